@@ -3,10 +3,9 @@
 //! `cargo bench -p seafix-vision --bench alignment`
 //!
 //! Scenes are blurred by a Gaussian of 0.8 px, with a contrast of ±60 grey levels and noise of 0, 2 or 5 grey levels,
-//! rounded
-//! to 8 bits; the left position and the disparity have random fractions. The bound is √2 σ (Σ w g gᵀ)^(−1/2): both
-//! images are
-//! noisy, σ² includes rounding (1/12), all pixels of the window have full weight and the scene is known.
+//! rounded to 8 bits; the left position and the disparity have random fractions. The bound is √2 σ (Σ w g gᵀ)^(−1/2):
+//! both images are noisy, σ² includes rounding (1/12), all pixels of the window have full weight and the scene is
+//! known.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its results")]
 

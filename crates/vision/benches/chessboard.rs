@@ -5,10 +5,8 @@
 //! `calibration.json`.
 //!
 //! A corner counts as matched if one point of the cloud lies within 1.5 px of OpenCV's in both images, and as wrong if
-//! it does
-//! so in the left image only. The 3D error is the RMS residual of a rigid fit of the board. Finally OpenCV calibrates
-//! the rig
-//! by each set of corners; the residuals in the images show which set is more accurate.
+//! it does so in the left image only. The 3D error is the RMS residual of a rigid fit of the board. Finally OpenCV
+//! calibrates the rig by each set of corners; the residuals in the images show which set is more accurate.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its results")]
 

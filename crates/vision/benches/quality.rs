@@ -4,27 +4,20 @@
 //! requirements.
 //!
 //! Photographs of scikit-image's wheel lie on planes. A second image of each is rendered through a known homography
-//! (cubic
-//! convolution, 8 bits; a smaller image averages the area of its pixels). Every method gives its 1000 strongest points
-//! of each
-//! image; the default Harris detector, which spreads them over the image at the cost of repeatability, has a row of its
-//! own.
-//! Points outside the other image are excluded, and n is the smaller number of the remaining ones. Points are mapped to
-//! the
-//! other image by the homography:
+//! (cubic convolution, 8 bits; a smaller image averages the area of its pixels). Every method gives its 1000 strongest
+//! points of each image; the default Harris detector, which spreads them over the image at the cost of repeatability,
+//! has a row of its own. Points outside the other image are excluded, and n is the smaller number of the remaining
+//! ones. Points are mapped to the other image by the homography:
 //!
 //! - *repeatability*: the number of pairs of points, one of each image, within 1.5 px over n; nearest pairs first, each
-//!   point
-//!   once (Mikolajczyk et al., *A comparison of affine region detectors*, IJCV 2005, with the distance of points
-//!   instead of
-//!   the overlap of regions);
+//!   point once (Mikolajczyk et al., *A comparison of affine region detectors*, IJCV 2005, with the distance of points
+//!   instead of the overlap of regions);
 //! - *matching score*: the number of mutual nearest neighbours by descriptor within 3 px over n (ibid.);
 //! - *matching accuracy*: the same number over that of all mutual nearest neighbours (HPatches; Dusmanu et al., D2-Net,
 //!   CVPR 2019), here at 3 px.
 //!
 //! Each is averaged over the photographs. Distances are Euclidean or Hamming, by one matcher for all methods. The last
-//! table
-//! gives the cosine between the SURF descriptors of Seafix and OpenCV at the same key points.
+//! table gives the cosine between the SURF descriptors of Seafix and OpenCV at the same key points.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
@@ -326,8 +319,7 @@ const AGREEMENTS: [Agreement; 6] = {
 /// Prints the cosines between the SURF descriptors of Seafix and OpenCV at OpenCV's key points.
 ///
 /// OpenCV rounds its upright window to integer pixels and its means to integer grey levels. The effect is small on 64
-/// numbers;
-/// with 128 it changes the sign of weak derivatives, which then count in another sum.
+/// numbers; with 128 it changes the sign of weak derivatives, which then count in another sum.
 fn cosines(photographs: &[Image], peers: &mut Peers) {
     println!(
         "\n{:<32} {:>13} {:>15} {:>18} {:>9} {:>8}",

@@ -1,12 +1,10 @@
 //! Run time of each stage of the front end, compared with its peer on the same images.
 //!
 //! `cargo bench -p seafix-vision --bench speed [-- PART-OF-A-NAME]`; see the README in this folder for the
-//! requirements.
-//! Both programs run in turns. Times are minima over all turns, with the median in brackets, since other programs may
-//! disturb
-//! a turn. One thread is measured in processor time; two threads, and the gain, by the clock. Seafix runs warm, as in a
-//! dive;
-//! allocations are counted after two frames, on one thread and on two. Without a peer Seafix is timed alone.
+//! requirements. Both programs run in turns. Times are minima over all turns, with the median in brackets, since other
+//! programs may disturb a turn. One thread is measured in processor time; two threads, and the gain, by the clock.
+//! Seafix runs warm, as in a dive; allocations are counted after two frames, on one thread and on two. Without a peer
+//! Seafix is timed alone.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its results")]
 

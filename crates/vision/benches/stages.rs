@@ -1,7 +1,7 @@
 //! Run time of each registered component, with new ones included automatically.
 //!
-//! Images have 1024×768 px, settings are the defaults, and the components run warm on one thread:
-//! `cargo bench -p seafix-vision --bench stages`.
+//! Images have 1024×768 px, settings are the defaults, and the components run warm on one thread: `cargo bench -p
+//! seafix-vision --bench stages`.
 
 mod common;
 

@@ -6,18 +6,15 @@ use seafix_geometry::{StereoPixels, StereoRig};
 /// A rig whose right camera is rotated so that matches lie on their epipolar lines.
 ///
 /// An opened housing, a bent bracket or a calibration in air shifts points off their epipolar lines by pixels; a
-/// matcher
-/// that searches along the lines then finds nothing.
+/// matcher that searches along the lines then finds nothing.
 ///
 /// Two angles are estimated: about the baseline, which shifts all points alike, and about the right camera's optical
 /// axis. They minimise Σ ρ(e). e is the signed Sampson distance ([`StereoRig::epipolar_offset`]) of a pair, ρ the loss
-/// of
-/// Geman and McClure, whose width shrinks from 32 px to 1 px (graduated non-convexity), so that false pairs have no
+/// of Geman and McClure, whose width shrinks from 32 px to 1 px (graduated non-convexity), so that false pairs have no
 /// influence.
 ///
 /// Limits: a rotation about the third axis changes depths and hardly moves a point off its line, and so do a wrong
-/// focal
-/// length and a wrong baseline. They keep their given values, and the scale error that they cause remains.
+/// focal length and a wrong baseline. They keep their given values, and the scale error that they cause remains.
 ///
 /// Source: Zhang, *Determining the epipolar geometry and its uncertainty*, IJCV 1998; Black and Rangarajan, *On the
 /// unification of line processes, outlier rejection, and robust statistics*, IJCV 1996 (the loss and its narrowing).
@@ -51,8 +48,7 @@ impl RightCameraRotation {
     pub const NEAR: f64 = 1.5;
 
     /// The correction of `rig` from matches by appearance ([`repeated_patterns`](crate::repeated_patterns)), best of
-    /// several
-    /// images.
+    /// several images.
     ///
     /// `None` if the given rig fits well enough, if no rotation brings a third of the pairs to their lines, or if the
     /// correction does not at least halve the median distance of the agreeing pairs.
@@ -151,8 +147,7 @@ mod tests {
     /// A rotation of 0.1 to 0.5° is recovered to 0.01°, beside or above the left camera, with half of the pairs false.
     ///
     /// Nothing is invented about the third axis, which pairs hardly determine. Seen to fail with squares in place of
-    /// the
-    /// robust loss.
+    /// the robust loss.
     #[test]
     fn a_turned_camera_is_found_again() {
         for step in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, -0.2, 0.01)] {

@@ -147,8 +147,7 @@ impl ScaleSpace {
     /// Calls `visit` with an octave whose levels are computed up to `level`.
     ///
     /// An octave that is kept is passed at once. Others are passed strip by strip, with margins so large that results
-    /// do not
-    /// depend on the strips.
+    /// do not depend on the strips.
     ///
     /// # Panics
     /// If no image is set.

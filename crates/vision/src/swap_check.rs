@@ -22,8 +22,7 @@ impl Sides {
     /// The counts of a pair of views, matched along the epipolar band in both orders.
     ///
     /// Points lie in front of the cameras, so a rig admits matches of the true order and few of the other. Exchanged
-    /// images
-    /// of a rectified rig give negative depths; those of any other rig also lie off their epipolar lines.
+    /// images of a rectified rig give negative depths; those of any other rig also lie off their epipolar lines.
     ///
     /// The check costs two matchings. A data set's first frames suffice, with their counts added.
     pub fn of(left: &View<'_>, right: &View<'_>, rig: &StereoRig, work: &mut Workspace) -> Self {

@@ -7,8 +7,7 @@ use rayon::prelude::*;
 /// The working memory of components and their use of threads.
 ///
 /// Components keep buffers between frames, so that a warm front end allocates nothing. Each component keeps its own
-/// type
-/// here; the contents never change a result.
+/// type here; the contents never change a result.
 #[derive(Debug, Default)]
 pub struct Workspace {
     threads: Threads,

@@ -13,8 +13,7 @@ pub(crate) fn map(h: &Matrix3<f64>, at: Pixel) -> Pixel {
 /// The view of `base` of this `size` through the homography `base_from_image`, in 8 bits.
 ///
 /// Each pixel is the mean of `samples`² points in it, more than one if the image is smaller than the base, by Keys'
-/// cubic
-/// convolution. The base is mirrored at its border, so that no edge appears there.
+/// cubic convolution. The base is mirrored at its border, so that no edge appears there.
 pub(crate) fn render(base: &Image, size: [usize; 2], base_from_image: &Matrix3<f64>, samples: usize) -> Image {
     let step = |i: usize| (i as f64 + 0.5) / samples as f64 - 0.5;
     let pixel = |x: usize, y: usize| {

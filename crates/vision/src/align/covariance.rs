@@ -24,16 +24,15 @@ const SLOPE: f64 = 0.15;
 
 /// The covariance of the aligned position (px²) in pixels of the left image; `None` if the window is noise alone.
 ///
-/// Noise of variance σ² in both images, with T of variance s_T² and I of s_I² scaled to 1, moves the position by
-/// δ = G⁻¹ Σ w J̃ᵀ(ñ_T − ñ_I), so Cov δ = σ² (1/s_T² + 1/s_I²) G⁻¹ (Σ w² J̃ᵀJ̃) G⁻¹. Three corrections apply:
+/// Noise of variance σ² in both images, with T of variance s_T² and I of s_I² scaled to 1, moves the position by δ =
+/// G⁻¹ Σ w J̃ᵀ(ñ_T − ñ_I), so Cov δ = σ² (1/s_T² + 1/s_I²) G⁻¹ (Σ w² J̃ᵀJ̃) G⁻¹. Three corrections apply:
 ///
 /// - G is Σ w J̃ᵀJ̃ without the contribution of noise, since noise in J̃ does not recur in the other image.
 /// - The noise part of Σ w² J̃ᵀJ̃ counts with the right image's noise alone; with its own it forms an odd sum, which
 ///   vanishes.
 /// - Interpolation keeps a fraction q of the noise ([`kept`]) in the residual and in products with noise, but not in
 ///   products with the scene, whose frequencies are low: σ² = Σ w (Ĩ − T̃)² / (1/s_T² + q/s_I²), corrected for the
-///   fitted
-///   parameters.
+///   fitted parameters.
 pub(super) fn covariance<const P: usize>(normal: &Normal<P>, residual: &Residual) -> Option<Matrix2<f64>> {
     let (left, right) = (1.0 / normal.variance, 1.0 / residual.variance);
     let kept = residual.fractions.map_or(MEAN_KEPT * MEAN_KEPT, |[x, y]| kept(x) * kept(y));
@@ -74,8 +73,7 @@ impl Slant {
 /// The slant at the end of an alignment by translation; `None` if the window is noise alone.
 ///
 /// The slant's own part is u = g_s − G_sm G_mm⁻¹ g_m, with g the gradient of the four parameters and G their
-/// information.
-/// Its covariance is σ² (1/s_T² + 1/s_I²) T (Σ w² J̃ᵀJ̃) Tᵀ with T = (−G_sm G_mm⁻¹, 1).
+/// information. Its covariance is σ² (1/s_T² + 1/s_I²) T (Σ w² J̃ᵀJ̃) Tᵀ with T = (−G_sm G_mm⁻¹, 1).
 pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Residual) -> Option<Slant> {
     let block = |all: &Matrix4<f64>, i, j| all.fixed_view::<2, 2>(i, j).into_owned();
     let within = block(&normal.information, 0, 0).try_inverse()?;

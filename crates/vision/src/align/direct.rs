@@ -10,23 +10,21 @@ use crate::{Image, Pair, Workspace};
 /// Direct alignment of a match by inverse-compositional Gauss–Newton, with its covariance.
 ///
 /// Depth depends on the disparity, so the right pixel is aligned to the left one. The map W(x) = c + A x takes the
-/// window T
-/// around the left pixel to the right image I and minimises Σ w (Ĩ(W(x)) − T̃(x))². The tilde means: mean subtracted,
-/// scaled
-/// to unit variance; so the zero-normalised cross-correlation is maximised. The right pixel becomes c. A begins as the
-/// relation on a surface parallel to the left image and is kept or fitted ([`Warp`]). The derivatives are those of T,
-/// computed once at integer pixels, so that their noise has no preferred direction; a cubic spline interpolates I.
+/// window T around the left pixel to the right image I and minimises Σ w (Ĩ(W(x)) − T̃(x))². The tilde means: mean
+/// subtracted, scaled to unit variance; so the zero-normalised cross-correlation is maximised. The right pixel becomes
+/// c. A begins as the relation on a surface parallel to the left image and is kept or fitted ([`Warp`]). The
+/// derivatives are those of T, computed once at integer pixels, so that their noise has no preferred direction; a cubic
+/// spline interpolates I.
 ///
 /// The error of the left pixel is common to both images; only the alignment's error, which follows from the gradients
-/// and
-/// the residual, comes between them ([`UncertainPixels`]).
+/// and the residual, comes between them ([`UncertainPixels`]).
 ///
 /// An alignment fails if it does not converge, ends far from its start, leaves dissimilar windows, or has a standard
 /// deviation above `reach`. Most such pairs are false matches: they are rejected, or keep the detectors' positions with
 /// independent errors ([`Unaligned`]).
 ///
-/// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a
-/// perfect fit for signal and image processing*, 1999.
+/// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a perfect fit for
+/// signal and image processing*, 1999.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Direct {

@@ -36,8 +36,8 @@ impl Direct {
     /// Replaces `found` by the positions in `to` of the `expected` points of `from`, in order.
     ///
     /// `None` marks a point that is not visible or does not align. The alignment is that of a stereo pair with a given
-    /// relation
-    /// of the images instead of a rig. One template is aligned to image after image, so a point does not drift.
+    /// relation of the images instead of a rig. One template is aligned to image after image, so a point does not
+    /// drift.
     pub fn follow_into(
         &self,
         from: &Image,

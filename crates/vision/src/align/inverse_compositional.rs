@@ -93,10 +93,9 @@ impl Aligner {
     /// Aligns by translation as [`align`](Self::align), or with a slant if the translation leaves a significant one.
     ///
     /// The test is Rao's score. Under noise alone, the gradient by the slant at the end of the translation, without its
-    /// part
-    /// due to translation, follows χ² with two degrees of freedom. If the slant is not significant or the slanted
-    /// alignment
-    /// fails, the translation's position is kept and its covariance grows by the error that the slant would cause.
+    /// part due to translation, follows χ² with two degrees of freedom. If the slant is not significant or the slanted
+    /// alignment fails, the translation's position is kept and its covariance grows by the error that the slant would
+    /// cause.
     pub(super) fn align_as_seen(
         &mut self,
         left: &Image,
@@ -364,8 +363,7 @@ impl Found<4> {
 }
 
 /// Subtracts the mean of the patch; returns its variance and its product with T̃, and fills `gradient` with its
-/// products
-/// with the columns of J̃.
+/// products with the columns of J̃.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn sums(
     patch: &mut [f32],

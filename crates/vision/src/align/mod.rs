@@ -71,8 +71,7 @@ pub use zncc_parabola::ZnccParabola;
 /// ```
 pub trait Refinement: Send + Sync + std::fmt::Debug {
     /// Replaces `pixels` by the refined pixels of `pairs`, in their order, with their joint covariance; rejected pairs
-    /// are
-    /// missing.
+    /// are missing.
     fn refine_into(
         &self,
         pairs: &[Pair],

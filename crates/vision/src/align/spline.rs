@@ -87,8 +87,7 @@ impl Spline {
     /// Computes the values on a grid that is stretched and sheared along its rows.
     ///
     /// Pixel i of row j lies at `at` + (`step` i + `drift` j, j). `columns` is a multiple of 8; values outside the
-    /// spline are
-    /// meaningless.
+    /// spline are meaningless.
     pub(super) fn sheared(
         &self,
         at: [f64; 2],

@@ -10,8 +10,7 @@ use crate::{Image, Pair, Workspace};
 /// No refinement: keeps the pixels of detector, locator and matcher.
 ///
 /// Their errors are independent: a fitted corner has the covariance of its fit, any other key point the `sigma-px` of
-/// the
-/// triangulation.
+/// the triangulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Unrefined {}

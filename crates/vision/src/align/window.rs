@@ -104,9 +104,8 @@ impl<const P: usize> Normal<P> {
     /// The prior information of the deformation, which is small, for noise of this variance.
     ///
     /// A deformation leaves some windows unchanged, such as the corner of a chessboard scaled along both its edges.
-    /// Noise would
-    /// still seem to determine it, equally in every step. The prior has a tenth of that apparent information, which is
-    /// negligible beside a texture's.
+    /// Noise would still seem to determine it, equally in every step. The prior has a tenth of that apparent
+    /// information, which is negligible beside a texture's.
     pub(super) fn prior(&self, noise: f64) -> SMatrix<f64, P, P> {
         SMatrix::from_fn(|i, j| if i == j && i >= 2 { 0.1 * noise * self.noise[(i, j)] } else { 0.0 })
     }

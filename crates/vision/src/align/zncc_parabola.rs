@@ -16,18 +16,17 @@ use crate::{
 ///
 /// The window around the left pixel is compared with those around the integer pixels near the right one, by
 /// zero-normalised cross-correlation c. The right pixel becomes the vertex of the paraboloid through the nine
-/// correlations
-/// around the maximum.
+/// correlations around the maximum.
 ///
 /// The covariance, for n pixels in the window and H = −∂²c, is that of a least-squares fit, 2 (1 − c) / n · H⁻¹, plus
 /// `floor-px`². The latter covers a bias: correlations are no paraboloid, which pulls the vertex towards integer
-/// pixels, and
-/// windows are not deformed, whatever the rig. That error is the same in every frame and does not average out.
+/// pixels, and windows are not deformed, whatever the rig. That error is the same in every frame and does not average
+/// out.
 ///
 /// A pair is most often a false match if its maximum lies at the edge of the search or is below `min-correlation`.
 ///
-/// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi,
-/// *Precise sub-pixel estimation on area-based matching*, ICCV 2001.
+/// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi, *Precise
+/// sub-pixel estimation on area-based matching*, ICCV 2001.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccParabola {

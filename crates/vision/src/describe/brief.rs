@@ -10,12 +10,11 @@ use crate::{Image, Keypoint, Workspace};
 /// BRIEF-256, upright: one bit for each of 256 pairs of points, set if the first is darker.
 ///
 /// The points are drawn from a Gaussian of 31/5 steps around the key point. Means over squares of 5 steps are compared,
-/// at
-/// the key point's subpixel position. Distances are Hamming distances. The descriptor is invariant under any increasing
-/// function of brightness, hence under offset and contrast.
+/// at the key point's subpixel position. Distances are Hamming distances. The descriptor is invariant under any
+/// increasing function of brightness, hence under offset and contrast.
 ///
-/// Source: Calonder, Lepetit, Strecha and Fua, *BRIEF: binary robust independent elementary features*,
-/// ECCV 2010 (its pattern G II).
+/// Source: Calonder, Lepetit, Strecha and Fua, *BRIEF: binary robust independent elementary features*, ECCV 2010 (its
+/// pattern G II).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Brief {

@@ -24,10 +24,8 @@ impl Grid {
     /// Computes the means over the cells of an upright grid, less the grey level at the centre.
     ///
     /// Pixels are squares of constant grey, and the border pixels continue beyond the border. The subtraction avoids
-    /// rounding
-    /// where the image is bright and gives zeros for a constant image. Pixels are summed directly, which for a thousand
-    /// key
-    /// points is cheaper than an integral image, and exact.
+    /// rounding where the image is bright and gives zeros for a constant image. Pixels are summed directly, which for a
+    /// thousand key points is cheaper than an integral image, and exact.
     pub(super) fn upright<const N: usize, const LANES: usize>(
         &self,
         image: &Image,

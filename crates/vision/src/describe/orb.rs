@@ -10,11 +10,10 @@ use crate::{Image, Keypoint, Workspace};
 /// ORB's descriptor: BRIEF-256, rotated by the direction from the key point to the centroid of brightness.
 ///
 /// The centroid is that within 15 steps around the key point. Limit: the pattern is BRIEF's, drawn from a Gaussian and
-/// kept
-/// within the circle, not ORB's own, which is learned on photographs.
+/// kept within the circle, not ORB's own, which is learned on photographs.
 ///
-/// Source: Rublee, Rabaud, Konolige and Bradski, *ORB: an efficient alternative to SIFT or SURF*, ICCV
-/// 2011; Rosin, *Measuring corner properties*, 1999.
+/// Source: Rublee, Rabaud, Konolige and Bradski, *ORB: an efficient alternative to SIFT or SURF*, ICCV 2011; Rosin,
+/// *Measuring corner properties*, 1999.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Orb {

@@ -9,8 +9,7 @@ use crate::Image;
 /// SURF's orientation: the dominant gradient direction around a key point.
 ///
 /// Haar wavelets of 4 s give gradients at the 113 points of a grid of pitch s within 6 s, weighted by a Gaussian of 2.5
-/// s. A
-/// sector of 60° rotates in steps of 5°, and the gradients in it are summed; the longest sum is the orientation.
+/// s. A sector of 60° rotates in steps of 5°, and the gradients in it are summed; the longest sum is the orientation.
 ///
 /// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006.
 #[derive(Debug)]

@@ -16,20 +16,17 @@ use crate::{
 /// SIFT's descriptor: histograms of 8 gradient directions in 4×4 cells of 3σ.
 ///
 /// Samples are weighted by the gradient's magnitude and a Gaussian of two cells, and shared among neighbouring cells
-/// and
-/// directions. The vector is scaled to norm one, clipped at 0.2 and scaled to norm one again.
+/// and directions. The vector is scaled to norm one, clipped at 0.2 and scaled to norm one again.
 ///
 /// The image is smoothed by the Gaussian nearest to the key point's scale σ, whatever its detector, and sampled on a
-/// rotated
-/// grid: 20 × 20 gradients, ¾ σ apart, from differences across the grid's own squares. The rotation is the peak of a
-/// histogram of the gradient directions around the key point, under a Gaussian of 1.5 σ.
+/// rotated grid: 20 × 20 gradients, ¾ σ apart, from differences across the grid's own squares. The rotation is the peak
+/// of a histogram of the gradient directions around the key point, under a Gaussian of 1.5 σ.
 ///
 /// Limits: a key point with two strong directions keeps the stronger (Lowe would describe it twice). All numbers are
-/// zero in
-/// a flat region.
+/// zero in a flat region.
 ///
-/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004; Arandjelović
-/// and Zisserman, *Three things everyone should know to improve object retrieval*, CVPR 2012 (`root`).
+/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004; Arandjelović and Zisserman,
+/// *Three things everyone should know to improve object retrieval*, CVPR 2012 (`root`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sift {

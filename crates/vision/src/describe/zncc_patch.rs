@@ -13,12 +13,10 @@ use crate::{
 ///
 /// The scalar product of two such windows is their zero-normalised cross-correlation ρ, so their Euclidean distance is
 /// √(2 (1 − ρ)). It is invariant under gain and offset of brightness, but not under rotation: use it for the two views
-/// of
-/// one instant, not for a vehicle that has turned.
+/// of one instant, not for a vehicle that has turned.
 ///
 /// The window is square and upright, sampled at `window`² points `step` apart from the image under a Gaussian; the
-/// nearest
-/// pixel is repeated beyond the border. All numbers are zero in a flat region, or if values overflow.
+/// nearest pixel is repeated beyond the border. All numbers are zero in a flat region, or if values overflow.
 ///
 /// Source: Lewis, *Fast normalized cross-correlation*, Vision Interface, 1995.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -20,11 +20,9 @@ use crate::{
 ///
 /// D(x, y, σ) = (G_kσ − G_σ) ∗ I with k = 2^(1/3) is nearly σ² ∇²G ∗ I up to a factor. An extremum among its 26
 /// neighbours moves to the vertex of the quadratic through them; the fit is repeated from the next sample if the vertex
-/// is
-/// nearer to that. An extremum is accepted if |D| is at least `contrast` and the ratio of its principal curvatures is
-/// below
-/// `edge`, since positions along an edge are ill determined. The response is |D| (grey levels), the scale is the σ of
-/// the extremum.
+/// is nearer to that. An extremum is accepted if |D| is at least `contrast` and the ratio of its principal curvatures
+/// is below `edge`, since positions along an edge are ill determined. The response is |D| (grey levels), the scale is
+/// the σ of the extremum.
 ///
 /// Limit: nothing is detected within five pixels (of the octave) of the border.
 ///

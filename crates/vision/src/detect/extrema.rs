@@ -14,10 +14,8 @@ const LANES: usize = 16;
 /// Appends the extrema (level, x, y) of these rows to `found` in row-major order.
 ///
 /// The difference D = level + 1 − level of an extremum exceeds `min` and its 26 neighbours, or is as far below; of
-/// equal
-/// samples the first counts. `border` columns and rows on each side are skipped. `ring` is scratch for the differences
-/// of
-/// three rows.
+/// equal samples the first counts. `border` columns and rows on each side are skipped. `ring` is scratch for the
+/// differences of three rows.
 pub(super) fn extrema(
     octave: &Octave,
     rows: Range<usize>,

@@ -15,11 +15,9 @@ use crate::{Image, Workspace};
 /// FAST-9/16: pixels that differ from an arc of the circle around them.
 ///
 /// A pixel is a corner if 9 consecutive ones of the 16 pixels on a circle of radius 3 px are all brighter than the
-/// centre
-/// by more than the threshold, or all darker. The response is the largest threshold that the pixel passes (grey
-/// levels):
-/// the maximum over the 16 arcs of the minimum difference on the arc. The corner is the vertex of the quadratic through
-/// the nine responses around a maximum, if they have one.
+/// centre by more than the threshold, or all darker. The response is the largest threshold that the pixel passes (grey
+/// levels): the maximum over the 16 arcs of the minimum difference on the arc. The corner is the vertex of the
+/// quadratic through the nine responses around a maximum, if they have one.
 ///
 /// Limit: nothing is detected within 4 px of the border. Each value is a difference of two pixels, so a quarter turn of
 /// the image turns the corners exactly.

@@ -17,9 +17,8 @@ use crate::{
 /// The settings of a detector that fits a corner model to Harris' candidates.
 ///
 /// Candidates are the maxima of [`Harris`](super::Harris)' response. A corner model is fitted to the pixels around
-/// each;
-/// a good fit gives the corner and its position. The response is the inverse of the larger eigenvalue of the position's
-/// covariance (px⁻²), so sharp edges of high contrast at a right angle come first.
+/// each; a good fit gives the corner and its position. The response is the inverse of the larger eigenvalue of the
+/// position's covariance (px⁻²), so sharp edges of high contrast at a right angle come first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FittedCorners {

@@ -14,16 +14,13 @@ use crate::{Image, Workspace};
 /// Harris' corner detector.
 ///
 /// The gradient g (grey levels/px, Sobel's operator) gives the structure tensor A = w ∗ g gᵀ with a window w. The
-/// response
-/// R = det A − k (tr A)² (grey levels⁴/px⁴) is positive at corners, negative along edges and zero in flat regions. A
-/// corner
-/// is a maximum of R, with the subpixel position of the vertex of the quadratic through its nine responses.
+/// response R = det A − k (tr A)² (grey levels⁴/px⁴) is positive at corners, negative along edges and zero in flat
+/// regions. A corner is a maximum of R, with the subpixel position of the vertex of the quadratic through its nine
+/// responses.
 ///
 /// Limits: the position is repeatable, but not the intersection of the edges; the response peaks 1 to 2 px inside a
-/// convex
-/// corner. Nothing is detected nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; a smaller
-/// image
-/// has no corner.
+/// convex corner. Nothing is detected nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; a
+/// smaller image has no corner.
 ///
 /// Source: Harris and Stephens, *A combined corner and edge detector*, Alvey Vision Conference, 1988.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -85,8 +85,7 @@ impl Octave<'_> {
         second([row(top), row(top + lobe), row(top + 2 * lobe), row(bottom)], yy);
         mixed([row(y - lobe), row(y), row(y + 1), row(y + lobe + 1)], xy);
         // The sum over a lobe of xx or yy, 2·lobe − 1 long, becomes its mean. The factor of xy makes the determinant of
-        // a
-        // quadratic surface the same in every direction.
+        // a quadratic surface the same in every direction.
         let pixels = (lobe << self.number) as f32 * ((2 * lobe - 1) << self.number) as f32;
         let mean = self.unit / pixels;
         let balance = (lobe * lobe) as f32 / ((lobe + 1) * (lobe + 1)) as f32;

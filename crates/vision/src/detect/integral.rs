@@ -7,8 +7,7 @@ use crate::Image;
 /// The integral image in integer units, modulo 2³².
 ///
 /// The unit is a power of two of a grey level. It is so small that integer grey levels are exact, and so large that no
-/// sum
-/// over a rectangle of the largest area reaches 2³⁰. Differences are therefore exact although the sums overflow.
+/// sum over a rectangle of the largest area reaches 2³⁰. Differences are therefore exact although the sums overflow.
 ///
 /// Source: Viola and Jones, *Rapid object detection using a boosted cascade of simple features*, 2001.
 #[derive(Debug, Default)]

@@ -17,8 +17,7 @@ pub enum Selection {
     /// The points with the largest distance to a clearly stronger one, 0.9 Rⱼ > Rᵢ: adaptive non-maximal suppression.
     ///
     /// Unlike cells, it does not depend on the position of a grid. Source: Brown, Szeliski and Winder, *Multi-image
-    /// matching
-    /// using multi-scale oriented patches*, CVPR 2005.
+    /// matching using multi-scale oriented patches*, CVPR 2005.
     Adaptive,
 }
 

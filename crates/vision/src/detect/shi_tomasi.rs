@@ -17,8 +17,7 @@ use crate::{Image, Workspace};
 /// levels²/px²): the information of the window about the displacement in the worse direction. It has no free constant.
 ///
 /// Limits: nothing is detected nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; a smaller
-/// image
-/// has no corner.
+/// image has no corner.
 ///
 /// Source: Shi and Tomasi, *Good features to track*, CVPR 1994.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -13,15 +13,14 @@ use crate::{Image, Threads, Workspace};
 ///
 /// Box filters of side L = 9, 15, 21, … px approximate the second derivatives Lxx, Lyy, Lxy of the image smoothed with
 /// σ = 1.2 L/9. The response is Lxx Lyy − (w Lxy)² (grey levels², since each lobe of a filter counts by its mean), with
-/// w
-/// such that a quadratic surface has the same response in every direction. Each octave repeats the filters on the image
-/// with 2×2 pixels summed to one. A maximum among its 26 neighbours moves to the vertex of the quadratic through them;
-/// [`Keypoint::scale`] is its σ, the s of SURF's descriptor.
+/// w such that a quadratic surface has the same response in every direction. Each octave repeats the filters on the
+/// image with 2×2 pixels summed to one. A maximum among its 26 neighbours moves to the vertex of the quadratic through
+/// them; [`Keypoint::scale`] is its σ, the s of SURF's descriptor.
 ///
 /// Limit: nothing is detected within reach of the next larger filter of the octave from the border.
 ///
-/// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006;
-/// Bay, Ess, Tuytelaars and Van Gool, CVIU 2008.
+/// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006; Bay, Ess, Tuytelaars and Van
+/// Gool, CVIU 2008.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FastHessian {

@@ -107,8 +107,7 @@ impl Stream {
     /// Fills `out` with the response of complete image rows from `first` on.
     ///
     /// The response is zero nearer to the border than the operator reaches. Rows follow those of the last call, or are
-    /// the
-    /// first.
+    /// the first.
     pub(super) fn fill(&mut self, image: &Image, tensor: &Tensor, weights: &Weights, first: usize, out: &mut [f32]) {
         let (width, height) = (image.width(), image.height());
         let (margin, reach) = (weights.margin(), weights.reach());

@@ -9,12 +9,9 @@ use crate::{Image, Threads, Workspace};
 /// Contrast-limited adaptive histogram equalisation (CLAHE).
 ///
 /// The image is divided into tiles. Each tile has a histogram over 0 to 255 in which no bin keeps more than `clip`
-/// times the
-/// uniform count; the excess is spread evenly over all bins. The tile's mapping is the cumulative histogram, linear
-/// within
-/// a bin, so that grey levels finer than a bin remain distinct. A pixel is mapped by the four nearest tiles,
-/// interpolated
-/// between their centres. Values outside 0 to 255 are clamped.
+/// times the uniform count; the excess is spread evenly over all bins. The tile's mapping is the cumulative histogram,
+/// linear within a bin, so that grey levels finer than a bin remain distinct. A pixel is mapped by the four nearest
+/// tiles, interpolated between their centres. Values outside 0 to 255 are clamped.
 ///
 /// The slope of a mapping, and so the gain of contrast and noise, never exceeds `clip` + 1. A constant image stays
 /// constant, in general with another value.

@@ -12,10 +12,8 @@ use crate::{Image, Workspace};
 /// The guided filter with the image as its own guide.
 ///
 /// Each window of 2r + 1 pixels is fitted by a I + b with a = var / (var + σ²) and b = (1 − a) mean: contrast far below
-/// σ
-/// is reduced to the mean, and edges far above σ remain. A pixel uses the mean of a and b over all windows that contain
-/// it.
-/// Results are clipped to the range of the input, 0 to 255.
+/// σ is reduced to the mean, and edges far above σ remain. A pixel uses the mean of a and b over all windows that
+/// contain it. Results are clipped to the range of the input, 0 to 255.
 ///
 /// Source: He, Sun and Tang, *Guided image filtering*, ECCV 2010; PAMI 2013.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -12,13 +12,11 @@ use crate::{Image, Workspace};
 /// Shading correction: division by the lamps' light or subtraction of backscatter, estimated as the smooth background.
 ///
 /// The background B is the image after three means over windows of 2r + 1 pixels, nearly a Gaussian of standard
-/// deviation σ
-/// (r = ½ (√(4σ² + 1) − 1)). Lamps multiply, so `divide` gives I · min(m / B, gain) with the image's mean m.
-/// Backscatter
-/// adds, so `subtract` gives I − B + m. Results are clipped to 0 to 255.
+/// deviation σ (r = ½ (√(4σ² + 1) − 1)). Lamps multiply, so `divide` gives I · min(m / B, gain) with the image's mean
+/// m. Backscatter adds, so `subtract` gives I − B + m. Results are clipped to 0 to 255.
 ///
-/// Source: Gonzalez and Woods, *Digital image processing*, 2002, shading correction; the windows:
-/// Wells, *Efficient synthesis of Gaussian filters by cascaded uniform filters*, PAMI 1986.
+/// Source: Gonzalez and Woods, *Digital image processing*, 2002, shading correction; the windows: Wells, *Efficient
+/// synthesis of Gaussian filters by cascaded uniform filters*, PAMI 1986.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Illumination {

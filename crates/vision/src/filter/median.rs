@@ -10,13 +10,10 @@ use crate::{Image, Workspace};
 /// The median filter of 3×3 or 5×5 pixels.
 ///
 /// It removes single bright or dark pixels, drifting particles among them. Edges keep their positions; corners are
-/// rounded a
-/// little. The nearest pixel is repeated beyond the border. The median comes from Batcher's sorting network, reduced to
-/// the
-/// comparators that lead to it, for sixteen pixels at a time.
+/// rounded a little. The nearest pixel is repeated beyond the border. The median comes from Batcher's sorting network,
+/// reduced to the comparators that lead to it, for sixteen pixels at a time.
 ///
-/// Source: Tukey, *Exploratory data analysis*, 1977; Batcher, *Sorting networks and their applications*,
-/// AFIPS 1968.
+/// Source: Tukey, *Exploratory data analysis*, 1977; Batcher, *Sorting networks and their applications*, AFIPS 1968.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Median {

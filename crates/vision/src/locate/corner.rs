@@ -57,8 +57,7 @@ locator!(
     /// The corner of a chequerboard: two crossing blurred edges, bright in two opposite sectors.
     ///
     /// Least squares on the residuals r = I − a − b·U fit seven parameters: centre, two directions, blur, two grey
-    /// levels. The
-    /// covariance of the centre comes from (JᵀJ)⁻¹, scaled by the residual variance.
+    /// levels. The covariance of the centre comes from (JᵀJ)⁻¹, scaled by the residual variance.
     XCorner,
     "x-corner",
     [Shape::Crossing],

@@ -11,17 +11,15 @@ use crate::{Image, Keypoint, Workspace};
 /// Förstner's junction: the point nearest to the lines of all edges around it.
 ///
 /// The point p solves Σ w g gᵀ (x − p) = 0 over the pixels x with gradients g. A Harris response peaks 1 to 2 px inside
-/// a
-/// convex corner, at the apex of the blurred edge's curve, but the edges still intersect at the true corner. The weight
-/// w = exp(−r²/2σ²) (1 − exp(−r²/2h²)), h = 0.6 σ, r the distance from p, therefore suppresses the middle, where blur
-/// has
-/// rounded the corner. Gradients are taken at integer pixels and the weights alone move with p, so nothing is
+/// a convex corner, at the apex of the blurred edge's curve, but the edges still intersect at the true corner. The
+/// weight w = exp(−r²/2σ²) (1 − exp(−r²/2h²)), h = 0.6 σ, r the distance from p, therefore suppresses the middle, where
+/// blur has rounded the corner. Gradients are taken at integer pixels and the weights alone move with p, so nothing is
 /// interpolated.
 ///
 /// The covariance is A⁻¹ (Σ w² (gᵀd)² g gᵀ) A⁻¹ with A = Σ w g gᵀ and d = x − p, from the distances of the lines to p.
 ///
-/// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct
-/// points, corners and centres of circular features*, ISPRS 1987.
+/// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct points, corners and
+/// centres of circular features*, ISPRS 1987.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Junction {

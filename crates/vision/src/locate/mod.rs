@@ -1,12 +1,9 @@
 //! Locators of exact corners.
 //!
 //! A detector's response peaks near a corner, not at it: 1 to 2 px inside the corner of a box. A locator fits a corner
-//! model
-//! to the pixels around it. Key points of both images are located before they are described: a response may have two
-//! maxima
-//! beside one corner, and those of one image would match the others of the other image. Key points at no corner stay.
-//! The
-//! refinement later replaces the right pixel by a more exact one than a second fit gives.
+//! model to the pixels around it. Key points of both images are located before they are described: a response may have
+//! two maxima beside one corner, and those of one image would match the others of the other image. Key points at no
+//! corner stay. The refinement later replaces the right pixel by a more exact one than a second fit gives.
 
 mod corner;
 mod fit;

@@ -21,8 +21,7 @@ pub(super) const PARAMETERS: usize = 7;
 /// - U = 4 Φ₂ − 2 Φ(h₁) − 2 Φ(h₂) + 1 for a crossing.
 ///
 /// Φ₂ is the bivariate normal distribution: exactly the indicator of the wedge h₁ > 0, h₂ > 0 convolved with an
-/// isotropic
-/// Gaussian, for edges at any angle.
+/// isotropic Gaussian, for edges at any angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Model {
     pub(super) shape: Shape,
@@ -86,8 +85,8 @@ impl Pixels {
     }
 }
 
-/// The Gauss–Legendre rule for the part of Φ₂ that ρ adds to Φ(h₁) Φ(h₂):
-/// ∫ exp(−(h₁² + h₂² − 2 h₁ h₂ sin φ) / 2cos²φ) dφ/2π from 0 to arcsin ρ.
+/// The Gauss–Legendre rule for the part of Φ₂ that ρ adds to Φ(h₁) Φ(h₂): ∫ exp(−(h₁² + h₂² − 2 h₁ h₂ sin φ) / 2cos²φ)
+/// dφ/2π from 0 to arcsin ρ.
 struct Rule {
     sine: f64,
     cosine: f64,

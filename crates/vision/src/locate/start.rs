@@ -30,11 +30,9 @@ impl Start {
     /// The edges in the square of side 2·`half` + 1, at most [`MAX`], around the pixel (x, y).
     ///
     /// The square and one pixel more must lie in the image. `None` if there are fewer than two edges. They intersect at
-    /// the
-    /// point nearest to the lines of the gradients, Σ g gᵀ(x − p) = 0. Their directions are those of two edges that
-    /// explain the
-    /// moments mₖ = Σ |g|² z^k, z = exp(2i·arg g), of the gradients: z₁ and z₂ are the roots of z² − S z + P with
-    /// m₁ = S m₀ − P m̄₁ and m₂ = S m₁ − P m₀ (Prony's method).
+    /// the point nearest to the lines of the gradients, Σ g gᵀ(x − p) = 0. Their directions are those of two edges that
+    /// explain the moments mₖ = Σ |g|² z^k, z = exp(2i·arg g), of the gradients: z₁ and z₂ are the roots of z² − S z +
+    /// P with m₁ = S m₀ − P m̄₁ and m₂ = S m₁ − P m₀ (Prony's method).
     pub(super) fn of(image: &Image, x: usize, y: usize, half: usize) -> Option<Self> {
         let square = Square::cut(image, x, y, half);
         let [xx, xy, yy, xd, yd, fourth_x, fourth_y] = moments(&square).map(f64::from);

@@ -28,9 +28,8 @@ impl Along {
     ///
     /// Its arguments are both indices and the squared distance of the descriptors, in the order of the left key points.
     /// Only the pairs compete that `visit(i, ..)` names for left key point `i`. The distance is that of the
-    /// descriptors. With
-    /// neighbours it is the inverse of a pair's supported weight, and ambiguous pairs are rejected unless `patterns` is
-    /// set.
+    /// descriptors. With neighbours it is the inverse of a pair's supported weight, and ambiguous pairs are rejected
+    /// unless `patterns` is set.
     pub(super) fn search(
         &mut self,
         test: Test,

@@ -6,8 +6,7 @@ use seafix_geometry::{Pixel, Point, StereoRig};
 /// Replaces `curve` by the epipolar curve of left pixel `place` in the right image, between two depths (m).
 ///
 /// It has points about `step` px apart, at most `max`, including those outside the image and excluding those outside
-/// the
-/// range of the lens model. They are evenly spaced in inverse depth, hence in the image if the cameras are side by
+/// the range of the lens model. They are evenly spaced in inverse depth, hence in the image if the cameras are side by
 /// side.
 pub(super) fn epipolar_curve(
     rig: &StereoRig,

@@ -15,35 +15,27 @@ use crate::Workspace;
 /// Mutual nearest neighbours by descriptor along the epipolar band, with ratio test and neighbour support.
 ///
 /// A pair is admissible if its key points lie within `epipolar_px` of a common point's projections (Sampson distance,
-/// see
-/// [`StereoRig::epipolar_distance`]) and that point's depth lies between the limits. This holds for any rig, rectified
-/// or
-/// not. Only admissible pairs compete, for the second place too; otherwise a repeated pattern would have no clear
-/// nearest
-/// neighbour anywhere.
+/// see [`StereoRig::epipolar_distance`]) and that point's depth lies between the limits. This holds for any rig,
+/// rectified or not. Only admissible pairs compete, for the second place too; otherwise a repeated pattern would have
+/// no clear nearest neighbour anywhere.
 ///
 /// The distance is Euclidean between numbers and Hamming between bits. A pair passes if its distance is less than
-/// `ratio`
-/// times the distance to the second nearest, seen from either side. With `neighbours`, pairs compete by weight instead:
-/// the
-/// inverse squared distance times the support of the pairs around it (relaxation labelling). A pair is rejected as
-/// ambiguous
-/// if its whole neighbourhood fits as well one period of a repeated pattern further; so are the pairs around it that
-/// seem
-/// unambiguous.
+/// `ratio` times the distance to the second nearest, seen from either side. With `neighbours`, pairs compete by weight
+/// instead: the inverse squared distance times the support of the pairs around it (relaxation labelling). A pair is
+/// rejected as ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; so are the
+/// pairs around it that seem unambiguous.
 ///
 /// Limit: descriptors of different kinds or lengths do not match.
 ///
-/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio);
-/// Barnard and Thompson, *Disparity analysis of images*, PAMI 1980 (support).
+/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio); Barnard and Thompson,
+/// *Disparity analysis of images*, PAMI 1980 (support).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EpipolarBand {
     /// Maximum ratio of the distances to the nearest and the second nearest; 1 disables the test.
     pub ratio: f64,
     /// Maximum distance between descriptors of unit length, whatever the second nearest; its square is 2 − 2 cos of
-    /// their
-    /// angle.
+    /// their angle.
     pub max_distance: f64,
     /// Maximum fraction of differing bits, for binary descriptors.
     pub max_hamming: f64,
@@ -256,8 +248,7 @@ mod tests {
             .collect();
         let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
         // A common pattern, small individual differences and image noise: the neighbours together distinguish a
-        // position from the
-        // next by the required six standard errors.
+        // position from the next by the required six standard errors.
         let mut next = numbers(11);
         let descriptor: Vec<f32> = (0..48 * 16).map(|i| (i % 16) as f32 / 16.0 + 0.2 * next()).collect();
         let mut noisy = || unit(descriptor.iter().map(|x| x + 0.15 * next()).collect(), 16);

@@ -29,10 +29,8 @@ impl Exhaustive {
     /// Replaces `nearest` by the nearest neighbours among all pairs.
     ///
     /// Numbers are compared by |a|² + |b|² − 2 a·b, in blocks that stay in registers. If rounding of that form could
-    /// change the
-    /// nearest or the second, differences are summed instead; so are the final distances of both. The result equals
-    /// that of
-    /// [`Metric::squared`] for every pair to the last bit, whatever the machine or its threads.
+    /// change the nearest or the second, differences are summed instead; so are the final distances of both. The result
+    /// equals that of [`Metric::squared`] for every pair to the last bit, whatever the machine or its threads.
     pub(super) fn compare(&mut self, metric: &Metric<'_>, threads: Threads, nearest: &mut Nearest) {
         let [n, m] = match metric {
             Metric::Euclid([a, b]) => [a.len(), b.len()],
@@ -61,8 +59,7 @@ impl Exhaustive {
                 let (a_max, b_max) =
                     (longest(&mut lengths.iter().copied()), longest(&mut (0..m).map(|j| squared_length(b.row(j)))));
                 // The products of n numbers have an error of at most n + 4 roundings of |a|² + |b|², ε/2 each; the
-                // differences, in eight
-                // sums, of n/4 + 12. Both count for the second and for the third.
+                // differences, in eight sums, of n/4 + 12. Both count for the second and for the third.
                 (1.25 * a.length() as f32 + 20.0) * f32::EPSILON * (a_max + b_max)
             }
             Metric::Hamming(tables) => {

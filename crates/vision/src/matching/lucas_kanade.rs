@@ -15,8 +15,7 @@ use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
 /// positions to full resolution and back. The best correlation is a match if it lies on the epipolar curve.
 ///
 /// Right key points take no part. The distance of a pair is 1 minus the correlation. The better of two pairs within a
-/// pixel
-/// of each other is kept. Limit: there is no ratio test, so a pair on a repeated pattern may be a period off.
+/// pixel of each other is kept. Limit: there is no ratio test, so a pair on a repeated pattern may be a period off.
 ///
 /// Source: Lucas and Kanade, *An iterative image registration technique with an application to stereo vision*, 1981;
 /// Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000.
@@ -113,8 +112,7 @@ impl LucasKanade {
     /// The position of `place` in the right image, and the correlation there.
     ///
     /// A window near the border fits on finer levels only, and a pair that a coarse level does not resolve may appear
-    /// on a
-    /// finer one; so levels are tried from coarse to fine.
+    /// on a finer one; so levels are tried from coarse to fine.
     fn seek(&self, levels: [&[Image]; 2], place: &Pixel, rig: &StereoRig, seeker: &mut Seeker) -> Option<(Pixel, f64)> {
         let coarsest = SEARCHED.min(levels[0].len().saturating_sub(1));
         (0..=coarsest).rev().find_map(|level| self.seek_from(level, levels, place, rig, seeker))

@@ -26,8 +26,7 @@ impl<'a> Metric<'a> {
     /// The squared distance of left descriptor `i` and right descriptor `j`.
     ///
     /// It is Euclidean for numbers. For n bits with Hamming distance h it is 4 h / n, the squared distance of the unit
-    /// vectors
-    /// whose signs they are.
+    /// vectors whose signs they are.
     pub(super) fn squared(&self, i: usize, j: usize) -> f32 {
         match self {
             Self::Euclid([a, b]) => squared(a.row(i), b.row(j)),

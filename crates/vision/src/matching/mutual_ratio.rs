@@ -10,10 +10,8 @@ use crate::Workspace;
 /// Mutual nearest neighbours by descriptor among all pairs, with the ratio test.
 ///
 /// All pairs are compared exactly, by Euclidean distance between numbers or Hamming distance between bits. A pair
-/// passes if
-/// its distance is less than `ratio` times the distance to the second nearest, seen from either side; of equal
-/// distances
-/// the first counts as nearest.
+/// passes if its distance is less than `ratio` times the distance to the second nearest, seen from either side; of
+/// equal distances the first counts as nearest.
 ///
 /// Limits: descriptors of different kinds or lengths do not match. The rig takes no part; [`EpipolarBand`] uses it.
 ///
@@ -24,8 +22,7 @@ pub struct MutualRatio {
     /// Maximum ratio of the distances to the nearest and the second nearest; 1 disables the test.
     pub ratio: f64,
     /// Maximum distance between descriptors of unit length, whatever the second nearest; its square is 2 − 2 cos of
-    /// their
-    /// angle.
+    /// their angle.
     pub max_distance: f64,
     /// Maximum fraction of differing bits, for binary descriptors.
     pub max_hamming: f64,

@@ -70,8 +70,7 @@ const ALTERNATIVE: f32 = 0.5;
 /// The number of standard errors by which the neighbourhood's descriptors must prefer a pair to its alternative.
 ///
 /// It is three, doubled because the errors are not independent: windows of neighbours overlap, and the sampling by the
-/// pixel
-/// grid has a similar effect on patterns a period apart.
+/// pixel grid has a similar effect on patterns a period apart.
 const CLEARLY: f32 = 6.0;
 /// The minimum number of neighbours for a standard error.
 const FEW: usize = 4;
@@ -117,15 +116,13 @@ impl MatchCandidates {
 
     /// Shifts weight to the candidates that agree with those of the `neighbours` nearest left key points.
     ///
-    /// Pairs (i, j) and (i', j') agree by c = 1 − |δ| / (1 px + 0.3 |x_i − x_i'|), if positive, where
-    /// δ = (x_j − x_i) − (x_j' − x_i') is the difference of their displacements. Each round multiplies the weight w_ij
-    /// by its
-    /// support, the mean over i' of the maximum over j' of p_i'j' c, where p_ij = w_ij / (Σ_k w_ik + Σ_k w_kj − w_ij)
-    /// is the
+    /// Pairs (i, j) and (i', j') agree by c = 1 − |δ| / (1 px + 0.3 |x_i − x_i'|), if positive, where δ = (x_j − x_i) −
+    /// (x_j' − x_i') is the difference of their displacements. Each round multiplies the weight w_ij by its support,
+    /// the mean over i' of the maximum over j' of p_i'j' c, where p_ij = w_ij / (Σ_k w_ik + Σ_k w_kj − w_ij) is the
     /// pair's fraction. Without any support the weights keep their ratios, those of the plain ratio test.
     ///
-    /// Source: Barnard and Thompson, *Disparity analysis of images*, PAMI 1980; Pollard, Mayhew and
-    /// Frisby, *PMF: a stereo correspondence algorithm using a disparity gradient limit*, 1985.
+    /// Source: Barnard and Thompson, *Disparity analysis of images*, PAMI 1980; Pollard, Mayhew and Frisby, *PMF: a
+    /// stereo correspondence algorithm using a disparity gradient limit*, 1985.
     pub(super) fn support(&mut self, left: &[Keypoint], right: usize, neighbours: usize) {
         self.link(left, neighbours);
         for _ in 0..ROUNDS {
@@ -140,18 +137,13 @@ impl MatchCandidates {
     }
 
     /// Decides for each of these pairs, in the order of the left key points, whether it is ambiguous: the evidence for
-    /// it
-    /// supports an alternative as well, as on a repeated pattern shifted by a period.
+    /// it supports an alternative as well, as on a repeated pattern shifted by a period.
     ///
     /// An alternative of a pair is another candidate of its left key point with which the neighbours agree at least
-    /// half as
-    /// much, by candidates of their own. Each such neighbour, and the point itself, contributes the logarithm of a
-    /// ratio of
-    /// squared descriptor distances: that of its candidate that agrees with the alternative over that of its candidate
-    /// that
-    /// agrees with the pair. A pair is confirmed if the mean is at least six standard errors above zero or, with fewer
-    /// than
-    /// four neighbours, if it passes the plain ratio test.
+    /// half as much, by candidates of their own. Each such neighbour, and the point itself, contributes the logarithm
+    /// of a ratio of squared descriptor distances: that of its candidate that agrees with the alternative over that of
+    /// its candidate that agrees with the pair. A pair is confirmed if the mean is at least six standard errors above
+    /// zero or, with fewer than four neighbours, if it passes the plain ratio test.
     ///
     /// One neighbourhood may mislead, so a pair is ambiguous if more than half of the pairs that agree with it, itself
     /// included, are not confirmed.
@@ -181,8 +173,8 @@ impl MatchCandidates {
     /// Marks each pair as ambiguous if more than a fifth of its `neighbours` nearest pairs are.
     ///
     /// Points of an unbounded pattern differ from their alternatives by chance at best: if the right image has no key
-    /// point at
-    /// the alternative's position, or has it a little off. Without repetition hardly any pair has an alternative.
+    /// point at the alternative's position, or has it a little off. Without repetition hardly any pair has an
+    /// alternative.
     pub(super) fn spread(
         &mut self,
         left: &[Keypoint],

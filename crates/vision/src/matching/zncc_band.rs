@@ -17,19 +17,16 @@ use crate::{Image, Workspace, detect::vertex};
 ///
 /// The window around a key point is compared by zero-normalised cross-correlation c with those around all pixels within
 /// `epipolar_px` of its epipolar curve between the depths, for any rig. The best is a match under three conditions: it
-/// is
-/// clearly better than any position further than half a window away; the search from there in the left image returns to
-/// the
-/// start; and it passes the epipolar test at its subpixel position, the vertex of the quadratic through its nine
+/// is clearly better than any position further than half a window away; the search from there in the left image returns
+/// to the start; and it passes the epipolar test at its subpixel position, the vertex of the quadratic through its nine
 /// correlations. The distance of a pair is that of the windows as unit vectors, √(2 − 2c). The better of two pairs
-/// within a
-/// pixel of each other is kept.
+/// within a pixel of each other is kept.
 ///
 /// Right key points take no part, so the matcher finds more pairs where contrast is low and detections seldom repeat.
 /// Limit: windows are not rotated; cameras with a relative roll of more than about 10° need a descriptor.
 ///
-/// Source: Hannah, *Computer matching of areas in stereo images*, 1974; Fua, *A parallel stereo algorithm that
-/// produces dense depth maps and preserves image features*, 1993 (left–right check).
+/// Source: Hannah, *Computer matching of areas in stereo images*, 1974; Fua, *A parallel stereo algorithm that produces
+/// dense depth maps and preserves image features*, 1993 (left–right check).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccBand {

@@ -16,13 +16,11 @@ use crate::{
 /// The pyramidal Lucas–Kanade tracker with forward–backward check.
 ///
 /// On each pyramid level, the coarsest first, the window around the point is aligned to the other image by translation,
-/// as in
-/// [`Direct`](crate::Direct); each level begins at the result of the one before. A track is accepted if the finest
-/// level
-/// aligns and tracking backward returns to the start.
+/// as in [`Direct`](crate::Direct); each level begins at the result of the one before. A track is accepted if the
+/// finest level aligns and tracking backward returns to the start.
 ///
-/// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and
-/// Matas, *Forward-backward error*, 2010.
+/// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and Matas,
+/// *Forward-backward error*, 2010.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Tracker {
@@ -99,8 +97,7 @@ impl Tracker {
     }
 
     /// Replaces `found` by the positions in the second image of `places`: positions in the first image and initial
-    /// positions
-    /// in the second.
+    /// positions in the second.
     pub fn track_into(
         &self,
         [from, to]: [&Pyramid; 2],

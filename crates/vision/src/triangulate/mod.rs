@@ -53,8 +53,7 @@ pub trait Triangulator: Send + Sync + std::fmt::Debug {
     fn point(&self, rig: &StereoRig, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable>;
 
     /// Replaces `cloud` by the points in front of the cameras whose pairs pass the epipolar and the χ² test, in the
-    /// order of
-    /// `pairs`.
+    /// order of `pairs`.
     fn triangulate_into(&self, pairs: &[UncertainPixels], rig: &StereoRig, cloud: &mut Vec<MeasuredPoint>) {
         cloud.clear();
         let PointRules { calibration_px, epipolar_px, confidence, max_depth, .. } = *self.rules();

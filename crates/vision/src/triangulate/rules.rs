@@ -11,16 +11,14 @@ pub struct PointRules {
     pub sigma_px: f64,
     /// Standard deviation (px) of the offset of a key point without a fitted corner from its true corner.
     ///
-    /// The offset is common to both images, so it affects directions and not disparities. Harris' maxima of 130 corners in 60 rendered pairs of a dive had an
-    /// RMS offset
-    /// of 0.87 px an axis and a disparity error of 0.13 px; fitted corners had 0.16 and 0.05
-    /// (`cargo test -p seafix-experiment located:: -- --ignored --nocapture`).
+    /// The offset is common to both images, so it affects directions and not disparities. Harris' maxima of 130 corners
+    /// in 60 rendered pairs of a dive had an RMS offset of 0.87 px an axis and a disparity error of 0.13 px; fitted
+    /// corners had 0.16 and 0.05 (`cargo test -p seafix-experiment located:: -- --ignored --nocapture`).
     pub peak_px: f64,
     /// Standard deviation (px) of the camera model's own error: calibration, lens, housing.
     ///
     /// It is added to each coordinate in both images: an alignment may be accurate to 0.01 px, the directions of its
-    /// pixels
-    /// are not.
+    /// pixels are not.
     pub calibration_px: f64,
     /// Maximum distance from the epipolar line (px, Sampson distance).
     pub epipolar_px: f64,

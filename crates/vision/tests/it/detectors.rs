@@ -43,8 +43,7 @@ fn cut(image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> I
 /// Applies the property to each detector, with the settings changed that it has.
 ///
 /// There is no maximum number and no threshold relative to the strongest response, so the property does not depend on
-/// the
-/// order of equals, on the position of a grid's lines, or on other parts of the image.
+/// the order of equals, on the position of a grid's lines, or on other parts of the image.
 fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
     for listing in DETECTORS.listings() {
         let mut choice = Choice::named(listing.name);
@@ -68,8 +67,7 @@ fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
 /// The largest shift of a point by rounding (px) in a brighter or rotated image.
 ///
 /// Sums of f32 are rounded differently then; a response changes by about 1e-6 of itself, and its vertex by that over
-/// the
-/// curvature. Differences of integer grey levels, and their sums in a box, are exact.
+/// the curvature. Differences of integer grey levels, and their sums in a box, are exact.
 fn rounding(name: &str, turned: bool) -> f64 {
     match name {
         "fast" => 1e-9,
@@ -131,8 +129,7 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
 /// P55. A shift of the image by integer pixels shifts the key points away from the border.
 ///
 /// Their surroundings of ten times the scale lie in both images. Seen to fail when the kept rows of a response are
-/// moved by
-/// one.
+/// moved by one.
 #[test]
 fn a_shift_by_integer_pixels_shifts_the_points() {
     // The vertical shift differs from the number of rows in a block.

@@ -50,10 +50,8 @@ fn rigs() -> Vec<(&'static str, StereoRig)> {
 /// Most key points become points of the plane, and at most 1 % have a right pixel more than 1.5 px from the truth.
 ///
 /// This holds in clear water, and with a contrast of a few grey levels under noise of ±2. Seen to fail when pairs
-/// without
-/// alignment are kept (under noise a quarter of the band's are false), and when the right image's noise is missing from
-/// the
-/// covariance.
+/// without alignment are kept (under noise a quarter of the band's are false), and when the right image's noise is
+/// missing from the covariance.
 #[test]
 fn the_cloud_lies_on_the_plane() {
     for (name, rig) in rigs() {
@@ -83,10 +81,8 @@ fn the_cloud_lies_on_the_plane() {
 /// Hardly a point of an endlessly tiled plane is a tile off.
 ///
 /// No point remains if the rig cannot distinguish a tile from the next; points are right if the tiles do not follow
-/// each
-/// other along the epipolar lines. Seen to fail when the points around ambiguous ones are kept: 29 of the 31 points of
-/// a
-/// vertical rig were wrong.
+/// each other along the epipolar lines. Seen to fail when the points around ambiguous ones are kept: 29 of the 31
+/// points of a vertical rig were wrong.
 #[test]
 fn a_pattern_without_end_misleads_hardly_a_point() {
     for (name, rig) in rigs() {
@@ -146,8 +142,7 @@ fn alignment_finds_the_place_for_every_rig() {
 /// Every refinement states the error of its disparities correctly and improves on the matcher.
 ///
 /// On a plane and a rectified rig the median of the normalised squared error must be about 0.45, that of χ² with one
-/// degree
-/// of freedom. Seen to fail when `zncc-parabola` claims a tenth of its variance.
+/// degree of freedom. Seen to fail when `zncc-parabola` claims a tenth of its variance.
 #[test]
 fn every_refinement_has_an_error_as_it_states() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
@@ -180,10 +175,8 @@ fn every_refinement_has_an_error_as_it_states() {
 /// The offset of a key point from its corner is an error common to both images, whatever the refinement.
 ///
 /// Each coordinate's variance and its covariance with the same coordinate of the other image grow by the squared
-/// offset; the
-/// variance of a disparity does not. Fitted corners have no such error. Seen to fail when only the left image's
-/// coordinates
-/// have it, and when fitted corners have it too.
+/// offset; the variance of a disparity does not. Fitted corners have no such error. Seen to fail when only the left
+/// image's coordinates have it, and when fitted corners have it too.
 #[test]
 fn peaks_lie_off_their_corners_in_both_images_alike() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);

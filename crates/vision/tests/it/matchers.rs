@@ -187,8 +187,7 @@ fn threads_and_memory_change_no_bit() {
 /// Without key points there is no match, and a single one gives at most one.
 ///
 /// Key points outside the range of the lens model do not match, nor do descriptors of different kinds or lengths. Seen
-/// to
-/// fail when every key point is assumed to have a nearest one.
+/// to fail when every key point is assumed to have a nearest one.
 #[test]
 fn few_points_and_none() {
     let [rig, ..] = rigs();

@@ -11,8 +11,7 @@ const PLACE: i32 = (1 << PLACE_BITS) - 1;
 /// The three smallest keys of each lane, smallest first.
 ///
 /// A key is one integer with the distance in its upper bits and the position in its lower eight. Keys compare by
-/// distance,
-/// then by position.
+/// distance, then by position.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Keys([[i32; COLUMNS]; 3]);
 
