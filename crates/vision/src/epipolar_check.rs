@@ -44,7 +44,7 @@ impl EpipolarCheck {
 
 /// The matches of two images by appearance alone, with the default detector and descriptor.
 ///
-/// The rig only removes lens distortion; its pose takes no part in the matching.
+/// The rig takes no part in the matching.
 pub fn repeated_patterns(left: &Image, right: &Image, rig: &StereoRig) -> Vec<StereoPixels> {
     let corners = [left, right].map(|image| Harris::default().detect(image));
     let described = [(left, &corners[0]), (right, &corners[1])].map(|(image, at)| Surf::default().describe(image, at));

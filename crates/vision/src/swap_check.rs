@@ -59,7 +59,7 @@ impl Sides {
         self.given + self.exchanged >= FEW
     }
 
-    /// Whether the images are unrelated: too few matches, for fewer than one key point in twenty.
+    /// Whether the images are unrelated: too few matches for a decision, and fewer than one for 20 key points.
     pub fn are_strangers(&self) -> bool {
         self.keypoints > 0 && !self.is_decisive() && 20 * self.given < self.keypoints
     }

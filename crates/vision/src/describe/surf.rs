@@ -12,11 +12,9 @@ use crate::{Image, Keypoint, Workspace};
 /// SURF's descriptor: sums of Haar wavelet responses around the key point, 64 or 128 numbers.
 ///
 /// The square window of 20 s around the key point has 4×4 sub-regions. In each, at 5×5 points one s apart, a Haar
-/// wavelet of 2 s gives dx and dy, weighted by a Gaussian of 3.3 s about the key point. The sub-region contributes Σ
-/// dx, Σ dy, Σ
-/// |dx|,
-/// Σ |dy|; extended, each sum is split by the sign of the other derivative. The vector is scaled to unit length, so it
-/// is invariant under brightness offset and contrast. It is zero in a flat region.
+/// wavelet of 2 s gives dx and dy, weighted by a Gaussian of 3.3 s about the key point. The sub-region contributes the
+/// sums of dx, dy, |dx| and |dy|; extended, each sum is split by the sign of the other derivative. The vector is scaled
+/// to unit length, so it is invariant under brightness offset and contrast. It is zero in a flat region.
 ///
 /// Wavelets, window and sub-regions are at the key point's subpixel position; border pixels continue beyond the border.
 /// Upright windows are sums of pixels and their parts. Windows rotated to the orientation of the surroundings (the
