@@ -278,7 +278,7 @@ mod tests {
         let version = of(POINTS, &|_, versions| *versions.get_mut("solver stereo-reprojection").unwrap() += 1);
         let input = of(POINTS, &|inputs, _| drop(inputs[0].files.insert("a.csv".to_owned(), "13".to_owned())));
         let seed = of(&format!("seed = 1\n{POINTS}"), &|_, _| {});
-        let setting = of(&format!("{POINTS}[pipeline]\nwiden = true\n"), &|_, _| {});
+        let setting = of(&format!("{POINTS}[pipeline]\nexpand-gates = true\n"), &|_, _| {});
         let question = of(&POINTS.replace("why", "how"), &|_, _| {});
         let all = BTreeSet::from([same, version, input, seed, setting, question]);
         assert_eq!(all.len(), 6);

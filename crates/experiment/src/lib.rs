@@ -34,7 +34,6 @@ pub use navigation::Navigation;
 pub use odometry_fault::OdometryFault;
 pub use range::{Number, Range};
 pub use replay::{Replay, ReplayFrom};
-pub use results::COLUMNS;
 pub use run::{
     Existing, Finished, Observer, Options, Remade, RunError, RunEstimate, Shard, Silent, estimate, merge, remake, run,
 };

@@ -160,7 +160,7 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
     let details = answer.outcome.explanation().into_iter().chain(attempt.joint.clone());
-    record.detail = details.collect::<Vec<_>>().join("; ");
+    record.explanation = details.collect::<Vec<_>>().join("; ");
     record
 }
 

@@ -21,7 +21,7 @@
 //! let localizer = Localizer::new(&site, &rig)?;
 //! for target in localizer.localize(&images, &prior)? {
 //!     match target.outcome {
-//!         Outcome::Referenced(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
+//!         Outcome::Fix(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
 //!         rejected => println!("{}: {rejected}", target.name),
 //!     }
 //! }

@@ -36,6 +36,9 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("pose_graphs_over_dead_reckoning_are_consistent", "the method"),
     ("FishEye", "a name that OpenCV's users write"),
     ("eye", "the identity matrix of a camera message"),
+    ("Shell", "of a command line"),
+    ("ShellName", "of a command line"),
+    ("PowerShell", "of a command line"),
     // Plain English.
     ("look_at", "where a camera points"),
     ("look_up", "in a table"),

@@ -514,7 +514,7 @@ fn a_fault_is_reported_where_it_stands() {
             &[("do not reach its end, 2; give 1.9 or 2.2", "5:28"), ("too few or too many", "8:37")],
         ),
         (
-            "source = 'virtual-points'\n[pipeline.acceptance]\nleast-points = 1\nconfidence = 2.0\n[pipeline.gate]\nbox = -1.0\n\
+            "source = 'virtual-points'\n[pipeline.acceptance]\nmin-points = 1\nconfidence = 2.0\n[pipeline.gate]\nbox = -1.0\n\
              [[navigation.faults]]\nkind = 'off'\nfrom = 3.0\nto = 1.0\n[navigation.pose-graph.settings]\noverlap = 3.0\n\
              recognition = { solver = 'kabch', draws = 0 }\n",
             &[
@@ -555,7 +555,7 @@ fn an_unknown_filter_among_filters() {
 fn a_value_out_of_range() {
     let (_folder, file) = experiment("question = 'why'\n[source]\nname = 'virtual-points'\ndistance = -1.0\n");
     let run = Path::new(&file).with_file_name("out");
-    refused(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:4", "distance = -1", "from 1 m to 30 m"]);
+    refused(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:4", "distance = -1", "from 1 to 30"]);
     assert!(!run.exists());
 }
 
@@ -566,7 +566,7 @@ fn dives_that_cannot_be() {
     let waypoints = "[source.route]\nkind = 'waypoints'\n";
     for (text, parts) in [
         ("[source.water]\nattenuation = 1e9\n", ["e.toml:7", "water.attenuation = 1000000000", "from 0 to 20"]),
-        ("route.speed = 0.0\n", ["e.toml:5", "rate = 0", "or the route a speed"]),
+        ("route.speed = 0.0\n", ["e.toml:5", "rate = 0", "a route.speed above 0"]),
         ("rig.size = [0, 0]\n", ["e.toml:6", "rig.size = 0", "from 16 to 8192"]),
         ("[[source.lamps]]\n[[source.lamps]]\npower = -1.0\n", ["e.toml:8", "lamps[1].power = -1", "0 to 1000"]),
         (
@@ -594,7 +594,10 @@ fn dives_that_cannot_be() {
             "rig.at = [0.0, 0.0, -10.0]\n",
             ["the vehicle comes within 0.3 m of something near `tree-a`", "after 0.0 s", "raise route.altitude"],
         ),
-        (&format!("{waypoints}waypoints = [[0.0, 0.0, -4.0]]\n"), ["e.toml:8", "waypoints[0]", "height above the bed"]),
+        (
+            &format!("{waypoints}waypoints = [[0.0, 0.0, -4.0]]\n"),
+            ["e.toml:8", "waypoints[0]", "height above the seabed"],
+        ),
         ("site = 'm.site.toml'\n", ["m.geometry.toml:", "vertex 2 is [0.0, NaN, 0.0]", "give metres"]),
         ("site = 'z.site.toml'\n", ["z.geometry.toml:", "a triangle without area", "triangle 0 is [0, 1, 1]"]),
     ] {

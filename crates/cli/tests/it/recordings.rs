@@ -98,7 +98,7 @@ impl Bag {
         let at = |name: &str| folder.path().join(name);
         fs::copy(sample().join("site.toml"), at("site.toml")).unwrap();
         let experiment = "question = 'Where?'\n[source]\nname = 'mcap'\npath = 'bag.mcap'\nsite = 'site.toml'\n\
-                          prior = '/odom'\nprior-position = 0.1\nprior-attitude-deg = 0.5\ntruth = '/odom'\nmost-gap = 0.0\n";
+                          prior = '/odom'\nprior-position = 0.1\nprior-attitude-deg = 0.5\ntruth = '/odom'\nmax-gap = 0.0\n";
         fs::write(at("e.toml"), experiment).unwrap();
         let mut mcap = WriteOptions::new().create(File::create(at("bag.mcap")).unwrap()).unwrap();
         let mut channel = |topic: &str, kind: &str, definition: &str| {

@@ -100,7 +100,6 @@ fn copy(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::Row;
     use parquet::record::Field;
     use seafix_log::{FrameRecord, TargetRecord};
     use std::fs;
@@ -118,7 +117,7 @@ mod tests {
         let (csv, parquet) = (at("csv"), at("parquet"));
         let rows = (frames.end - frames.start) as usize;
         let mut table = Table::default();
-        frames.clone().for_each(|k| Row::of("001", &frame(k, "a")).for_each(|row| table.add(&row)));
+        frames.clone().for_each(|k| table.add("001", &frame(k, "a")));
         fs::write(&csv, &table.text).unwrap();
         let text = (0, table.text.len() as u64);
         let mut file = table::create(&parquet).unwrap();

@@ -7,13 +7,13 @@ use parquet::{
     column::{reader::ColumnReader, writer::ColumnWriter},
     data_type::ByteArray,
     errors::ParquetError,
-    file::{properties::WriterProperties, reader::RowGroupReader, writer::SerializedFileWriter},
+    file::{metadata::KeyValue, properties::WriterProperties, reader::RowGroupReader, writer::SerializedFileWriter},
     schema::parser::parse_message_type,
 };
 
-use super::{
-    COLUMNS, Row,
-    columns::{Cell, Kind},
+use seafix_log::{
+    FrameRecord, TargetRecord,
+    quantities::{Kind, QUANTITIES, Value},
 };
 
 /// Rows of one row group of the Parquet table, where there are as many.
@@ -44,7 +44,7 @@ impl Default for Table {
             Kind::Real => Values::Real(Vec::new(), Vec::new()),
             Kind::Flag => Values::Flag(Vec::new(), Vec::new()),
         };
-        let columns = COLUMNS.iter().map(|column| empty(column.kind)).collect();
+        let columns = QUANTITIES.iter().map(|column| empty(column.kind)).collect();
         Self { rows: 0, text: String::new(), columns }
     }
 }
@@ -52,17 +52,21 @@ impl Default for Table {
 impl Table {
     /// The head of the table as CSV.
     pub(super) fn head() -> String {
-        COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
+        QUANTITIES.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
     }
 
-    /// Adds a row.
-    pub(crate) fn add(&mut self, row: &Row<'_>) {
+    /// Adds the rows of a frame, one for each attempt.
+    pub(crate) fn add(&mut self, trial: &str, frame: &FrameRecord) {
+        frame.targets.iter().for_each(|target| self.add_row(trial, frame, target));
+    }
+
+    fn add_row(&mut self, trial: &str, frame: &FrameRecord, target: &TargetRecord) {
         self.rows += 1;
-        for (place, (column, values)) in COLUMNS.iter().zip(&mut self.columns).enumerate() {
+        for (place, (column, values)) in QUANTITIES.iter().zip(&mut self.columns).enumerate() {
             if place > 0 {
                 self.text.push(',');
             }
-            let cell = (column.fill)(row);
+            let cell = column.value(trial, frame, target);
             write_cell(&mut self.text, &cell);
             values.push(cell);
         }
@@ -100,16 +104,16 @@ impl Table {
 }
 
 impl Values {
-    fn push(&mut self, cell: Cell) {
+    fn push(&mut self, cell: Value) {
         fn known<T>((values, levels): (&mut Vec<T>, &mut Vec<i16>), value: Option<T>) {
             levels.push(i16::from(value.is_some()));
             values.extend(value);
         }
         match (self, cell) {
-            (Self::Text(all), Cell::Text(word)) => all.push(ByteArray::from(word.into_bytes())),
-            (Self::Integer(all, levels), Cell::Integer(value)) => known((all, levels), value),
-            (Self::Real(all, levels), Cell::Real(value)) => known((all, levels), value),
-            (Self::Flag(all, levels), Cell::Flag(value)) => known((all, levels), value),
+            (Self::Text(all), Value::Text(word)) => all.push(ByteArray::from(word.into_bytes())),
+            (Self::Integer(all, levels), Value::Integer(value)) => known((all, levels), value),
+            (Self::Real(all, levels), Value::Real(value)) => known((all, levels), value),
+            (Self::Flag(all, levels), Value::Flag(value)) => known((all, levels), value),
             _ => unreachable!("a column fills cells of its own kind"),
         }
     }
@@ -163,7 +167,7 @@ impl Values {
 
 /// An empty Parquet table, ZSTD.
 pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetError> {
-    let fields: String = COLUMNS
+    let fields: String = QUANTITIES
         .iter()
         .map(|column| match column.kind {
             Kind::Text => format!("REQUIRED BYTE_ARRAY {} (UTF8);", column.name),
@@ -173,26 +177,32 @@ pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetE
         })
         .collect();
     let schema = Arc::new(parse_message_type(&format!("message results {{ {fields} }}"))?);
+    // What the columns are, for whoever finds the file alone: the table of `docs/quantities.md`.
+    let about = |suffix: &str, text: &str, column: &str| KeyValue::new(format!("{column}.{suffix}"), text.to_owned());
+    let described = QUANTITIES
+        .iter()
+        .flat_map(|column| [about("unit", column.unit, column.name), about("description", column.doc, column.name)]);
     let properties = WriterProperties::builder()
+        .set_key_value_metadata(Some(described.collect()))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_created_by(concat!("seafix ", env!("CARGO_PKG_VERSION")).to_owned())
         .build();
     SerializedFileWriter::new(File::create(path)?, schema, Arc::new(properties))
 }
 
-fn write_cell(text: &mut String, cell: &Cell) {
+fn write_cell(text: &mut String, cell: &Value) {
     use std::fmt::Write;
     // Writing into a string cannot fail.
     let _ = match cell {
-        Cell::Text(word) => {
+        Value::Text(word) => {
             quote(text, word);
             Ok(())
         }
-        Cell::Integer(Some(number)) => write!(text, "{number}"),
+        Value::Integer(Some(number)) => write!(text, "{number}"),
         // All its digits; very small ones with an exponent instead of many zeros.
-        Cell::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
-        Cell::Real(Some(x)) => write!(text, "{x}"),
-        Cell::Flag(Some(flag)) => write!(text, "{flag}"),
+        Value::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
+        Value::Real(Some(x)) => write!(text, "{x}"),
+        Value::Flag(Some(flag)) => write!(text, "{flag}"),
         _ => Ok(()),
     };
 }
@@ -213,7 +223,6 @@ fn quote(text: &mut String, word: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use seafix_log::{FrameRecord, TargetRecord};
 
     #[test]
     fn a_row_is_a_line_and_unknown_is_empty() {
@@ -222,12 +231,12 @@ mod tests {
             let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "absent");
             target.evaluation.visible = Some(4);
             let frame = FrameRecord { frame: 2, stamp_ns: 7, targets: vec![target], ..Default::default() };
-            Row::of("001", &frame).for_each(|row| table.add(&row));
+            table.add("001", &frame);
         }
-        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,wrong,wrong_pairs,visible";
+        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,explanation,wrong,wrong_pairs,visible";
         assert!(Table::head().starts_with(head));
         let mut lines = table.text.lines();
-        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,unidentified,chance,,,4,,"));
+        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,rejected,absent,,,,4,,"));
         assert!(lines.next().unwrap().contains("\"'=1+1\""));
     }
 }

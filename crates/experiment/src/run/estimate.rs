@@ -10,10 +10,7 @@ use seafix_component::Fault;
 use seafix_log::Writer;
 
 use super::{RunError, group, partition};
-use crate::{
-    Plan,
-    results::{Row, Table},
-};
+use crate::{Plan, results::Table};
 
 /// What a run would take.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +80,7 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
                 failures += usize::from(crate::log_decimation::failed(&record));
                 let trial = group.trials[which];
                 writer.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
-                Row::of(&trial.name, &record).for_each(|row| table.add(&row));
+                table.add(&trial.name, &record);
             }
             tried += 1;
             warm.push(first.elapsed());

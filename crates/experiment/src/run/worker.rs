@@ -16,10 +16,7 @@ use super::{
     partition::Piece,
     store::{Draft, Store},
 };
-use crate::{
-    log_decimation::Thinned,
-    results::{Row, Table},
-};
+use crate::{log_decimation::Thinned, results::Table};
 
 /// Makes all of `pieces`; `false` when the observer ended it before.
 pub(super) fn work(
@@ -113,7 +110,7 @@ fn make(
             if kept {
                 output.log.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
             }
-            Row::of(&output.trial, &record).for_each(|row| output.table.add(&row));
+            output.table.add(&output.trial, &record);
             observer.frame(&output.trial);
         }
     }

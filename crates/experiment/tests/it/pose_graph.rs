@@ -47,7 +47,8 @@ fn a_pose_graph_goes_from_run_to_run() {
     let pose_graph = format!("runs/first/{trial}.pose-graph");
     assert!(fs::read_to_string(folder.path().join(&pose_graph)).unwrap().contains("seafix-pose-graph/2"));
 
-    let second = planned(folder.path(), "second.toml", &format!("read = '{pose_graph}', settings.apart = 0.0"));
+    let second =
+        planned(folder.path(), "second.toml", &format!("read = '{pose_graph}', settings.min-loop-distance = 0.0"));
     let out = folder.path().join("runs/second");
     run(&second, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
     let log = out.join(format!("{}.mcap", second.trials[0].name));

@@ -71,7 +71,7 @@ fn truth_is_the_judge_s_alone() {
     let folder = TempDir::new().unwrap();
     draw(&folder.path().join("all"), Family::A, 12);
     let known = rows(folder.path(), FILES);
-    let truth = |number: usize| folder.path().join(format!("all/a/a{number:03}.truth.json"));
+    let truth = |number: usize| folder.path().join(format!("all/paper-scale/a{number:03}.truth.json"));
     // Another truth changes the judgement, and nothing else.
     let mut moved: serde_json::Value = serde_json::from_str(&fs::read_to_string(truth(4)).unwrap()).unwrap();
     moved["T_cam_obj"][0][3] = 7.0.into();
@@ -164,12 +164,13 @@ fn faults_name_the_file() {
     );
     assert!(said("").contains("needs pixels"));
     let sound = "solver = 'mahalanobis'";
-    fs::copy(all.join("a/a000.json"), all.join("a/a009.json")).unwrap();
+    fs::copy(all.join("paper-scale/a000.json"), all.join("paper-scale/a009.json")).unwrap();
     assert!(said(sound).contains("two problems of one `id`"));
-    fs::write(all.join("a/a009.json"), "{").unwrap();
+    fs::write(all.join("paper-scale/a009.json"), "{").unwrap();
     assert!(said(sound).contains("a009.json:1"));
-    fs::remove_file(all.join("a/a009.json")).unwrap();
-    fs::write(all.join("a/a001.truth.json"), r#"{"T_cam_obj": [], "pairs": [], "pose_defined": false}"#).unwrap();
+    fs::remove_file(all.join("paper-scale/a009.json")).unwrap();
+    fs::write(all.join("paper-scale/a001.truth.json"), r#"{"T_cam_obj": [], "pairs": [], "pose_defined": false}"#)
+        .unwrap();
     assert!(said(sound).contains("a001.truth.json"));
     fs::remove_dir_all(&all).unwrap();
     assert!(said(sound).contains("no such file or folder"));

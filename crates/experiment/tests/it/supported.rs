@@ -186,11 +186,16 @@ fn a_joint_fix_that_fails_states_why() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 2\nobjects = 2\npoints = 12\nframes = 60\nsurvey-sigma = 0.002\n";
     let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nconfidence = 0.4\n"));
     let fixes = frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.outcome == Outcome::Fix);
-    let (joined, failed): (Vec<_>, Vec<_>) = fixes.partition(|target| target.detail.starts_with("joint fix over "));
+    let (joined, failed): (Vec<_>, Vec<_>) =
+        fixes.partition(|target| target.explanation.starts_with("joint fix over "));
     assert!(!failed.is_empty() && !joined.is_empty(), "{} failed, {} joined", failed.len(), joined.len());
     for target in failed {
-        assert!(target.detail.starts_with("no joint fix, the pose is that of the object alone: "), "{}", target.detail);
-        assert!(target.detail.contains("χ² = "), "{}", target.detail);
+        assert!(
+            target.explanation.starts_with("no joint fix, the pose is that of the object alone: "),
+            "{}",
+            target.explanation
+        );
+        assert!(target.explanation.contains("χ² = "), "{}", target.explanation);
     }
 }
 
@@ -199,22 +204,26 @@ fn a_joint_fix_that_fails_states_why() {
 fn a_joint_fix_states_what_took_part() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";
     // Objects of five, five and four points, of which five are asked for.
-    let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nleast-points = 5\n"));
+    let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nmin-points = 5\n"));
     let (mut took_part, mut left_out) = (0, 0);
     for frame in &frames {
         for target in &frame.targets {
             match target.outcome {
                 Outcome::Fix => {
-                    assert!(target.detail.starts_with("joint fix over `layout"), "{}", target.detail)
+                    assert!(target.explanation.starts_with("joint fix over `layout"), "{}", target.explanation)
                 }
                 _ => {
-                    assert!(target.detail.starts_with("too few identified points: 4 found, 5 required"), "{}", target.detail);
-                    took_part += usize::from(target.detail.ends_with("; 4 points took part in the joint fix"));
-                    left_out += usize::from(target.detail.contains("; no part in the joint fix: "));
+                    assert!(
+                        target.explanation.starts_with("too few identified points: 4 found, 5 required"),
+                        "{}",
+                        target.explanation
+                    );
+                    took_part += usize::from(target.explanation.ends_with("; 4 points took part in the joint fix"));
+                    left_out += usize::from(target.explanation.contains("; no part in the joint fix: "));
                 }
             }
         }
-        let said = |part: &str| frame.targets.iter().any(|target| target.detail.contains(part));
+        let said = |part: &str| frame.targets.iter().any(|target| target.explanation.contains(part));
         assert_eq!(said("took part in the joint fix"), said("(4 points, not fixed by itself)"));
         assert_eq!(said("no part in the joint fix"), said("; left out: "));
     }

@@ -252,7 +252,7 @@ fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_reported() {
         // The candidates.
         (
             vec![(CLOUD, &places(9000, |k| [k.sin(), (2.0 * k).sin(), k.cos() + 3.0])), no_prior],
-            "too many candidate pairs in p.json: 45000, the limit of `rigid-consensus` is 40000; give a rough pose",
+            "too many candidate pairs in p.json: 45000, the limit of `rigid-consensus` is 40000; give a prior pose",
         ),
     ] {
         let reported = warnings(&changes);
@@ -283,7 +283,7 @@ fn gates_that_hold_too_much_are_refused() {
     let model = places(2001, |k| [k, (3.0 * k).sin(), k.cos()]);
     let changes = [(CLOUD, cloud.as_str()), (MODEL, &model), ("\"shell_half_m\": 0.1", "\"shell_half_m\": 1e9")];
     let reported = warnings(&changes);
-    let many = "too many candidate pairs in p.json: at least 4002000, the limit of `rigid-consensus` is 40000; give a rough \
+    let many = "too many candidate pairs in p.json: at least 4002000, the limit of `rigid-consensus` is 40000; give a prior \
          pose";
     assert!(reported.iter().any(|reported| reported.starts_with(many)), "{reported:?}");
     let sound = changes.map(|(from, to)| (from, if to.ends_with("1e9") { "\"shell_half_m\": 0.1" } else { to }));
