@@ -124,7 +124,7 @@ const COLUMNS: [Column; 5] = [
 fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table {
     let any_best = (0..summary.rows.len()).any(|index| best(comparisons, index));
     let mut caption = text![
-        "Errors of the fixes: median and 95 % quantile over n fixes that are not wrong. Fit RMS: the paper’s measure; unused: the fit RMS over the identified points that the solver did not use. TRE: target registration error. Position and attitude errors are those of the camera. ",
+        "Errors of the fixes: median and 95 % quantile over n fixes that are not wrong. Fit RMS, unused: the fit RMS over the identified points that the solver did not use. TRE: target registration error. Position and attitude errors are those of the camera. ",
         italic("TRE all"),
         ": median TRE over all attempts, with rejected attempts and wrong fixes counted as infinite errors. ",
     ];

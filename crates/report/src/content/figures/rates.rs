@@ -35,7 +35,8 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
                 marks.push([fraction, at]);
             }
             let name = RunSummary::name(run, trial);
-            data.line(false, vec![name.into(), group.into(), fraction.into(), low.into(), high.into()]);
+            let outcome = phrases::outcome(group).into();
+            data.line(false, vec![name.into(), outcome, fraction.into(), low.into(), high.into()]);
         }
         layers.push(Layer::Spans { series, values: spans });
         layers.push(Layer::Marks { series, points: marks, radius: 2.2 });
