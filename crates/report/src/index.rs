@@ -46,12 +46,7 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String 
     for finding in content::findings(run, summary) {
         text += &format!("- {}\n", print::markdown(&finding));
     }
-    let links = [
-        ("Report", "report.html"),
-        ("PDF", "report.pdf"),
-        ("tables", "tables"),
-        ("summary", "summary.txt"),
-    ];
+    let links = [("Report", "report.html"), ("PDF", "report.pdf"), ("tables", "tables"), ("summary", "summary.txt")];
     let links = links.iter().filter(|(_, file)| there(file));
     let links: Vec<String> = links.map(|(what, file)| format!("[{what}]({name}/{file})")).collect();
     text + &format!("\n{}\n", links.join(", "))

@@ -12,8 +12,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let axes = &summary.rows.first()?.axes;
     let mut heads = vec![Head::words("Setting"), Head::words("value"), Head::numbers("trials"), Head::numbers("n")];
     heads.extend(
-        ["fixes (%)", "wrong (%)", "TRE min (mm)", "TRE median (mm)", "TRE max (mm)", "total (ms)"]
-            .map(Head::numbers),
+        ["fixes (%)", "wrong (%)", "TRE min (mm)", "TRE median (mm)", "TRE max (mm)", "total (ms)"].map(Head::numbers),
     );
     let caption = text![
         "Effect of each setting, pooled over all others. Fixes and wrong fixes are in % of all attempts. TRE: minimum, median and maximum, over the trials, of the median TRE of all attempts, with failures counted as infinite errors. Total: median of the trials’ median times."

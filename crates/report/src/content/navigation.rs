@@ -209,11 +209,7 @@ fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
         return Vec::new();
     }
     let sentence = |(index, as_number): (usize, Vec<String>)| {
-        let what = if as_number.is_empty() {
-            "none".to_owned()
-        } else {
-            as_number.join("; ")
-        };
+        let what = if as_number.is_empty() { "none".to_owned() } else { as_number.join("; ") };
         text![format!("{}: objects reported away from their surveyed pose: {}.", name(index), what)]
     };
     all.into_iter().map(sentence).collect()

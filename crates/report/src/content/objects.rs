@@ -33,8 +33,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     if !run.trials.iter().any(|trial| objects(trial).len() > 1) {
         return None;
     }
-    let caption =
-        text!["Attempts on each object by outcome, and the errors of the fixes."];
+    let caption = text!["Attempts on each object by outcome, and the errors of the fixes."];
     let mut above = results::blank(summary, 5);
     above.extend(ERRORS.map(|(head, _)| Head::over(2, head)));
     let mut below = results::heads(summary);

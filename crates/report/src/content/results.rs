@@ -108,7 +108,12 @@ struct Column {
 
 const COLUMNS: [Column; 5] = [
     Column { name: "fit RMS (mm)", field: Field::Fit, unit: Unit::Millimetres, value: |row| row.fit },
-    Column { name: "fit RMS, unused (mm)", field: Field::FitUnused, unit: Unit::Millimetres, value: |row| row.fit_unused },
+    Column {
+        name: "fit RMS, unused (mm)",
+        field: Field::FitUnused,
+        unit: Unit::Millimetres,
+        value: |row| row.fit_unused,
+    },
     Column { name: "TRE (mm)", field: Field::Tre, unit: Unit::Millimetres, value: |row| row.tre },
     Column {
         name: "position error (mm)",
@@ -135,7 +140,9 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
         _ => "No value is in bold, because no trial is significantly better than all others on the same frames.",
     }));
     if run.trials.iter().any(|trial| trial.every() > 1) {
-        caption.push(Span::from(" A trial that logged one frame in k has n over all frames and the rest over the logged ones."));
+        caption.push(Span::from(
+            " A trial that logged one frame in k has n over all frames and the rest over the logged ones.",
+        ));
     }
     let mut above = blank(summary, 1);
     above.extend(COLUMNS.iter().map(|column| Head::over(2, column.name)));

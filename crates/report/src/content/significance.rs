@@ -125,7 +125,11 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
         as_number("difference-low", comparison.interval.0),
         ", ",
         as_number("difference-high", comparison.interval.1),
-        if over { "] (95 % bootstrap interval over conditions)." } else { "] (95 % bootstrap interval over blocks of frames)." }
+        if over {
+            "] (95 % bootstrap interval over conditions)."
+        } else {
+            "] (95 % bootstrap interval over blocks of frames)."
+        }
     ]
 }
 

@@ -31,9 +31,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Section {
         .collect();
     if shown.is_empty() {
         let mut section = Section::new("Run time");
-        section.say(text![
-            "No durations were logged, so that every run of the configuration gives identical files."
-        ]);
+        section.say(text!["No durations were logged, so that every run of the configuration gives identical files."]);
         section.blocks.extend(figures::search_cost(run).map(Block::Figure));
         return section;
     }

@@ -24,8 +24,7 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     }
     let heads = [Head::words("search"), Head::words("cost"), Head::numbers("candidates"), Head::numbers("n")];
     let heads = heads.into_iter().chain(["p5", "median", "p95"].map(Head::numbers));
-    let mut data =
-        Table::new("search-cost", text!["The data of the figure of search cost."], heads.collect());
+    let mut data = Table::new("search-cost", text!["The data of the figure of search cost."], heads.collect());
     let mut panels = Vec::new();
     for (field, label, decimals) in [(Field::Tests, "pair tests", 1), (Field::SearchTime, "search (ms)", 4)] {
         let mut layers = Vec::new();
