@@ -1,6 +1,7 @@
 //! Time and memory of a report over the number of rows: `cargo bench -p seafix-report --bench rows -- 1000000`.
 //!
-//! The run has two logs with half of the rows each, every row logged. Real runs of this size log a sample of their rows.
+//! The run has two logs with half of the rows each, every row logged. Real runs of this size log a sample of their
+//! rows.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints its results and may panic")]
 

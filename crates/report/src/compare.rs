@@ -26,8 +26,8 @@ pub struct Compared {
 
 /// Compares runs on the same data: equal source, seeds, cameras, site, targets and alert limits.
 ///
-/// `force` compares runs on different data, with a notice. The page is written to `out`, if given. The table has at most
-/// `width` columns, if given.
+/// `force` compares runs on different data, with a notice. The page is written to `out`, if given. The table has at
+/// most `width` columns, if given.
 ///
 /// # Errors
 /// [`ReportError::Incomparable`] with the differences, unless `force`; [`ReportError`] when a log cannot be read or the
@@ -96,7 +96,9 @@ fn names(folders: &[PathBuf]) -> Vec<String> {
     if unique { short } else { folders.iter().map(|folder| folder.display().to_string()).collect() }
 }
 
-/// Gives a trial of a joined run the axes of all runs, with the name of its own run as the first axis.
+/// Gives a trial of a joined run the axes of all runs.
+///
+/// The first axis is the name of its own run.
 fn joined(trial: &mut Trial, name: &str, keys: &[String]) {
     let of = |key: &String| {
         let value = trial.header.axes.iter().find(|axis| axis.key == *key).map(|axis| axis.value.clone());

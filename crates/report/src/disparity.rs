@@ -12,8 +12,8 @@ const CORRECT: f64 = 2.0;
 /// Measured minus true disparity (px) of every correctly identified point of `frame`.
 ///
 /// The result is empty without rectified images or ground truth. The errors are truncated, because pairs more than 2 px
-/// from the true projection are excluded. Targets with several objects are excluded too: their coordinates include survey
-/// errors.
+/// from the true projection are excluded. Targets with several objects are excluded too: their coordinates include
+/// survey errors.
 pub(crate) fn errors(header: &TrialHeader, frame: &FrameRecord) -> Vec<f64> {
     let (Some(truth), true) = (&frame.truth, header.rig.rectified) else { return Vec::new() };
     let Some(rig) = rig(&header.rig) else { return Vec::new() };

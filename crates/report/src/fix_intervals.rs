@@ -18,7 +18,9 @@ pub(crate) struct Step {
     pub(crate) object: u32,
 }
 
-/// The time from a fix to the last frame before the next fix, before the pose is lost, or before the dive ends.
+/// The time from a fix to the last frame before the next fix.
+///
+/// It also ends before the pose is lost, and at the end of the dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct FixInterval {
     /// The largest position error of the interval less the error at its fix (m).
@@ -31,7 +33,9 @@ pub(crate) struct FixInterval {
     pub(crate) seconds: f64,
 }
 
-/// The position error vector of the camera in the frame of the pose's object (m); `None` without ground truth or pose.
+/// The position error vector of the camera in the frame of the pose's object (m).
+///
+/// The result is `None` without ground truth or pose.
 pub(crate) fn off(truth: Option<&TruthRecord>, record: &NavigationRecord) -> Option<[f64; 3]> {
     let (truth, pose) = (truth?, record.pose.as_ref()?);
     let (_, world_from_object) = truth.world_from_object.iter().find(|(id, _)| *id == pose.object)?;
@@ -47,7 +51,9 @@ pub(crate) fn step(stamp_ns: u64, truth: Option<&TruthRecord>, record: &Navigati
     Some(Step { stamp_ns, fixed: Counted::Fix.holds(record), camera, off, object })
 }
 
-/// The fix intervals of the navigated frames, in order of time; a fix followed directly by another fix has none.
+/// The fix intervals of the navigated frames, in order of time.
+///
+/// A fix followed directly by another fix has none.
 pub(crate) fn fix_intervals<'a>(steps: impl Iterator<Item = Option<&'a Step>>) -> Vec<FixInterval> {
     let mut fix_intervals = Vec::new();
     // The open interval: its fix, the previous frame, and the values so far.
@@ -74,7 +80,9 @@ pub(crate) fn fix_intervals<'a>(steps: impl Iterator<Item = Option<&'a Step>>) -
     fix_intervals
 }
 
-/// The sum of all drifts divided by the sum of `over`, path length or time; `None` if the latter is zero.
+/// The sum of all drifts divided by the sum of `over`, path length or time.
+///
+/// The result is `None` if the latter is zero.
 pub(crate) fn drift(fix_intervals: &[FixInterval], over: fn(&FixInterval) -> f64) -> Option<f64> {
     let all: f64 = fix_intervals.iter().map(over).sum();
     (all > 0.0).then(|| fix_intervals.iter().map(|fix_interval| fix_interval.drift).sum::<f64>() / all)
@@ -97,8 +105,8 @@ mod tests {
         Some(Step { stamp_ns, fixed, camera: [x, 0.0, 0.0], off: [0.0, off, 0.0], object: 0 })
     }
 
-    /// Two intervals, one of 3 s and 6 m, one of 1 s and 1 m. Frames after a lost pose belong to no interval, and a lone
-    /// fix has none.
+    /// Two intervals, one of 3 s and 6 m, one of 1 s and 1 m. Frames after a lost pose belong to no interval, and a
+    /// lone fix has none.
     ///
     /// Seen to fail where a fix does not end an interval.
     #[test]

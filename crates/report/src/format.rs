@@ -37,7 +37,9 @@ pub(crate) fn unit(key: &str) -> Option<&'static str> {
     }
 }
 
-/// Whether a larger value of an axis makes the task harder: axes of the environment, not of the method's settings.
+/// Whether a larger value of an axis makes the task harder.
+///
+/// Such axes describe the environment, not the settings of the method.
 pub(crate) fn harder(key: &str) -> bool {
     let name = short(key);
     let words =

@@ -10,9 +10,10 @@ use crate::{ReportError, RunSummary, content, print, run::Run, write::write};
 /// The file name of the page.
 const NAME: &str = "README.md";
 
-/// Writes `README.md` into `folder`: the version of the program and the findings of every report, in the given order.
+/// Writes the page `README.md` with the findings of all reports into `folder`.
 ///
-/// The reports must be in subfolders of `folder` already.
+/// It states the version of the program and lists the findings in the given order. The reports must be in subfolders of
+/// `folder` already.
 ///
 /// # Errors
 /// [`ReportError`] when the file cannot be written.
@@ -34,7 +35,7 @@ fn text<'a>(findings: impl IntoIterator<Item = &'a str>) -> String {
     findings.into_iter().fold(head, |text, section| text + section)
 }
 
-/// The section of one run: its question, the main figure of the report in `folder`, its findings and links.
+/// The section of one run: question, main figure, findings and links to the report in `folder`.
 pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String {
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let escaped = print::escape_markdown(&name);

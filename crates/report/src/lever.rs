@@ -8,9 +8,10 @@ use crate::place::matrix;
 /// The lengths of the lever arms (m).
 pub(crate) const ARMS: [f64; 3] = [1.0, 2.0, 5.0];
 
-/// The error motion E of a fix in the object's frame, and the centroid of the points that the fix used.
+/// The error motion E of a fix in the object's frame, and the centroid of its points.
 ///
-/// E maps true to estimated positions. `None` if the log lacks the pose, the ground truth or the points.
+/// The centroid is that of the points that the fix used. E maps true to estimated positions. `None` if the log lacks
+/// the pose, the ground truth or the points.
 pub(crate) fn misplaced(
     header: &TrialHeader,
     truth: Option<&TruthRecord>,

@@ -1,9 +1,9 @@
 //! Reports on experiments, generated from their logs alone.
 //!
-//! [`summary`] gives the results of a run as a table for the terminal. [`report`] writes a paper: one self-contained HTML
-//! page without scripts, LaTeX source, a PDF, figures as SVG and PDF, every plotted number as CSV and JSON, and a BibTeX
-//! entry. Both read only the `*.mcap` files of the run and give the same bytes for the same logs. Every number has a key
-//! that identifies its source in the logs; [`verify`] computes each number again from its key.
+//! [`summary`] gives the results of a run as a table for the terminal. [`report`] writes a paper: one self-contained
+//! HTML page without scripts, LaTeX source, a PDF, figures as SVG and PDF, every plotted number as CSV and JSON, and a
+//! BibTeX entry. Both read only the `*.mcap` files of the run and give the same bytes for the same logs. Every number
+//! has a key that identifies its source in the logs; [`verify`] computes each number again from its key.
 //!
 //! The content of a report (module `content`) is a data structure (`document`) that printers (`print`) render.
 

@@ -26,14 +26,20 @@ pub(crate) const MARGIN_RATIO: f64 = 1.1;
 ///
 /// Below five, the median is outside the range of all differences with a probability above 10 %: 2 · 2⁻⁴.
 const MIN_BLOCKS: usize = 5;
-/// Maximum size of a group that is compared in all pairs; members of a larger group are compared with the first only.
+/// Maximum size of a group that is compared in all pairs.
+///
+/// Members of a larger group are compared with the first only.
 pub(crate) const ALL_PAIRS: usize = 8;
-/// Maximum number of comparisons in a readable table; beyond it only groups of up to four are compared in all pairs.
+/// Maximum number of comparisons in a readable table.
+///
+/// Beyond it only groups of up to four are compared in all pairs.
 const READABLE: usize = 40;
 /// Minimum number of conditions that are used as units of comparison, with one value each, instead of frames.
 const CONDITIONS: usize = 10;
 
-/// A comparison of two trials, or of two methods over many conditions, by the TRE; failures count as infinite errors.
+/// A comparison of two trials, or of two methods over many conditions, by the TRE.
+///
+/// Failures count as infinite errors.
 #[derive(Debug, Clone)]
 pub(crate) struct Comparison {
     /// The common condition of both trials; empty over conditions.
@@ -58,9 +64,10 @@ pub(crate) struct Comparison {
     /// The number of pairs with a fix of the first trial only, and of the second only.
     pub(crate) alone: [usize; 2],
     pub(crate) mcnemar: f64,
-    /// The largest absolute end of the 90 % interval (m, or logarithm of a ratio), if the difference is not significant.
+    /// The largest absolute end of the 90 % interval (m, or logarithm of a ratio).
     ///
-    /// Two one-sided tests at 5 % show equivalence within any larger margin.
+    /// Only a difference that is not significant has it. Two one-sided tests at 5 % show equivalence within any larger
+    /// margin.
     pub(crate) margin: Option<f64>,
     /// The errors of both, kept until the margin is computed.
     errors: Vec<(f64, f64)>,
@@ -112,9 +119,9 @@ fn data(trial: &Trial, joined: bool) -> String {
     format!("{}\n{source}\n{:?}\n{:?}\n{}", header.source, header.seeds, header.rig, header.site)
 }
 
-/// Whether two trials have the same true position at every common frame, as far as the ground truth is logged.
+/// Whether two trials have the same true position at every common frame.
 ///
-/// A dive of another length may take another route.
+/// Frames without ground truth are ignored. A dive of another length may take another route.
 fn same_views(first: &Trial, second: &Trial) -> bool {
     let places = |trial: &Trial| trial.frames.iter().map(|frame| (frame.number, frame.truth)).collect::<Vec<_>>();
     let theirs: BTreeMap<u64, Option<[f64; 3]>> = places(second).into_iter().collect();
@@ -165,7 +172,7 @@ fn max_in_all_pairs(sizes: impl Iterator<Item = usize>) -> usize {
     if pairs <= READABLE { ALL_PAIRS } else { 4 }
 }
 
-/// The pairs of `n` indices: all pairs if `n` is at most `max`, otherwise the pairs with the first index.
+/// All pairs of `n` indices, or those with the first index if `n` is larger than `max`.
 fn pairs(n: usize, max: usize) -> Vec<(usize, usize)> {
     let all = n <= max;
     (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, _)| all || *a == 0).collect()
@@ -232,7 +239,9 @@ fn between(run: &Run) -> Vec<Comparison> {
     found
 }
 
-/// The TREs (m) of both on their common attempts, in order of time; infinite for a rejected attempt or a wrong fix.
+/// The TREs (m) of both on their common attempts, in order of time.
+///
+/// The TRE of a rejected attempt or a wrong fix is infinite.
 pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
     fn keyed(trial: &Trial) -> Vec<(u64, &str, f64)> {
         let attempts = trial.attempts();
@@ -241,7 +250,9 @@ pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
     matched(keyed(first), keyed(second))
 }
 
-/// The values of both under their common keys, in the order of the keys; the last value of a repeated key counts.
+/// The values of both under their common keys, in the order of the keys.
+///
+/// The last value of a repeated key counts.
 fn matched<K: Ord>(first: Vec<(u64, K, f64)>, second: Vec<(u64, K, f64)>) -> Vec<(f64, f64)> {
     let ordered = |mut keyed: Vec<(u64, K, f64)>| {
         // Logs are usually in order, and sorting takes memory even then.
@@ -345,7 +356,9 @@ impl Statistics {
 }
 
 impl Statistics {
-    /// The largest absolute end of the 90 % interval of the median difference; infinite for too few pairs.
+    /// The largest absolute end of the 90 % interval of the median difference.
+    ///
+    /// The result is infinite for too few pairs.
     ///
     /// It is the smallest margin within which two one-sided tests at 5 % show equivalence.
     pub(crate) fn margin(errors: &[(f64, f64)], conditions: bool) -> f64 {
@@ -389,7 +402,9 @@ mod tests {
         assert_eq!(Statistics::margin(&alike(60), false), 0.0);
     }
 
-    /// Two methods that fail at different times are not shown to be equivalent; two with small differences are.
+    /// Two methods that fail at different times are not shown to be equivalent.
+    ///
+    /// Two methods with small differences are.
     ///
     /// Seen to fail where the NaN median between both infinities is ignored.
     #[test]
@@ -413,7 +428,7 @@ mod tests {
         assert_eq!((many, pairs(6, many).len(), pairs(4, many).len()), (4, 5, 6));
     }
 
-    /// Pairs that both fail are ignored: a fix of only one trial is a difference, however many pairs both fail.
+    /// Pairs that both fail are ignored; a fix of only one trial is a difference.
     ///
     /// Seen to fail where two failures count as a difference of zero.
     #[test]
@@ -426,7 +441,9 @@ mod tests {
         assert_eq!(Statistics::of(&[(none, none)], false).difference, 0.0);
     }
 
-    /// Only common keys are paired, in the order of the keys for any input order; the last value of a repeated key counts.
+    /// Only common keys are paired, in the order of the keys for any input order.
+    ///
+    /// The last value of a repeated key counts.
     ///
     /// Seen to fail where the first value counts, and where keys are compared by frame number only.
     #[test]

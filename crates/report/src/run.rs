@@ -66,7 +66,9 @@ pub(crate) struct Frame {
     pub(crate) stamp_ns: u64,
     /// The true position of the left camera in the world (m).
     pub(crate) truth: Option<[f64; 3]>,
-    /// The times of the stages common to all targets, in the order of [`crate::StageTimeSummary`] (ms); NaN without one.
+    /// The times (ms) of the stages common to all targets; NaN without one.
+    ///
+    /// Their order is that of [`crate::StageTimeSummary`].
     pub(crate) times: [f64; 7],
     rows: (u32, u32),
     /// The navigated pose, for a trial with a navigator.
@@ -84,8 +86,9 @@ pub(crate) struct Inspected {
 /// The state of the navigator after a frame.
 #[derive(Debug)]
 pub(crate) struct NavigatedFrame {
-    /// The positions of the left camera in the world (m) by the navigated pose and by odometry only from the first fix, each
-    /// combined with the survey; NaN where unknown.
+    /// The positions of the left camera in the world (m), navigated and by odometry only.
+    ///
+    /// Odometry starts at the first fix. Both use the survey; unknown positions are NaN.
     pub(crate) places: [[f64; 3]; 2],
     /// The events that report objects away from their surveyed pose.
     pub(crate) displaced: Vec<String>,
@@ -101,7 +104,7 @@ pub(crate) struct AttemptRow {
     pub(crate) outcome: Outcome,
     pub(crate) wrong: Option<bool>,
     pub(crate) points: u32,
-    /// The position of the left camera in the world by the fix and the survey (m); NaN where unknown.
+    /// The position of the left camera in the world (m) by fix and survey; NaN where unknown.
     pub(crate) estimate: [f64; 3],
     /// The error of the fix at the centroid of its used points (m); NaN where unknown.
     displacement: f64,
@@ -390,7 +393,9 @@ impl AttemptRow {
     }
 }
 
-/// Checks the manifest of a run, if it has one: a known major format, and all logs present for a finished run.
+/// Checks the manifest of a run, if it has one.
+///
+/// Its major format must be known, and a finished run must have all its logs.
 fn known_manifest(folder: &Path) -> Result<(), ReportError> {
     const KNOWN: &str = "seafix-manifest/2";
     let path = folder.join("manifest.json");

@@ -53,11 +53,15 @@ pub struct Row {
     pub unjudged: usize,
     /// The number of rejected attempts for each reason.
     pub reasons: BTreeMap<String, usize>,
-    /// The fit RMS: RMS of C·H − P over the identified points (m), of the fixes that are not wrong.
+    /// The fit RMS (m) of the fixes that are not wrong.
+    ///
+    /// It is the RMS of C·H − P over the identified points.
     pub fit: Option<Distribution>,
-    /// The fit RMS over the identified points that the solver did not use (m), of the fixes that are not wrong.
+    /// The fit RMS (m) over points that the solver did not use, of the fixes that are not wrong.
     pub fit_unused: Option<Distribution>,
-    /// The target registration error (TRE): RMS over all model points (m), of the fixes that are not wrong.
+    /// The target registration error (TRE, m) of the fixes that are not wrong.
+    ///
+    /// It is the RMS error over all model points of the target.
     pub tre: Option<Distribution>,
     /// The median TRE over all attempts (m), with rejected attempts and wrong fixes counted as infinite.
     pub tre_of_all: Option<f64>,
@@ -205,7 +209,7 @@ impl RunSummary {
         }
     }
 
-    /// A sentence on stages shared by several trials; `None` if no stage is shared, or no duration is logged.
+    /// A sentence on stages shared by several trials; `None` without shared stages.
     pub(crate) fn shared_times(&self) -> Option<String> {
         let any = |is_shared: fn(&SharedStages) -> bool| self.rows.iter().any(|row| is_shared(&row.shared));
         let stages = [

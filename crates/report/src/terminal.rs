@@ -137,7 +137,9 @@ fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// A text broken at blanks into lines of at most `max` columns, with later lines indented; longer words are cut.
+/// A text broken at blanks into lines of at most `max` columns.
+///
+/// Later lines are indented; words longer than a line are cut.
 pub(crate) fn wrapped(text: &str, max: Option<usize>, indent: usize) -> String {
     let Some(max) = max.map(|max| max.max(indent + 8)) else { return text.to_owned() };
     let mut lines = vec![String::new()];

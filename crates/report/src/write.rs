@@ -23,7 +23,9 @@ pub struct Forms {
     pub latex: bool,
     /// The PDF `report.pdf`.
     pub pdf: bool,
-    /// A small report for a repository: a page with small pictures, the main figure, and tables as CSV only.
+    /// A small report for a repository.
+    ///
+    /// It has a page with small pictures, the main figure, and tables as CSV only.
     pub small: bool,
 }
 
@@ -69,9 +71,9 @@ pub(crate) type File = (String, Vec<u8>);
 
 /// Writes the report on the logs in `run_dir` to `folder`.
 ///
-/// The files are the report in the selected forms, `figures/` as SVG and PDF, `tables/` as CSV and JSON with every plotted
-/// number, pictures as JPEG, `run.bib`, and the table for the terminal as `summary.txt`. Stale files of an earlier report
-/// are removed from `figures/` and `tables/`.
+/// The files are the report in the selected forms, `figures/` as SVG and PDF, `tables/` as CSV and JSON with every
+/// plotted number, pictures as JPEG, `run.bib`, and the table for the terminal as `summary.txt`. Stale files of an
+/// earlier report are removed from `figures/` and `tables/`.
 ///
 /// # Errors
 /// [`ReportError`] when the run has no log, a log cannot be read, the folder holds other files and no report, or a file
@@ -123,7 +125,7 @@ pub(crate) fn files(run: &Run, summary: &RunSummary, forms: Forms) -> Result<Vec
     Ok(files)
 }
 
-/// Adds the files of a small report: the main figure, the picture of a fix, and all tables as CSV.
+/// Adds the files of a small report: main figure, picture of a fix, tables as CSV.
 fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     if let Some(figure) = main_figure(document) {
         add("main.svg".to_owned(), print::standalone(&figure.drawing).into_bytes());
@@ -164,7 +166,9 @@ fn figures(document: &Document) -> Vec<File> {
     figures.par_iter().flat_map_iter(figure).chain(tables.par_iter().flat_map_iter(table)).collect()
 }
 
-/// The stale files in `figures/` and `tables/` of the report in `folder`: those of a report that are not in `files`.
+/// The stale files of an earlier report in `folder`, which are not in `files`.
+///
+/// Only `figures/` and `tables/` are searched.
 pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for part in ["figures", "tables"] {
@@ -181,7 +185,7 @@ pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     found
 }
 
-/// The first entry of a folder that has other files and no report; `None` for an empty folder or one with a report.
+/// The first entry of a folder that has other files and no report.
 fn foreign(folder: &Path) -> Option<String> {
     let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
     let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();

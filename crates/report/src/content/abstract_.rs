@@ -65,7 +65,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     texts
 }
 
-/// A sentence on the settings in which the run departs from its experiment file; `None` where there are none.
+/// A sentence on the settings that differ from the experiment file; `None` without any.
 fn changed(run: &Run) -> Option<Text> {
     let mut settings =
         run.header().command.split(" --set '").skip(1).filter_map(|rest| rest.split_once('\'')).peekable();

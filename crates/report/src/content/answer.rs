@@ -120,7 +120,9 @@ const METRICS: [Metric; 2] = [
     ("camera position error", Field::Position, |row| row.position_error),
 ];
 
-/// One sentence for every quantity, listing all trials in order of the numeric axis, or the highest fix rate first.
+/// One sentence for every quantity, listing all trials.
+///
+/// They are in order of the numeric axis, or without one in order of decreasing fix rate.
 fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
     let mut order: Vec<usize> = (0..summary.rows.len()).collect();
     if labels.along.is_none() {
@@ -196,7 +198,7 @@ fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
         .collect()
 }
 
-/// `, no fix at 4.5 and 5.5`: the values of the axis without a fix, for a series that has fixes elsewhere.
+/// The clause on values without a fix, like `, no fix at 4.5 and 5.5`; `None` for a series without any fix.
 fn nowhere(summary: &RunSummary, labels: &Labels, members: &[usize]) -> Option<String> {
     let key = labels.along.as_ref()?;
     let found = |index: &usize| summary.rows[*index].found > 0;
@@ -205,7 +207,9 @@ fn nowhere(summary: &RunSummary, labels: &Labels, members: &[usize]) -> Option<S
     (members.iter().any(found) && !places.is_empty()).then(|| format!(", no fix at {}", places.join(" and ")))
 }
 
-/// `; the median TRE is a mm at 2 and b mm at 5`, or the smallest and the largest median without a numeric axis.
+/// The clause on the median errors of a series, like `; the median TRE is a mm at 2 and b mm at 5`.
+///
+/// A run without a numeric axis has the smallest and the largest median instead.
 fn course(run: &Run, summary: &RunSummary, labels: &Labels, members: &[usize], (name, field, of): Metric) -> Text {
     let known: Vec<(usize, f64)> =
         members.iter().filter_map(|&index| Some((index, of(&summary.rows[index])?.median))).collect();
@@ -302,7 +306,9 @@ fn errors(run: &Run, summary: &RunSummary) -> Vec<Text> {
     as_number.collect()
 }
 
-/// A sentence on the trial with the most wrong fixes; `None` without any, or for a single trial.
+/// A sentence on the trial with the most wrong fixes.
+///
+/// The result is `None` without any, or for a single trial.
 fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
     let worst = (0..summary.rows.len()).rev().max_by_key(|&index| summary.rows[index].wrong)?;
     let (row, trial) = (&summary.rows[worst], &run.trials[worst]);
@@ -310,9 +316,9 @@ fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
         return None;
     }
     let alike = summary.rows.iter().filter(|other| other.wrong == row.wrong).count();
-    let began = if alike == 1 { "Most wrong fixes:" } else { "Most wrong fixes (several trials have as many):" };
+    let began = if alike == 1 { "Most wrong fixes:" } else { "No trial has more wrong fixes than" };
     Some(text![
-        format!("{began} {}, ", labels.of_trial(row)),
+        format!("{began} {} with ", labels.of_trial(row)),
         phrases::count(trial, "wrong", row.wrong),
         " in ",
         phrases::count(trial, "attempted", row.attempted),

@@ -23,7 +23,7 @@ const SEARCHED: usize = 200_000;
 /// One attempt in its trial.
 type Case<'a> = (usize, &'a Frame, &'a AttemptRow);
 
-/// The picture of the best frame for the section on the method, and the section with the worst attempts.
+/// The picture of the best frame, and the section with the worst attempts.
 pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section), ReportError> {
     let worst = worst(run);
     let best = best(run);

@@ -22,7 +22,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         return None;
     }
     let caption = text![
-        "Error of each point of interest in the frame of the left camera: the estimated position (by the navigated pose, or by the frame’s fix without navigation) against the true one. The survey links points of other objects than the one that the pose refers to. In view: frames with the point inside both images; occlusion is not considered. With a pose: frames at which the vehicle has a pose; the errors are over these. NEES: 3 for a consistent covariance."
+        "Error of each point of interest in the frame of the left camera: the estimated position (by the navigated pose, or by the frame’s fix without navigation) against the true one. Points of other objects than that of the pose are placed by the survey. In view: frames with the point inside both images; occlusion is not considered. With a pose: frames at which the vehicle has a pose; the errors are over these. NEES: 3 for a consistent covariance."
     ];
     let mut above = results::blank(summary, 1);
     above.extend([

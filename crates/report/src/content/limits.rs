@@ -54,8 +54,7 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let ticks: Vec<f64> = on(&key).iter().filter_map(|value| value.parse().ok()).collect();
     let heads =
         [Head::words("condition"), Head::words("series"), Head::numbers(headed(&key)), Head::numbers("RMS TRE (mm)")];
-    let mut data =
-        Table::new("error-over-noise", text!["Every point of the figure of error over noise."], heads.to_vec());
+    let mut data = Table::new("error-over-noise", text!["The data of the figure of error over noise."], heads.to_vec());
     let mut panels = Vec::new();
     for place in &places {
         let mut layers = Vec::new();

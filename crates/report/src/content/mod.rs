@@ -36,7 +36,9 @@ use crate::{
     run::Run,
 };
 
-/// The report on a run; a `small` one has few small pictures and no text that depends on the program's version.
+/// The report on a run.
+///
+/// A `small` one has few small pictures and no text that depends on the program's version.
 pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<Document, ReportError> {
     let header = run.header();
     let title = if header.title.is_empty() { &header.run } else { &header.title };

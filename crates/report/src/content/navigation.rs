@@ -122,7 +122,9 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
     (!table.lines.is_empty()).then_some(table)
 }
 
-/// One sentence for every trial with a navigator; `name` gives the name of the trial at an index.
+/// The sentences on trials with a navigator, one for each.
+///
+/// `name` gives the name of the trial at an index.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
@@ -164,7 +166,9 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     said
 }
 
-/// A sentence on the trial with the smallest RMS position error; `None` where trials have different numbers of poses.
+/// A sentence on the trial with the smallest RMS position error.
+///
+/// The result is `None` where trials have different numbers of poses.
 fn min(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
     let rms = |trial: &Trial| -> (usize, f64) {
         let errors = trial.sample().filter_map(|frame| frame.navigated.as_ref()?.get(NavigationQuantity::Position));

@@ -55,9 +55,10 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     Some(Section::new("Objects").with([Block::Table(table)]))
 }
 
-/// One sentence for every trial with the fixes and errors of each object, for experiments that change the objects.
+/// One sentence for every trial with the fixes and errors of each object.
 ///
-/// They show whether a displaced object affects the fixes on others. `name` gives the name of the trial at an index.
+/// Only experiments that change the objects have them; they show whether a displaced object affects the fixes on
+/// others. `name` gives the name of the trial at an index.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let changes = |trial: &Trial| trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"));
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| changes(trial) && objects(trial).len() > 1);
@@ -78,7 +79,9 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     trials.map(sentence).collect()
 }
 
-/// A sentence on the frames with a fix, by the number of targets in view; `None` where no frame has several.
+/// A sentence on the frames with a fix, by the number of targets in view.
+///
+/// The result is `None` where no frame has several.
 ///
 /// `name` gives the name of the trial at an index.
 pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
@@ -106,8 +109,10 @@ pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
     Some(said)
 }
 
-/// The searched objects by name; empty for a decimated log, and for generated problems, whose attempts each have an
-/// object of their own.
+/// The searched objects by name.
+///
+/// The result is empty for a decimated log, and for generated problems, whose attempts each have an object of their
+/// own.
 fn objects(trial: &Trial) -> Vec<String> {
     let names: BTreeSet<&str> = trial.attempts().map(|(_, row)| trial.object(row)).collect();
     if trial.every() > 1 || 2 * names.len() > trial.attempts().count() {

@@ -69,8 +69,10 @@ fn is_of(row: &AttemptRow, group: &str) -> bool {
     }
 }
 
-/// The 95 % interval of the fraction of `group`: [`proportion::interval`] of the attempts one by one, or
-/// [`proportion::interval_of_counts`] of a decimated log, which has only counts of the frames that it skipped.
+/// The 95 % interval of the fraction of `group`.
+///
+/// It is [`proportion::interval`] of the single attempts, or [`proportion::interval_of_counts`] for a decimated log,
+/// which has only counts of the skipped frames.
 fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
     if trial.every() > 1 || !proportion::is_trajectory(&trial.header) {
         return proportion::interval_of_counts(proportion::is_trajectory(&trial.header), k, n);
@@ -174,7 +176,9 @@ pub(super) fn value(
     Number::new(value.map(|value| value * unit.scale()), decimals, key)
 }
 
-/// A key over several logs: a count is summed over them; `least`, `greatest` and `middle` select among their values.
+/// A key over several logs.
+///
+/// A count is summed over them; `least`, `greatest` and `middle` select among their values.
 pub(super) fn over(trials: &[&Trial], topic: &str, what: String) -> Key {
     let spans = trials.iter().map(|trial| trial.span());
     let span = spans.fold([u64::MAX, 0], |[a, b], [from, to]| [a.min(from), b.max(to)]);

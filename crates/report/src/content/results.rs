@@ -141,7 +141,7 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
     }));
     if run.trials.iter().any(|trial| trial.every() > 1) {
         caption.push(Span::from(
-            " A trial that logged one frame in k has n over all frames and the rest over the logged ones.",
+            " For a trial that logged one frame in k, n counts all frames; the other columns are over the logged frames.",
         ));
     }
     let mut above = blank(summary, 1);

@@ -82,7 +82,9 @@ pub(super) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Ve
     sure.into_iter().take(max).map(as_number).collect()
 }
 
-/// The sentence on a comparison whose difference, or an end of its interval, is infinite because one trial often fails.
+/// The sentence on a comparison with an infinite difference or interval.
+///
+/// One of the trials often fails then.
 fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
     let [first, second] = &comparison.names;
     let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };

@@ -27,7 +27,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
         items.push(text!["Construct: a mean NEES well below 6 means that covariances and protection levels are larger than the errors require. They include the assumed calibration error and the assumed corner noise (Section “Data”), even if the data have less of either."]);
     }
     if headers().any(|header| header.prior_position_sigma.is_some()) {
-        items.push(text!["Internal: prior poses are generated with the covariance that the method is given. A vehicle with an optimistic navigation covariance would be rejected more often, or would search in the wrong place."]);
+        items.push(text!["Internal: prior poses are generated with the uncertainty that the method is given. A vehicle with an optimistic navigation covariance would be rejected more often, or would search in the wrong place."]);
     }
     let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
     if min < 300 {

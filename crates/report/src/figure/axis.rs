@@ -147,7 +147,9 @@ fn steps([low, high]: [f64; 2], max: f64) -> Vec<f64> {
     (first..=last).map(|i| i as f64 * step).collect()
 }
 
-/// The text of a tick without trailing zeros, with a power of ten for very large and very small values.
+/// The text of a tick without trailing zeros.
+///
+/// Very large and very small values have a power of ten.
 pub(crate) fn tick_text(tick: f64) -> String {
     let size = tick.abs();
     if size >= 1e5 || (size > 0.0 && size < 1e-4) {

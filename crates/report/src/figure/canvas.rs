@@ -53,8 +53,10 @@ impl Canvas {
     }
 }
 
-/// A grey image resampled with a triangle filter, which interpolates linearly when it enlarges and averages when it
-/// shrinks. `size` and `to` are width and height (px).
+/// A grey image resampled with a triangle filter.
+///
+/// The filter interpolates linearly when it enlarges and averages when it shrinks. `size` and `to` are width and height
+/// (px).
 pub(super) fn resized(pixels: &[u8], size: [usize; 2], to: [usize; 2]) -> Vec<u8> {
     let columns = weights(size[0], to[0]);
     let rows = weights(size[1], to[1]);
@@ -74,7 +76,9 @@ pub(super) fn resized(pixels: &[u8], size: [usize; 2], to: [usize; 2]) -> Vec<u8
     resized
 }
 
-/// The source pixels and weights of each of `to` pixels; the weights of a pixel add up to one.
+/// The source pixels and weights of each of `to` pixels.
+///
+/// The weights of a pixel add up to one.
 fn weights(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     let ratio = from as f32 / to.max(1) as f32;
     let reach = ratio.max(1.0);

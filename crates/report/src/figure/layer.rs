@@ -45,7 +45,7 @@ pub(super) fn stroke(series: usize) -> Stroke {
     Stroke { ink: Ink::Series(series), width: 1.1, dash: series % 5 }
 }
 
-/// The value of a heat map cell from which white text has more contrast than black: the luminance is below 0.21.
+/// Minimum value of a heat map cell with white text; its luminance is below 0.21.
 const DARK: f64 = 0.9;
 
 impl Layer {

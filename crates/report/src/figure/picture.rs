@@ -1,4 +1,4 @@
-//! Pictures of both images of a frame with its identified points, like Figures 7 to 9 of the paper.
+//! Pictures of a frame with its identified points, like Figures 7 to 9 of the paper.
 
 use std::collections::BTreeSet;
 
@@ -13,7 +13,9 @@ use crate::{ReportError, place::matrix, run::Trial};
 
 /// The gap between the two images (px).
 const GAP: u32 = 8;
-/// The half size of a gate in standard deviations: √11.34, from the 99 % quantile of χ² with three degrees of freedom.
+/// The half size of a gate in standard deviations, √11.34.
+///
+/// 11.34 is the 99 % quantile of χ² with three degrees of freedom.
 const GATE: f64 = 3.368;
 
 /// The picture of a frame.
@@ -119,7 +121,9 @@ impl Marked {
     }
 }
 
-/// The gates of the model points with candidates in both images: centres by the prior pose, and half sizes (px).
+/// The gates of the model points with candidates, in both images.
+///
+/// Each has its centre by the prior pose and its half size (px).
 fn gates(header: &TrialHeader, frame: &FrameRecord, offset: f64) -> Vec<([f64; 2], [f64; 2])> {
     let (Some(prior), Some(position)) = (&frame.prior, header.prior_position_sigma) else { return Vec::new() };
     let attitude = header.prior_attitude_sigma.unwrap_or(0.0);

@@ -7,7 +7,9 @@ use crate::{
     print::unicode::harmless,
 };
 
-/// A table as CSV, one line for every line of the table; a number has all its digits and no unit.
+/// A table as CSV, one line for every line of the table.
+///
+/// A number has all its digits and no unit.
 pub(crate) fn csv(table: &Table) -> String {
     let mut out = line(table.names().iter().map(String::as_str));
     // An empty first cell repeats the one above.
@@ -47,7 +49,9 @@ fn line<'a>(fields: impl Iterator<Item = &'a str>) -> String {
     fields.map(field).collect::<Vec<_>>().join(",") + "\n"
 }
 
-/// A CSV field, quoted if necessary, and guarded so that spreadsheets do not interpret a name as a formula.
+/// A CSV field, quoted if necessary.
+///
+/// It is guarded so that spreadsheets do not interpret a name as a formula.
 pub(crate) fn field(text: &str) -> String {
     let text = harmless(text);
     let number = text.parse::<f64>().is_ok();

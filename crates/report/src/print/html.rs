@@ -54,7 +54,9 @@ pub(crate) fn html(document: &Document, forms: Forms) -> String {
     page.into_string()
 }
 
-/// The style with the embedded font of the figures, so that text has the measured width, or with names of similar fonts.
+/// The style with the font of the figures, embedded or by name.
+///
+/// An embedded font gives text the measured width everywhere; a small page has names of fonts with the same widths.
 fn font(embedded: bool) -> String {
     if !embedded {
         return "svg{font-family:\"Liberation Sans\",Arimo,Helvetica,Arial,sans-serif}".to_owned();

@@ -228,7 +228,9 @@ fn toothed(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     })
 }
 
-/// The area under the recall curve up to `bound` (%), summed over its steps; `None` where a fix has no error.
+/// The area under the recall curve up to `bound` (%), summed over its steps.
+///
+/// The result is `None` where a fix has no error.
 fn area<'a>(attempts: impl Iterator<Item = &'a TargetRecord>, field: Field, bound: f64) -> Option<f64> {
     let attempts: Vec<&TargetRecord> = attempts.collect();
     if attempts.is_empty() || attempts.iter().any(|row| found(row) && field.of(row).is_none()) {

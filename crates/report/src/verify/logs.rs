@@ -43,7 +43,7 @@ pub(super) struct Seen {
     pub(super) times: FrameTimes,
     pub(super) truth: Option<[f64; 3]>,
     pub(super) navigation: Option<Box<NavigationRecord>>,
-    /// The camera positions in the world (m) by the navigated pose, and by odometry only from the first fix.
+    /// The camera positions in the world (m), navigated and by odometry only from the first fix.
     pub(super) carried: [[f64; 3]; 2],
     /// The pose error for fix intervals.
     pub(super) step: Option<Step>,
@@ -152,14 +152,16 @@ impl Log {
         self.frames[first..].iter().take_while(move |frame| frame.stamp_ns == stamp_ns)
     }
 
-    /// The frames within the stamps that are logged for any outcome: those whose number is a multiple of `every`.
+    /// The frames within the stamps that are logged for any outcome.
+    ///
+    /// Their numbers are multiples of the decimation factor.
     pub(super) fn sample(&self, [from, to]: [u64; 2]) -> impl Iterator<Item = &Seen> {
         let every = self.totals.as_ref().map_or(1, |totals| totals.every.max(1));
         self.frames.iter().filter(move |frame| frame.number % every == 0 && (from..=to).contains(&frame.stamp_ns))
     }
 }
 
-/// The RMS error (m) of six points at a lever arm from the centroid, along the axes and back.
+/// The RMS error (m) of six points at a lever arm from the centroid, along the axes.
 ///
 /// Their mean square equals that over a sphere.
 fn moved(header: &TrialHeader, truth: Option<&TruthRecord>, row: &TargetRecord, arm: f64) -> f64 {

@@ -6,8 +6,9 @@ use seafix_report::{Forms, report};
 
 use crate::made_up::write_run;
 
-/// A page that shows the report at both widths and lists elements that overflow or are too small to read; a wide table
-/// may scroll in its own box.
+/// A page that shows the report at both widths and lists faulty elements.
+///
+/// Faulty elements overflow or are too small to read; a wide table may scroll in its own box.
 const FRAME: &str = "<iframe id=f style='height:900px;border:0' src=report.html></iframe><p id=found></p><script>
 onload = () => { const said = [];
 for (const width of [380, 1280]) { f.style.width = width + 'px';

@@ -58,7 +58,9 @@ fn runs_of_other_data_are_refused() {
     assert!(forced.contains("a and b have different data: seeds: experiment 1 against experiment 2."), "{forced}");
 }
 
-/// A shorter run is compared over the common frames, with a notice; no line is wider than the terminal.
+/// A shorter run is compared over the common frames, with a notice.
+///
+/// No line is wider than the terminal.
 ///
 /// Seen to fail where runs of different length are not compared, and where the table is not split by width.
 #[test]

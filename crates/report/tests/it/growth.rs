@@ -10,7 +10,7 @@ use crate::rows;
 #[global_allocator]
 static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Whether this process runs `test` alone; otherwise runs `test` in a process of its own, and that process passes.
+/// Whether this process runs `test` alone; otherwise it runs `test` in another process.
 ///
 /// The allocation counters belong to the process, so a concurrent test would be counted too.
 fn alone(test: &str) -> bool {
@@ -25,7 +25,9 @@ fn alone(test: &str) -> bool {
     false
 }
 
-/// Four times the rows cost at most four times the memory, for a report and for its verification; the page hardly grows.
+/// Four times the rows cost at most four times the memory, and the page hardly grows.
+///
+/// This holds for a report and for its verification.
 ///
 /// Seen to fail where the Stanford diagram plots every fix.
 #[test]

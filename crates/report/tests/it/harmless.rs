@@ -1,5 +1,7 @@
-//! Safety against hostile input: names are plain text in HTML, LaTeX, CSV, PDF and the terminal (B42), and logs of a newer
-//! version are rejected with both versions (B57).
+//! Safety against hostile input and newer versions.
+//!
+//! Names are plain text in HTML, LaTeX, CSV, PDF and the terminal (B42). Logs of a newer version are rejected with both
+//! versions (B57).
 
 use std::{fs, process::Command};
 
@@ -40,8 +42,9 @@ fn names_command_nothing() {
     }
 }
 
-/// The source compiles with `article`, `booktabs` and `graphicx` alone, without an error or a box that is more than 2 pt
-/// too wide. Skipped without LaTeX.
+/// The source compiles with `article`, `booktabs` and `graphicx` alone.
+///
+/// It gives no error and no box that is more than 2 pt too wide. Skipped without LaTeX.
 #[test]
 fn latex_compiles() {
     if Command::new("pdflatex").arg("--version").output().is_err() {

@@ -17,7 +17,9 @@ const CASES: [(f64, Option<f64>, Region); 6] = [
     (0.010, None, Region::Unprotected),
 ];
 
-/// Writes twelve frames, each case twice, with or without totals; `change` can imitate a log of an older version.
+/// Writes twelve frames, each case twice, with or without totals.
+///
+/// `change` can imitate a log of an older version.
 fn write(folder: &Path, totals: bool, change: impl Fn(&mut FrameRecord)) {
     let header = header(1, 3.0, "kabsch");
     let mut sums = Totals { every: 1, ..Totals::default() };

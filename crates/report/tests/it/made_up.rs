@@ -91,7 +91,9 @@ fn seed(number: u64, distance: f64) -> u64 {
     10_000 * number + (distance * 10.0) as u64
 }
 
-/// Frame `number` at `distance`; every sixth is rejected, and one frame of the run has a wrong fix.
+/// Frame `number` at `distance`.
+///
+/// Every sixth is rejected, and one frame of the run has a wrong fix.
 pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
     let blind = blind(header, number, distance);
     let images = Some([0, 1].map(|side| image(&blind.cloud, side, seed(number, distance))));
@@ -233,7 +235,9 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
 /// The logs of a run: file names and contents.
 type Logs = Vec<(String, Vec<u8>)>;
 
-/// Writes a run with two trials at each distance; the logs of the same distances are generated once.
+/// Writes a run with two trials at each distance.
+///
+/// The logs of the same distances are generated once.
 pub(crate) fn write_run(folder: &Path, distances: &[f64]) {
     static MADE: Mutex<BTreeMap<String, Arc<Logs>>> = Mutex::new(BTreeMap::new());
     let made = {

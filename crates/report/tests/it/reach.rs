@@ -9,7 +9,8 @@ use crate::made_up::{blind, header};
 
 /// Three fixes in four attempts, rotated by 0.02 rad about the centroid of their points and shifted by 3 mm.
 ///
-/// Seen to fail where the rotation or the rejected attempts are ignored, and where the arm starts at the object's origin.
+/// Seen to fail where the rotation or the rejected attempts are ignored, and where the arm starts at the object's
+/// origin.
 #[test]
 fn areas_and_lever_arms_are_as_by_hand() {
     let folder = tempfile::tempdir().unwrap();

@@ -114,7 +114,9 @@ fn what_is_no_report_is_left_alone() {
     report(folder.path(), &own, Forms::ALL).unwrap();
 }
 
-/// A finished run with a missing log is rejected; an interrupted run is reported with the logs that it has.
+/// A finished run with a missing log is rejected.
+///
+/// An interrupted run is reported with the logs that it has.
 ///
 /// Seen to fail where the logs of the manifest are not checked.
 #[test]

@@ -39,7 +39,9 @@ pub(in crate::content) fn name(row: &Row, key: &str) -> String {
 /// A quantity with its distribution in a row and its axis label.
 type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
 
-/// The figure of fit RMS and TRE over the condition, with the paper's range and, over distance, growth with z and z².
+/// The figure of fit RMS and TRE over the condition, with the paper's range.
+///
+/// Over distance it also shows growth with z and z².
 pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let key = numeric(summary)?;
     let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
@@ -141,8 +143,10 @@ fn laws(ticks: &[f64], all: &[[f64; 2]]) -> Vec<Layer> {
 /// A quantity with its unit and its axis label.
 type Distributed = (Field, Unit, &'static str);
 
-/// The figure of error distributions, one box for every trial: the TRE, or attitude, position and search time over a
-/// fraction of outliers, as the literature on robust registration shows them.
+/// The figure of error distributions, with one box for every trial.
+///
+/// It shows the TRE; over a fraction of outliers it shows attitude error, position error and search time, as the
+/// literature on robust registration does.
 pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let groups = panels(run, 12);
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));

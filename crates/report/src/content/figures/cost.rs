@@ -16,7 +16,9 @@ const MAX: usize = 10;
 /// Minimum number of attempts of a plotted median.
 const MIN: usize = 3;
 
-/// The figure of pair tests and search time over the number of candidates, on logarithmic axes; time only if logged.
+/// The figure of pair tests and search time over the number of candidates, on logarithmic axes.
+///
+/// It has times only if durations are logged.
 pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     let names = distinct(run.trials.iter().map(|trial| trial.method()[0].clone()));
     if names.len() > MAX {

@@ -13,7 +13,9 @@ use crate::{
 /// Maximum number of lines with bands that remain distinguishable.
 const BANDS: usize = 3;
 
-/// The figure of recall over the TRE with 95 % bands; rejected attempts and wrong fixes are below no bound.
+/// The figure of recall over the TRE with 95 % bands.
+///
+/// Rejected attempts and wrong fixes are below no bound.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let mut groups = panels(run, 6);
     // Many bands in one panel hide each other.

@@ -13,9 +13,9 @@ use crate::{
 /// Maximum number of trials, one panel each.
 const PANELS: usize = 4;
 
-/// The figure of the camera position error over time, for the navigated pose and for odometry from the first fix alone.
+/// The figure of the camera position error over time, navigated and by odometry only.
 ///
-/// Every fix has a mark; gaps are times without a pose.
+/// Odometry starts at the first fix. Every fix has a mark; gaps are times without a pose.
 pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let trials: Vec<&Trial> =
         run.trials.iter().filter(|trial| trial.sample().any(|frame| frame.navigated.is_some())).take(PANELS).collect();

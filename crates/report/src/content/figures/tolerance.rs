@@ -104,7 +104,7 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
     figure("precision-recall", caption(&said, run), &chart, data)
 }
 
-/// Adds a label at a place, or to the label of a place so near that both would overlap.
+/// Adds a label at a point, or extends the label of a near point that it would overlap.
 fn note(notes: &mut Vec<([f64; 2], Vec<String>)>, word: String, at: [f64; 2]) {
     let near = |known: &[f64; 2]| (known[0] - at[0]).abs() < 0.16 && (known[1] - at[1]).abs() < 0.12;
     match notes.iter_mut().find(|(known, _)| near(known)) {

@@ -15,8 +15,9 @@ use crate::{
 /// Maximum number of plotted frames; the positions of more would overlap.
 const PLACES: usize = 1000;
 
-/// The figure for the first trial, from above and from the side: true positions, fixes, navigated and odometry-only
-/// trajectories, feature points and the bounding boxes of the objects.
+/// The figure of the first trial's trajectory, from above and from the side.
+///
+/// It shows true positions, fixes, navigated and odometry-only trajectories, feature points and bounding boxes.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let trial = &run.trials[0];
     if !proportion::is_trajectory(&trial.header) {

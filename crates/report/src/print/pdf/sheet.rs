@@ -61,7 +61,9 @@ impl Sheets {
         self.y -= height;
     }
 
-    /// Begins a new page if `height` does not fit on this one, unless the page is empty; gives whether it did.
+    /// Begins a new page if `height` does not fit on this one.
+    ///
+    /// An empty page is kept. The result is whether a new page was begun.
     pub(super) fn need(&mut self, height: f64) -> bool {
         let turns = self.y - height < BOTTOM && self.y < TOP;
         if turns {

@@ -68,7 +68,9 @@ pub(super) fn set(sheets: &mut Sheets, table: &Table, number: usize) {
 }
 
 impl Grid {
-    /// The layout with natural widths, or with a smaller font and then narrower columns of prose if that is too wide.
+    /// The layout with natural widths.
+    ///
+    /// A table that is too wide gets a smaller font, then narrower columns of prose.
     fn of(table: &Table) -> Self {
         let mut size = SMALL;
         loop {
