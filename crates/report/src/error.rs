@@ -11,7 +11,7 @@ pub enum ReportError {
     #[error("cannot report {}: no *.mcap file; {}", .0.display(), if .0.join("manifest.json").exists() { "its run has not ended: resume it with `seafix run --resume`, or save its finished part with `seafix recover`" } else { "give the folder of a run" })]
     NoLogs(PathBuf),
     /// The manifest has a later format.
-    #[error("cannot report {}: format {found}, but this version reads {known}; use the version that wrote the run", .path.display())]
+    #[error("cannot report the run of {}: format {found}, but this version reads {known}; use the version that wrote the run", .path.display())]
     Newer {
         /// The manifest.
         path: PathBuf,
@@ -29,7 +29,7 @@ pub enum ReportError {
         other: String,
     },
     /// A log of a finished run is missing.
-    #[error("cannot report {}: its log {log} is missing, and the report would lack a trial; restore the log, or run the experiment again", .path.display())]
+    #[error("cannot report the run of {}: its log {log} is missing, and the report would lack a trial; restore the log, or run the experiment again", .path.display())]
     Gone {
         /// The manifest.
         path: PathBuf,

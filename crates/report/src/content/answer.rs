@@ -276,7 +276,7 @@ fn limits(run: &Run, summary: &RunSummary) -> Vec<Text> {
             let [position_low, position_high] = ends(Field::Position, &ratios(|limits| limits.position));
             (!own.is_empty()).then(|| {
                 text![
-                    format!("{method}: the RMS TRE is "),
+                    format!("{method}: the RMS target registration error (TRE) is "),
                     tre_low,
                     " to ",
                     tre_high,

@@ -33,7 +33,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
         let mut said = text!["every "];
         said.push(phrases::header(trial, "every", Some(trial.every() as f64), 0).into());
         said.push(
-            "th frame, and failures up to a limit; medians and quantiles are over every such frame, counts over all frames"
+            "th frame, and more failures up to a limit; medians and quantiles are over the former, counts over all frames"
                 .into(),
         );
         line("Frames logged", said);

@@ -51,7 +51,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         text![italic("H0"), format!(": {null}. Rejected attempts and wrong fixes count as infinite errors.")],
         text![italic("H1"), format!(": {alternative} (two-sided).")],
         text![format!(
-            "Test: Wilcoxon’s signed rank test over {unit}, with Holm’s adjustment to a family-wise level of {ALPHA} over {} comparison{}. H0 is rejected only if the bootstrap interval of the difference also excludes no difference (Section “Significance”).",
+            "Test: Wilcoxon’s signed rank test over {unit}, with Holm’s adjustment to a family-wise level of {ALPHA} over {} comparison{}. H0 is rejected only if the bootstrap interval of the difference also excludes equality (Section “Significance”).",
             comparisons.len(),
             if comparisons.len() == 1 { "" } else { "s" },
         )],

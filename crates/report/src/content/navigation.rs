@@ -75,7 +75,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
         }
         let as_number = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
             let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
-            let key = Key::of(trial, "/referencing/frame", format!("teeth {what} of navigated{suffix}"));
+            let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated{suffix}"));
             Number::new(value.map(|value| value * unit.scale()), decimals, key)
         };
         let mut line = results::cells(row);

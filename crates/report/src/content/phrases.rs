@@ -42,6 +42,7 @@ fn counted(trial: &Trial) -> &'static str {
 /// The printed word for a counted group: keys keep the names `found` and `refused`.
 pub(super) fn outcome(group: &str) -> &str {
     match group {
+        "attempted" => "attempts",
         "found" => "fixes",
         "refused" => "rejected",
         _ => group,

@@ -51,7 +51,7 @@ pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
         ],
         components: vec![
             component("detector", "harris", "corners with sub-pixel peaks", "Harris and Stephens 1988"),
-            component("search", "maximum-clique", "the largest coherent set, one-to-one, mirror images refused", ""),
+            component("search", "maximum-clique", "the largest coherent set, one-to-one, mirror images rejected", ""),
             component("solver", solver, "a rigid motion from points", "Kabsch 1976"),
         ],
         configuration: format!("seed = 1\n[pipeline]\nsolver = \"{solver}\"\n"),
