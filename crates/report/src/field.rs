@@ -1,22 +1,22 @@
-//! The quantities of one attempt, under the names that the columns of the results have.
+//! The quantities of one attempt, named like the columns of the results.
 
 use seafix_log::TargetRecord;
 
 macro_rules! fields {
     ($($field:ident $name:literal $take:expr;)*) => {
-        /// One quantity of an attempt.
+        /// A quantity of an attempt.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub(crate) enum Field { $($field),* }
 
         impl Field {
             pub(crate) const ALL: &[Self] = &[$(Self::$field),*];
 
-            /// Its name, that of its column in the results where it has one.
+            /// The name in keys, equal to the column of the results if there is one.
             pub(crate) fn name(self) -> &'static str {
                 match self { $(Self::$field => $name),* }
             }
 
-            /// Its value in the logged record; `None` where nothing is known.
+            /// The value in a logged record; `None` where it is unknown.
             pub(crate) fn of(self, record: &TargetRecord) -> Option<f64> {
                 match self { $(Self::$field => { let take: fn(&TargetRecord) -> Option<f64> = $take; take(record) })* }
             }
@@ -48,12 +48,12 @@ fields! {
 }
 
 impl Field {
-    /// The field that is called `name`.
+    /// The field with this name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|field| field.name() == name)
     }
 
-    /// The topic that carries it.
+    /// The topic whose messages have the quantity.
     pub(crate) fn topic(self) -> &'static str {
         match self {
             Self::Residual | Self::Tests | Self::Level => "/referencing/result",

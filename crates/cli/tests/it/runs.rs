@@ -231,8 +231,8 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     let first = files(&folder.join("reports"));
     assert!(first.contains_key("b/main.svg"), "{:?}", first.keys());
     let text = |name: &str| String::from_utf8(first[name].clone()).unwrap();
-    assert!(text("a/report.html").contains("Not the experiment as its file says"));
-    assert!(!text("b/report.html").contains("Not the experiment as its file says"));
+    assert!(text("a/report.html").contains("This run departs from its experiment file"));
+    assert!(!text("b/report.html").contains("This run departs from its experiment file"));
     assert!(text("README.md").contains("[![The main figure of b](b/main.svg)](b/report.html)"));
     assert!(text("README.md").contains(&format!("Made by seafix {}.", env!("CARGO_PKG_VERSION"))));
     // The version that ran is left out: a kept run serves every version with its results.

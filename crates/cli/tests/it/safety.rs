@@ -274,9 +274,9 @@ fn a_recovered_log_counts_as_what_it_is() {
     let (code, text) = said(&["check", "saved/a.mcap"]);
     assert!(code == Some(0) && text.contains("warning: a log that was saved of one that was not whole"), "{text}");
     let (code, text) = said(&["report", "saved"]);
-    assert!(code == Some(0) && text.contains("warning: a.mcap was saved of a log that was not whole"), "{text}");
+    assert!(code == Some(0) && text.contains("warning: a.mcap: recovered from an incomplete log"), "{text}");
     let page = fs::read_to_string(folder.join("saved/report/report.html")).unwrap();
-    assert!(page.contains("What is lost is in no number here"));
+    assert!(page.contains("No number here includes the lost part"));
     for command in [&["diff", "whole", "saved"][..], &["merge", "saved", "--out", "merged"]] {
         let (code, text) = said(command);
         assert!(code == Some(3) && text.contains("logs that were saved of a run that is not whole"), "{text}");
