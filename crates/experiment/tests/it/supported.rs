@@ -180,7 +180,7 @@ fn the_log_and_the_table_state_what_the_fix_states() {
     }
 }
 
-/// Half of all true sets fail a test of so little confidence, together as well as alone.
+/// At a confidence of 0.4 more than half of all true sets fail the test, jointly as well as alone.
 #[test]
 fn a_joint_fix_that_fails_states_why() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 2\nobjects = 2\npoints = 12\nframes = 60\nsurvey-sigma = 0.002\n";
@@ -190,16 +190,13 @@ fn a_joint_fix_that_fails_states_why() {
         fixes.partition(|target| target.explanation.starts_with("joint fix over "));
     assert!(!failed.is_empty() && !joined.is_empty(), "{} failed, {} joined", failed.len(), joined.len());
     for target in failed {
-        assert!(
-            target.explanation.starts_with("no joint fix, the pose is that of the object alone: "),
-            "{}",
-            target.explanation
-        );
+        assert!(target.explanation.starts_with("no joint fix, each object keeps its own pose: "), "{}", target.explanation);
         assert!(target.explanation.contains("χ² = "), "{}", target.explanation);
     }
 }
 
-/// An object of which too few points are seen takes part with those, and both say so; its own fix stays refused.
+/// The few points of an object without a fix of its own are used in the joint fix, and both details state it. The object
+/// stays rejected.
 #[test]
 fn a_joint_fix_states_what_took_part() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";
@@ -218,14 +215,14 @@ fn a_joint_fix_states_what_took_part() {
                         "{}",
                         target.explanation
                     );
-                    took_part += usize::from(target.explanation.ends_with("; 4 points took part in the joint fix"));
-                    left_out += usize::from(target.explanation.contains("; no part in the joint fix: "));
+                    took_part += usize::from(target.explanation.ends_with("; 4 points used in the joint fix"));
+                    left_out += usize::from(target.explanation.contains("; not in the joint fix: "));
                 }
             }
         }
         let said = |part: &str| frame.targets.iter().any(|target| target.explanation.contains(part));
-        assert_eq!(said("took part in the joint fix"), said("(4 points, not fixed by itself)"));
-        assert_eq!(said("no part in the joint fix"), said("; left out: "));
+        assert_eq!(said("used in the joint fix"), said("(4 points, without a fix of its own)"));
+        assert_eq!(said("not in the joint fix"), said("; excluded: "));
     }
-    assert!(took_part > 15, "{took_part} of 30 took part, {left_out} did not");
+    assert!(took_part > 15, "{took_part} of 30 used, {left_out} excluded");
 }
