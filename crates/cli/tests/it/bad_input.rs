@@ -177,7 +177,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
         (output.status.code(), String::from_utf8(output.stderr).unwrap(), out)
     };
     let (code, said, out) = run("out", &[]);
-    let counted = "1 of 2 pairs left out: an image of another size than the calibration in";
+    let counted = "1 of 2 pairs skipped: an image of another size than the calibration in";
     assert!(code == Some(0) && said.contains(counted) && said.contains("c.pgm"), "{said}");
     let rows = fs::read_to_string(out.join("results.csv")).unwrap().lines().count() - 1;
     assert_eq!(rows, 1, "one pair, one object");
@@ -194,7 +194,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
 fn a_truncated_image() {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();
-    sample.refused(3, &["a.pgm", "PNG, JPEG and PNM"]);
+    sample.refused(3, &["a.pgm", "PNG, JPEG or PNM"]);
 }
 
 /// Seen to fail when lines are counted one too far.
@@ -305,8 +305,8 @@ fn the_limits_of_images_are_settings() {
         refused(&["run", folder, "--set", set, "--out", out.to_str().unwrap()], code, parts);
         assert!(!out.exists(), "something was written");
     };
-    run("source.max-pixels=3071", 3, &["a.pgm", "64×48; at most 3071 pixels are read"]);
-    run("source.max-bytes=100", 3, &["a.pgm", "at most 100 bytes are read"]);
+    run("source.max-pixels=3071", 3, &["a.pgm", "64×48; the limit is 3071 pixels"]);
+    run("source.max-bytes=100", 3, &["a.pgm", "the limit is 100 bytes"]);
     run("source.max-pixels=0", 2, &["max-pixels = 0"]);
     let check = |more: &[&str]| program().args(["check", folder]).args(more).output().unwrap().status.code();
     assert_eq!(
@@ -328,9 +328,9 @@ fn one_image_for_both_cameras() {
     assert!(code == Some(0) && said.contains("in order"), "{said}");
     fs::copy(sample.path("a.pgm"), sample.path("b.pgm")).unwrap();
     let (code, said) = checked(&sample);
-    let reported = said.contains("left and right images that are the same in") && said.contains("1 of 1 pairs");
+    let reported = said.contains("identical left and right images in") && said.contains("1 of 1 pairs");
     assert!(code == Some(1) && reported && !said.contains("in order"), "{said}");
-    sample.refused(3, &["a.pgm", "left and right images that are the same", "one image twice has no depth"]);
+    sample.refused(3, &["a.pgm", "identical left and right images", "one image twice has no depth"]);
     // Two images of nothing are alike and no mistake.
     let dark = format!("P2\n64 48\n255\n{}", "9\n".repeat(64 * 48));
     sample.put("a.pgm", &dark).put("b.pgm", &dark);
@@ -360,7 +360,7 @@ fn what_has_no_end_is_not_read() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for path in [Path::new("/dev/zero"), &pipe, folder.path()] {
         let (path, rig) = (path.to_str().unwrap(), rig.to_str().unwrap());
-        refused(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is no file", "; name a file"]);
+        refused(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is not a file", "; name a file"]);
     }
     refused(&["cloud", "a.pgm", "a.pgm", "--rig", "/dev/zero"], 3, &["/dev/zero", "text file too large"]);
 }

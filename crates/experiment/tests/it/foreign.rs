@@ -202,14 +202,14 @@ fn faults_name_file_and_line() {
         "{distortion}"
     );
     assert!(of(sheet, "intrinsics: [", "intrinsics: [7.0, ").contains("`intrinsics` has 5 numbers"));
-    assert!(of(sheet, "resolution", "solution").contains("`resolution` is no list of numbers"));
+    assert!(of(sheet, "resolution", "solution").contains("`resolution` is not a list of numbers"));
     assert!(of(sheet, "data: [", "data: [7.0, ").contains("`T_BS` has 17 numbers"));
-    assert!(of(sheet, "camera_model: pinhole", "camera_model: [").contains("no YAML"));
+    assert!(of(sheet, "camera_model: pinhole", "camera_model: [").contains("invalid YAML"));
     let stamp = own().frames[1].stamp_ns.to_string();
-    assert!(of("cam0/data.csv", &stamp, "0").contains("not after the one before"));
+    assert!(of("cam0/data.csv", &stamp, "0").contains("not later than the previous one"));
     assert!(of("cam0/data.csv", &format!("{stamp}.png"), "../../x.png").contains("leads out"));
     assert!(of("cam0/data.csv", &format!("{stamp}.png"), "x.png").contains("does not exist"));
-    assert!(of("cam1/sensor.yaml", "T_BS", "T_SB").contains("`T_BS` is no list"));
+    assert!(of("cam1/sensor.yaml", "T_BS", "T_SB").contains("`T_BS` is not a list"));
 
     let folder = TempDir::new().unwrap();
     let sequence = kitti(folder.path());
@@ -222,5 +222,5 @@ fn faults_name_file_and_line() {
     let missing = Dataset::open(&sequence).map(|_| ()).unwrap_err()[0].to_string();
     assert!(missing.contains("times.txt:3") && missing.contains("image_3/000002.png"), "{missing}");
     let none = Dataset::open(folder.path()).map(|_| ()).unwrap_err()[0].to_string();
-    assert!(none.contains("that is no data set"), "{none}");
+    assert!(none.contains("a folder without a data set"), "{none}");
 }

@@ -165,7 +165,7 @@ fn faults_name_the_file() {
     assert!(said("").contains("needs pixels"));
     let sound = "solver = 'mahalanobis'";
     fs::copy(all.join("paper-scale/a000.json"), all.join("paper-scale/a009.json")).unwrap();
-    assert!(said(sound).contains("two problems of one `id`"));
+    assert!(said(sound).contains("two problems with the same `id`"));
     fs::write(all.join("paper-scale/a009.json"), "{").unwrap();
     assert!(said(sound).contains("a009.json:1"));
     fs::remove_file(all.join("paper-scale/a009.json")).unwrap();
@@ -175,6 +175,6 @@ fn faults_name_the_file() {
     fs::remove_dir_all(&all).unwrap();
     assert!(said(sound).contains("no such file or folder"));
     fs::create_dir(&all).unwrap();
-    assert!(said(sound).contains("no problem in"));
+    assert!(said(sound).contains("no coherence problem in"));
     assert!(!folder.path().join("out").exists(), "nothing is written before inputs are checked");
 }
