@@ -490,20 +490,20 @@ fn a_fault_is_reported_where_it_stands() {
                 ("`slover`, did you mean `solver`?", "6:7"),
                 ("not a number: string \"far\"", "10:16"),
                 ("distance = -1", "10:23"),
-                ("there twice", "10:29"),
+                ("a duplicate value", "10:29"),
             ],
         ),
         (
             "source = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'kabch', 'kabsch']\n\
              [[vary]]\nkey = 'k'\nzip = { 'source.distance' = [2.0, 3.0], 'source.fraems' = [1, 2] }\n",
-            &[("did you mean `kabsch`?", "5:21"), ("there twice", "5:30"), ("did you mean `frames`?", "8:41")],
+            &[("did you mean `kabsch`?", "5:21"), ("a duplicate value", "5:30"), ("did you mean `frames`?", "8:41")],
         ),
         (
             "source = 'virtual-points'\n[[vary]]\nkey = 'k'\ncases = [\n{ label = 'a', set = { 'source.fraems' = 1 } },\n\
              { label = 'a', set = { 'pipeline.serch' = 'icp', 'pipeline.gate' = { bx = 1.0 } } },\n]\n",
             &[
                 ("did you mean `frames`?", "6:24"),
-                ("two cases of one name", "7:11"),
+                ("two cases with the same name", "7:11"),
                 ("`serch`, did you mean `search`?", "7:24"),
                 ("unknown word `bx`, did you mean `box`?", "7:50"),
             ],

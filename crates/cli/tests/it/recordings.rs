@@ -213,7 +213,7 @@ fn a_sound_recording_is_reported_and_run() {
 #[test]
 fn baselines_that_contradict_each_other() {
     let with = |tf: [f64; 3]| Bag { tf: Some(tf), ..Bag::sound() };
-    let parts = ["P and the transforms give different poses", "0.2500 m at [-0.250, 0.000, 0.000]"];
+    let parts = ["P and the transforms give different poses", "P gives 0.2500 m at [-0.250, 0.000, 0.000]"];
     with([0.5, 0.0, 0.0]).refused(
         &[&parts[..], &["/tf 0.5000 m", "`right` from `left`", "correct /cam/right/camera_info or the transform"]]
             .concat(),

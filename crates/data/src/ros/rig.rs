@@ -121,5 +121,5 @@ pub(crate) fn contradiction(
     };
     let p = mounted.unwrap_or(rectified);
     let of = |which: &Transform<RightCamera, Camera>| said(&which.translation(), which.rotation().angle());
-    Ok(Some(format!("{} by P, {} by /tf", of(&p), of(stands))))
+    Ok(Some(format!("P gives {}, /tf {}", of(&p), of(stands))))
 }

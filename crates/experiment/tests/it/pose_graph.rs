@@ -77,7 +77,7 @@ fn a_pose_graph_that_is_not_meant_is_refused() {
     for (pose_graph, what) in [
         ("read = 'missing.pose-graph'", "missing.pose-graph; check the path"),
         ("read = 'none.pose-graph'", "none.pose-graph"),
-        ("read = 'none.pose-graph', sha256 = '00'", "another network than the one that was meant"),
+        ("read = 'none.pose-graph', sha256 = '00'", "a pose graph with another SHA-256 than expected"),
     ] {
         let line = said(pose_graph);
         assert!(line.contains(what) && line.lines().count() == 1, "{line}");
