@@ -35,7 +35,7 @@ impl Thinned {
     }
 }
 
-/// Whether a frame has a rejected target or a wrong fix.
+/// Whether a target of a frame has no fix or a wrong one.
 pub(crate) fn failed(frame: &FrameRecord) -> bool {
     let failed =
         |target: &seafix_log::TargetRecord| target.outcome != Outcome::Fix || target.evaluation.wrong == Some(true);

@@ -30,8 +30,8 @@ pub struct ModelByHand<'a> {
     pub mark_sigma: f64,
     /// The name of the object.
     pub object: String,
-    /// The base points P1, P2, P3 of the Fig. 2 rule. `None` selects the triangle with the largest height relative to
-    /// the points' errors, in the order of the marks.
+    /// The base points P1, P2, P3 of the Fig. 2 rule, by name. `None` selects the triangle with the largest ratio of
+    /// area to the points' errors, in the order of the marks.
     pub base: Option<[String; 3]>,
 }
 

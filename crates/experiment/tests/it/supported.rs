@@ -1,4 +1,4 @@
-//! What supports a fix stands in the log and in the table; a joint fix that fails says so.
+//! The integrity of a fix in the log and in the table, and the reason of a failed joint fix.
 
 use std::{
     collections::HashMap,
@@ -26,11 +26,11 @@ fn made(experiment: &str) -> (Vec<FrameRecord>, Vec<HashMap<String, String>>) {
     (log.frames, rows)
 }
 
-/// Its log and the rows of its table, which CSV and Parquet hold alike.
+/// The log and the rows of the table, which are equal in CSV and Parquet.
 fn run_of(experiment: &str) -> (TrialLog, Vec<HashMap<String, String>>) {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("e.toml");
-    fs::write(&file, format!("question = 'Why believe it?'\nseed = 5\n{experiment}")).unwrap();
+    fs::write(&file, format!("question = 'Why accept it?'\nseed = 5\n{experiment}")).unwrap();
     let plan = Plan::read(&file, &[]).unwrap();
     let out = folder.path().join("run");
     run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
@@ -92,10 +92,9 @@ fn what_supports_a_fix_stands_in_log_and_table() {
     }
 }
 
-/// What the log and the table say of a fix is what the fix itself says, to the last bit: the points that were logged, judged
-/// once more.
+/// The log and the table hold the exact numbers of the fix: the logged points are solved and tested again.
 ///
-/// Seen to fail when the position's level is logged as the attitude's.
+/// Seen to fail when the position's protection level is logged as the attitude's.
 #[test]
 fn the_log_and_the_table_state_what_the_fix_states() {
     let (log, rows) = run_of(
@@ -170,7 +169,7 @@ fn the_log_and_the_table_state_what_the_fix_states() {
             "scale_error_sigma",
         ];
         assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_text[1..]);
-        // Residuals are C·H − P of each pair, and their root mean square is what is logged.
+        // Residuals are C·H − P of each pair, and their RMS is logged.
         for (pair, residual) in fix.pairs.iter().zip(&fix.residuals) {
             let at = fix.object_from_camera * cloud[pair.cloud].position.at;
             assert_eq!(at - model[pair.model].at, *residual);
@@ -200,7 +199,7 @@ fn a_joint_fix_that_fails_states_why() {
 #[test]
 fn a_joint_fix_states_what_took_part() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";
-    // Objects of five, five and four points, of which five are asked for.
+    // The objects have five, five and four points, and five are required.
     let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nmin-points = 5\n"));
     let (mut took_part, mut left_out) = (0, 0);
     for frame in &frames {

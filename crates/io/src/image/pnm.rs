@@ -73,7 +73,7 @@ impl Header {
         let size = [value("WIDTH")?, value("HEIGHT")?];
         let channels = value("DEPTH")? as usize;
         if !(1..=4).contains(&channels) {
-            return Err(format!("{channels} samples a pixel, at most 4 are supported"));
+            return Err(format!("{channels} samples a pixel, 1 to 4 are supported"));
         }
         let (white, begin) = (maxval(value("MAXVAL")?)?, end + END.len());
         Self::checked(Self { size, channels, white, coding: Coding::Binary, begin })
