@@ -47,7 +47,7 @@ impl<'a> TrialOdometry<'a> {
 /// The cause as a sentence: a frame without images.
 pub fn stereo_pair(sensor_frame: &SensorFrame) -> Result<StereoPair<'_>, String> {
     let FrameData::Stereo(left, right) = &sensor_frame.frame_data else {
-        return Err("the frame has no images; give a stereo pair".to_owned());
+        return Err("no images, but odometry needs a stereo pair".to_owned());
     };
     Ok(StereoPair { stamp_ns: sensor_frame.stamp_ns, left, right })
 }

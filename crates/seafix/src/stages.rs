@@ -368,7 +368,7 @@ fn labelled(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Corr
 }
 
 /// The points of `target` that may be in view: predicted in both images, or outside by at most three standard
-/// deviations of the prediction, with the normal towards the camera. `None` if fewer than three are predicted inside,
+/// deviations of the prediction, and not seen from behind. `None` if fewer than three are predicted inside,
 /// so that no fix is attempted. Without a prior, every point may be in view.
 fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
     /// The cosine of the angle between normal and line of sight below which a point is seen from behind.
