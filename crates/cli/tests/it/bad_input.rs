@@ -290,7 +290,8 @@ fn png_header(width: u32, height: u32) -> Vec<u8> {
 
 #[test]
 fn images_of_no_size_and_of_any() {
-    with_image(b"P5 60000 60000 255\n1").refused(3, &["a.pgm", "60000×60000", "the limit is 67108864 pixels", "max-pixels"]);
+    with_image(b"P5 60000 60000 255\n1")
+        .refused(3, &["a.pgm", "60000×60000", "the limit is 67108864 pixels", "max-pixels"]);
     with_image(b"P5 0 0 255\n").refused(3, &["a.pgm"]);
     with_image(&png_header(8_000_000, 4_000_000_000)).refused(3, &["a.pgm"]);
     with_image(&png_header(0, 48)).refused(3, &["a.pgm"]);

@@ -288,7 +288,7 @@ fn a_calibration_that_changes() {
         "a calibration that changes within the recording",
         "/cam/left/camera_info",
         "1700000000300000000 ns",
-        "cut the recording there",
+        "split the recording there",
     ]);
 }
 

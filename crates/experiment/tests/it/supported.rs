@@ -189,7 +189,11 @@ fn a_joint_fix_that_fails_states_why() {
         fixes.partition(|target| target.explanation.starts_with("joint fix over "));
     assert!(!failed.is_empty() && !joined.is_empty(), "{} failed, {} joined", failed.len(), joined.len());
     for target in failed {
-        assert!(target.explanation.starts_with("no joint fix, each object keeps its own pose: "), "{}", target.explanation);
+        assert!(
+            target.explanation.starts_with("no joint fix, each object keeps its own pose: "),
+            "{}",
+            target.explanation
+        );
         assert!(target.explanation.contains("χ² = "), "{}", target.explanation);
     }
 }
