@@ -14,7 +14,7 @@ use seafix_data::{log_conversion, source::Truth};
 
 use crate::inspect;
 
-/// The maximum distance (px) of a correct pair's cloud point from the true projections of its model point.
+/// The maximum distance (px) between a correct pair's cloud point and its model point's true projections.
 const CORRECT_PX: f64 = 2.0;
 
 /// A target with its ground truth at one instant.
@@ -203,7 +203,7 @@ fn evaluate(
     };
 }
 
-/// Whether the cloud point of `pair` is at the true projections of its model point in both images.
+/// Whether the cloud point of `pair` is at its model point's true projections in both images.
 fn shows_the_point(pair: &Correspondence, known: &TrueTarget<'_>, frame_result: &FrameResult, rig: &StereoRig) -> bool {
     let measured = &frame_result.cloud[pair.cloud];
     let shown: Option<StereoPixels> =

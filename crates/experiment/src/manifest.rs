@@ -194,7 +194,7 @@ impl Manifest {
         self.outputs.iter().filter_map(fault).collect()
     }
 
-    /// Whether this run is complete, with all its files, and has the results that `other` would have.
+    /// Whether this run is complete and has the results that `other` would have. All its files must exist.
     pub(crate) fn stands_for(&self, other: &Self, folder: &Path) -> bool {
         let complete = self.state == "finished" && self.outputs.keys().all(|name| folder.join(name).is_file());
         complete && !self.identity.is_empty() && self.identity == other.identity
@@ -304,8 +304,8 @@ pub(crate) fn without(folder: &Path) -> Option<Fault> {
 pub(crate) const NAME: &str = "manifest.json";
 
 impl Git {
-    /// The last commit that changed this program in the checkout of its build, and whether there are changes since;
-    /// empty without that checkout. Commits of other files, such as reports, do not affect runs.
+    /// The last commit that changed this program, and whether there are uncommitted changes. Both come from the
+    /// checkout of the build and are empty without it. Commits of other files, such as reports, do not affect runs.
     pub(crate) fn here() -> Self {
         static HERE: OnceLock<Git> = OnceLock::new();
         HERE.get_or_init(Self::find).clone()

@@ -99,7 +99,7 @@ mod tests {
         Some(RelativeMotion::new(motion, Covariance6::isotropic(1e-3, 1e-3)))
     }
 
-    /// The lengths of the motions in one minute at 1 Hz, with a failure of the odometry from 20 to 40 s.
+    /// The lengths of one minute's motions at 1 Hz. The odometry fails from 20 to 40 s.
     fn lengths(kind: FaultKind, amount: f64, to: f64) -> Vec<Option<f64>> {
         let faults = [OdometryFault { kind, from: 20.0, to, amount }];
         let mut motions = Motions::default();

@@ -114,7 +114,7 @@ impl Axis {
         fits(&self.range, false) && fits(&self.log_range, true)
     }
 
-    /// The places of `key` and of its value for point `number` of the axis, as paths in the file.
+    /// The places of `key` and of its value in the file, for point `number` of the axis.
     fn written(&self, number: usize, key: &str) -> ((Vec<String>, Part), Vec<String>) {
         let path = |steps: &[&str]| steps.iter().map(|&step| step.to_owned()).collect::<Vec<_>>();
         let number = number.to_string();
@@ -135,7 +135,7 @@ impl Axis {
     }
 }
 
-/// The place in the experiment file of the setting at `path` of one grid point, if an axis sets it.
+/// The place in the file of the setting at `path`, if an axis sets it at this grid point.
 pub(crate) fn written(axes: &[Axis], cell: &[AxisValue], path: &[String], part: Part) -> Option<(Vec<String>, Part)> {
     // The last axis has priority.
     for place in cell.iter().rev() {

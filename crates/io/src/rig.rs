@@ -45,7 +45,7 @@ impl Rig {
 }
 
 impl From<StereoRig> for Rig {
-    /// A rig whose left camera is the origin of the vehicle's frame, with images of up to 16 bits.
+    /// A rig without mounting: the left camera is the vehicle's frame. Images have up to 16 bits.
     fn from(stereo: StereoRig) -> Self {
         Self { stereo, body_from_camera: Transform::identity(), bits: 16, file: None, warning: None }
     }

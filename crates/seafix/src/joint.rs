@@ -50,9 +50,9 @@ impl PipelineStages {
         object_observations
     }
 
-    /// Replaces the pose of every fixed object by that of one fix over all fixed objects, over the gathered points of
-    /// others and over the observations `before`. If the images contradict each other or determine no joint fix, each
-    /// object keeps its own pose and its attempt states the reason.
+    /// Replaces the pose of every fixed object by that of one joint fix. The joint fix uses all fixed objects, the
+    /// gathered points of others and the observations `before`. If the images contradict each other or determine no
+    /// joint fix, each object keeps its own pose and its attempt states the reason.
     pub fn join(
         &self,
         frame_result: &mut FrameResult,

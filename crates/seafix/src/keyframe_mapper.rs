@@ -21,7 +21,7 @@ use crate::{
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Keyframes {
-    /// Whether the pose graph is written to the run's folder, as `<trial>.pose_graph`.
+    /// Whether the pose graph is written to the run's folder, as `<trial>.pose-graph`.
     pub add_keyframes: bool,
     /// The pose graph of an earlier run, relative to the experiment file; none if empty.
     pub read: String,

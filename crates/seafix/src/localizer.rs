@@ -71,7 +71,9 @@ impl Localizer {
         Self::with_pipeline(site, rig, &Pipeline::default())
     }
 
-    /// A localizer with the pipeline settings in `text`, the content of the table `[pipeline]` of an experiment file.
+    /// A localizer with the pipeline settings in `text`.
+    ///
+    /// The text is the content of the table `[pipeline]` of an experiment file.
     ///
     /// ```
     /// use seafix::{Error, Localizer, Rig, Site};
@@ -176,7 +178,9 @@ impl Localizer {
         Ok(self.outcomes(self.process(&frame(frame_data, prior.into()))))
     }
 
-    /// Outcomes of a cloud of measured points (camera frame, m), one for each target in view by the prior.
+    /// Outcomes of a cloud of measured points (camera frame, m).
+    ///
+    /// Each target in view by the prior has an outcome. Without a prior every target is searched in the complete cloud.
     ///
     /// The default solver minimises reprojection errors and needs points with pixels. The solver `mahalanobis` needs
     /// covariances only.
@@ -226,7 +230,9 @@ impl Localizer {
         result
     }
 
-    /// Begins a navigation session, with the pose graph `map` of an earlier session if there is one.
+    /// Begins a navigation session.
+    ///
+    /// A stack with key frames also recognises those of `map`, the pose graph of an earlier session.
     ///
     /// # Errors
     /// [`Error::NoWorld`]: an object without a pose in the world.

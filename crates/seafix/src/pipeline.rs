@@ -182,7 +182,7 @@ impl Pipeline {
     }
 }
 
-/// The error for a failed check of settings that belong to no component, such as `gate` or `acceptance`.
+/// The error of a setting without component, such as `gate` or `acceptance`.
 pub fn invalid_setting(setting: &'static str, message: String) -> PipelineError {
     // Some messages begin with the name of the setting.
     let own = message.strip_prefix(&format!("{setting}: ")).unwrap_or(&message);

@@ -57,7 +57,7 @@ pub struct TargetAttempt {
 }
 
 impl TargetAttempt {
-    /// `times` are the durations of candidates, search and solution (ms), `total_ms` that of all stages of this target.
+    /// An attempt with its durations (ms): candidates, search and solution, then all stages of this target.
     fn new(
         target: usize,
         candidates: Candidates,
@@ -171,7 +171,7 @@ impl PipelineStages {
         }
     }
 
-    /// The sensitivity of a fix to the error of each of its model points, with the index of the point.
+    /// The sensitivity of a fix to its model errors, for each model point by its index.
     pub fn model_errors(
         &self,
         fix: &Fix,
@@ -371,7 +371,7 @@ fn labelled(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Corr
 /// deviations of the prediction, and not seen from behind. `None` if fewer than three are predicted inside,
 /// so that no fix is attempted. Without a prior, every point may be in view.
 fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
-    /// The cosine of the angle between normal and line of sight below which a point is seen from behind.
+    /// The minimum cosine between normal and line of sight; below it a point is seen from behind.
     const BACK: f64 = -0.2;
     let Some(prior) = prior else { return Some(vec![true; target.points.len()]) };
     let camera_from_object = prior.object_from_camera.inverse();

@@ -64,7 +64,7 @@ pub struct IdenticalImages {
     first: Option<(PathBuf, PathBuf)>,
 }
 
-/// Decodes all images of the data set and returns their faults and the pairs with identical images.
+/// Decodes all images of the data set. The result is their faults and the pairs with identical images.
 pub fn inspect_images(dataset: &Dataset) -> (Vec<Fault>, IdenticalImages) {
     let seen: Vec<(Option<Fault>, bool)> = dataset
         .frames
@@ -138,8 +138,8 @@ pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides, &dataset.folder.join(&dataset.table))
 }
 
-/// The rig of `dataset` with the right camera's rotation estimated from a sample of pairs, evenly over the data set;
-/// `None` if the images agree with the rig. Unreadable images are ignored.
+/// The rig of `dataset` with an estimated rotation of the right camera. The estimate uses a sample of pairs, evenly
+/// over the data set; `None` if the images agree with the rig. Unreadable images are ignored.
 pub fn right_camera_rotation(dataset: &Dataset) -> Option<RightCameraRotation> {
     let apart = dataset.frames.len().div_ceil(ASKED).max(1);
     let some = dataset.frames.iter().step_by(apart).filter_map(|frame| dataset.pair(frame).ok());
@@ -213,7 +213,8 @@ pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// All files below a data set's folder with their SHA-256, in order of name, with relative paths joined by `/`.
+/// All files below a data set's folder with their SHA-256. They are in order of name, with relative paths joined by
+/// `/`.
 pub fn input_hashes(folder: &Path) -> Result<Vec<(String, String)>, Fault> {
     let mut files = Vec::new();
     gather(folder, PathBuf::new(), &mut files)?;

@@ -84,8 +84,7 @@ impl Dataset {
         Self::read(folder, false, false)
     }
 
-    /// Reads a data set and sorts pairs out of order by time, keeping the first of each stamp (`seafix-dataset/1`
-    /// only).
+    /// Reads a data set and sorts its pairs by time. The first pair of each stamp is kept (`seafix-dataset/1` only).
     ///
     /// # Errors
     /// All other faults of the data set.

@@ -123,8 +123,8 @@ impl<'a> Order<'a> {
     }
 }
 
-/// The first line of a text accepted by [`parse`] whose quaternion is off unit length by more than the rounding of six
-/// decimals, with its length. Such a quaternion is normalised, and a warning states it.
+/// The first line with a quaternion off unit length, and that length. Rounding to six decimals is tolerated. [`parse`]
+/// normalises such a quaternion, and a warning states it.
 pub(super) fn normalised(text: &str) -> Option<(usize, f64)> {
     const ROUNDING: f64 = 1e-5;
     text.lines().enumerate().find_map(|(index, line)| {

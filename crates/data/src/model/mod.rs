@@ -173,7 +173,7 @@ impl ModelByHand<'_> {
         Ok(Seen { corner: corner.is_some(), aligned: aligned.is_some(), measured, contradicted, mark })
     }
 
-    /// A warning if the best match of the left position is farther from the right mark than an operator's error.
+    /// A warning for a right mark far from the best match of the left position. The limit is the error of an operator.
     fn doubt(&self, seen: &Seen, file: &Path) -> Option<Fault> {
         let (sought, off) = seen.contradicted.filter(|(_, off)| *off > self.reach)?;
         let unaligned = if seen.aligned { "" } else { ", and the windows at the two marks differ" };

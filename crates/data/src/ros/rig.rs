@@ -68,7 +68,7 @@ pub(crate) fn right_from_left(
     Ok(Some(raw(&left, &right, &between)))
 }
 
-/// The centre of the left camera in the rectified right view (m), from P = K [I | t]; `None` if both centres coincide.
+/// The left camera's centre in the rectified right view (m), from P = K [I | t]; `None` if both centres coincide.
 fn baseline(left: &CameraInfo, right: &CameraInfo) -> Option<Vector3<f64>> {
     let shift = |info: &CameraInfo| {
         let [fx, _, cx, tx, _, fy, cy, ty, _, _, _, tz] = info.p;

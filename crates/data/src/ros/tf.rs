@@ -59,7 +59,7 @@ impl Tree {
         Some(full.relabel())
     }
 
-    /// A frame and its ancestors, each with the pose of the first in it, as far as they are known at `stamp`.
+    /// A frame and its ancestors as far as they are known at `stamp`, each with the first frame's pose in it.
     fn to_root(&self, frame: String, stamp: u64, max_gap: u64) -> Vec<(String, Transform<AnyFrame, AnyFrame>)> {
         let mut chain = vec![(frame, Transform::identity())];
         while let Some((here, up)) = chain.last().filter(|_| chain.len() < DEEPEST) {

@@ -149,7 +149,7 @@ impl Bag {
         Ok(())
     }
 
-    /// Checks on a sample of pairs that left and right images belong to the left and right camera.
+    /// Checks a sample of pairs for exchanged left and right images.
     fn appear_at_the_sides(&mut self) -> Result<(), Fault> {
         let step = self.pairs.len().div_ceil(INSPECTED_PAIRS).max(1);
         let mut sides = Sides::default();

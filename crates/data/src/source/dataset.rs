@@ -83,7 +83,7 @@ pub(super) struct Recorded {
 }
 
 impl Recorded {
-    /// Opens the data set with the site file `site`, relative to `folder`, or with its own site.
+    /// Opens the data set with its own site, or with the site file `site` relative to `folder`.
     pub(super) fn open(mut dataset: Dataset, site: &str, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         if !site.is_empty() {
             let file = folder.join(site);

@@ -89,7 +89,7 @@ pub trait Sequence: Send + Sync {
     fn labelled(&self) -> bool {
         false
     }
-    /// Whether every frame is a coherence problem with an object of its own, so that the sequence has no site.
+    /// Whether every frame is a coherence problem with its own object; the sequence then has no site.
     fn posed(&self) -> bool {
         false
     }

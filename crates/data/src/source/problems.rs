@@ -19,8 +19,8 @@ use super::{
 };
 use crate::dataset::sha256;
 
-/// A source of the problems (`coherence-problem/1`) in a folder and its subfolders, one a frame, in the order of their
-/// paths. The ground truth of `NAME.json` is `NAME.truth.json` if it exists; only evaluation uses it.
+/// A source of coherence problems (`coherence-problem/1`) from a folder, one a frame. Subfolders are included, in the
+/// order of paths. The ground truth of `NAME.json` is `NAME.truth.json` if it exists; only evaluation uses it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Problems {

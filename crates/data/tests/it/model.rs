@@ -48,9 +48,8 @@ fn model(sequence: &dyn Sequence, frame: usize, text: &str, base: Option<[String
     found.map_err(|fault| fault.to_string())
 }
 
-/// Distances between points with a corner agree with the true model to a few millimetres at 3 m, with marked and with
-/// matched right positions, although marks are off by 1.5 px (20 mm at that depth). Their errors agree with their
-/// covariances.
+/// Distances between corners agree with the true model to a few millimetres at 3 m. Marks are off by 1.5 px (20 mm at
+/// that depth), and right positions are marked or matched. The errors agree with their covariances.
 #[test]
 fn marks_a_pixel_off_make_a_model_to_millimetres() {
     let sequence = sample();

@@ -83,7 +83,7 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the columns as row groups of [`ROW_GROUP`] rows, removes them, and returns the number of groups. The
+    /// Writes the columns as row groups of [`ROW_GROUP`] rows and removes them. The result is the number of groups. The
     /// remaining rows are written as a smaller group if this is the `end`.
     pub(crate) fn write(&mut self, file: &mut SerializedFileWriter<File>, end: bool) -> Result<usize, ParquetError> {
         let mut groups = 0;
@@ -207,7 +207,7 @@ fn write_cell(text: &mut String, cell: &Value) {
     };
 }
 
-/// A CSV field, quoted if necessary, and protected from being read as a formula by a spreadsheet.
+/// A CSV field, quoted if necessary. A spreadsheet does not read it as a formula.
 fn quote(text: &mut String, word: &str) {
     let formula = word.starts_with(['=', '+', '-', '@', '\t', '\r']);
     if formula || word.contains([',', '"', '\n', '\r']) {

@@ -41,8 +41,8 @@ const MIN: usize = 4;
 /// The maximum time of all samples together, divided evenly among the sources.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// Estimates `plan` by running some frames of every source, with logs in the system's temporary folder that are removed
-/// afterwards. Trials share stages unless they are measured `separate`ly.
+/// Estimates `plan` from a sample of every source's frames. Logs are written to the system's temporary folder and
+/// removed. Trials share stages unless they are measured `separate`ly.
 ///
 /// # Errors
 /// All faults of the inputs, and a temporary folder that cannot be written.

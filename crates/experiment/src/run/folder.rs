@@ -33,7 +33,7 @@ struct Lock {
 }
 
 impl Drop for Lock {
-    /// The file is removed while it is locked, so that a process that has opened it notices.
+    /// The file is removed under the lock, so that a process that has opened it notices.
     fn drop(&mut self) {
         // The folder may have been replaced by another process.
         if is_at(&self.file, &self.path) {
@@ -54,7 +54,7 @@ pub(super) fn inspect(options: &Options) -> Result<(), Fault> {
 }
 
 impl Claim {
-    /// Claims the folder in `options`, or the next free one below `runs` for a run called `name`.
+    /// Claims the folder in `options`, or else the next free one below `runs` for `name`.
     pub(super) fn new(options: &Options, name: &str, manifest: &Manifest) -> Result<Self, RunError> {
         let Some(out) = &options.out else {
             let folder = next_free(name).map_err(RunError::Output)?;
@@ -120,7 +120,7 @@ impl Claim {
     }
 }
 
-/// Whether there is no folder, or only the remains of a run that was killed before it began.
+/// Whether the folder is absent or empty, apart from the lock of a run killed before it began.
 fn free(out: &Path) -> Result<bool, Fault> {
     let entries = match fs::read_dir(out) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),

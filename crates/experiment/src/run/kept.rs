@@ -26,8 +26,8 @@ pub struct Remade {
     pub differing: Vec<String>,
 }
 
-/// Repeats one piece of the run in `folder`, at most `frames` of its frames, and compares it with the stored bytes. The
-/// identity of the run selects the piece. The folder in `options` must not exist.
+/// Repeats one piece of the run in `folder` and compares it with the stored bytes. At most `frames` of its frames are
+/// repeated. The identity of the run selects the piece. The folder in `options` must not exist.
 ///
 /// # Errors
 /// [`RunError`]: a folder without a complete run of `plan`, inputs that cannot be read, an output that cannot be

@@ -66,7 +66,7 @@ pub enum Existing {
     Resume,
     /// It is removed.
     Overwrite,
-    /// It remains if it has the results of the new run, and is resumed if it is the same run; otherwise it is removed.
+    /// It remains if it has the new run's results, and is resumed if it is the same run; otherwise it is removed.
     Keep,
 }
 

@@ -117,8 +117,8 @@ fn pieces(groups: usize) -> usize {
     (256 / groups.max(1)).clamp(2, 64)
 }
 
-/// The decimation of a log of `frames` frames of about `bytes` each to at most `max` bytes: all frames, or every k-th
-/// in one half and failures in the other.
+/// The decimation of a log to at most `max` bytes. A log of `frames` frames with about `bytes` each keeps all frames,
+/// or every k-th in one half and failures in the other.
 fn thinning(frames: u64, bytes: u64, max: u64) -> (u64, u64) {
     let fit = (max / bytes.max(1)).max(2);
     if frames <= fit { (1, 0) } else { (frames.div_ceil(fit / 2), fit / 2) }

@@ -25,7 +25,7 @@ fn yaml<A: Frame, B: Frame>(pose: &Transform<A, B>) -> String {
     format!("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", rows.join(",\n         "))
 }
 
-/// The pose of the left camera in the body of the EuRoC set, and the marker whose pose its truth is.
+/// The left camera's pose in the body of the EuRoC set, and the pose of the truth's marker.
 fn mounts() -> (Transform<Body, Camera>, Transform<Body, Camera>) {
     let at = |xi: [f64; 6]| Transform::exp(&xi.into());
     (at([0.3, -0.2, 1.1, 0.1, 0.2, -0.05]), at([-0.1, 0.4, 0.2, 0.0, -0.1, 0.3]))

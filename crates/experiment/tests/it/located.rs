@@ -16,9 +16,8 @@ struct Corner {
     claimed: [f64; 2],
 }
 
-/// The visible feature points of a sequence with a pair of pixels within 2 px of their left projection, and the number
-/// of those without.
-/// have none.
+/// The visible feature points with a pair of pixels within 2 px of their left projection. The number of points without
+/// such a pair is given too.
 fn corners(sequence: &dyn Sequence, settings: &[&str]) -> (Vec<Corner>, usize) {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let front_end = changed_pipeline(&Pipeline::default(), &settings).unwrap().front_end().unwrap();
@@ -61,8 +60,8 @@ fn sequence(experiment: &str) -> Box<dyn Sequence> {
     plan.trials[0].source.open(plan.experiment.seed, &plan.folder).unwrap()
 }
 
-/// The RMS of the left errors per axis and of the disparity errors (px), and the ratio of both to the stated standard
-/// deviation.
+/// The RMS of the left errors per axis and of the disparity errors (px). The ratios of both to the stated standard
+/// deviations follow.
 fn spread(corners: &[&Corner]) -> [f64; 4] {
     let left = corners.iter().flat_map(|c| [0, 1].map(|axis| (c.error[axis], c.error[axis] / c.claimed[0])));
     let disparity = corners.iter().map(|c| c.error[0] - c.error[2]).zip(corners.iter().map(|c| c.claimed[1]));
@@ -70,8 +69,8 @@ fn spread(corners: &[&Corner]) -> [f64; 4] {
     [rms(left.clone().map(|x| x.0)), rms(disparity.map(|x| x.0)), rms(left.map(|x| x.1)), rms(over)]
 }
 
-/// A key point without a fitted corner has an error several times that of a fitted one, states it, and has it in both
-/// images alike. Seen to fail without `peak-px`: its errors were 4 times the stated ones.
+/// A key point without a fitted corner has an error several times that of a fitted one. It states this error, which is
+/// equal in both images. Seen to fail without `peak-px`: its errors were 4 times the stated ones.
 #[test]
 fn a_key_point_states_how_far_off_its_corner_it_lies() {
     let sample = sequence("experiments/virtual-sample.toml");

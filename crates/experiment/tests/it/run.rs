@@ -250,8 +250,8 @@ fn times_of_shared_stages_are_marked() {
     assert!(times(true).iter().flatten().all(|times| times.shared == SharedStages::default()));
 }
 
-/// A stored run has the bytes of a fresh one with the same identity, as a whole and in part. Seen to fail with an
-/// identity of the versions alone.
+/// A stored run has the bytes of a fresh one with the same identity. This holds as a whole and in part. Seen to fail
+/// with an identity of the versions alone.
 #[test]
 fn a_kept_run_is_what_would_be_made_now() {
     let folder = TempDir::new().unwrap();

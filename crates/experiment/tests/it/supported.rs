@@ -198,8 +198,8 @@ fn a_joint_fix_that_fails_states_why() {
     }
 }
 
-/// The few points of an object without a fix of its own are used in the joint fix, and both details state it. The object
-/// stays rejected.
+/// The few points of an object without its own fix are used in the joint fix. The explanations of both objects state
+/// it. The object stays rejected.
 #[test]
 fn a_joint_fix_states_what_took_part() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";

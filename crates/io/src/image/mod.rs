@@ -27,9 +27,9 @@ impl Default for ImageLimits {
     }
 }
 
-/// Reads a PNG, JPEG or PNM image as grey values from 0 (black) to 255 (white), at the full depth of the file.
+/// Reads a PNG, JPEG or PNM image as grey values.
 ///
-/// Colour becomes luma with the weights of Rec. 709. `expected` is the calibrated size, `bits` the number of
+/// Values range from 0 (black) to 255 (white) at the full depth of the file. Colour becomes luma (Rec. 709). `expected` is the calibrated size, `bits` the number of
 /// significant bits in images of 16 bits.
 ///
 /// # Errors
