@@ -126,7 +126,7 @@ impl Dataset {
     fn read(folder: &Path, pairs_only: bool, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
         let file = folder.join("dataset.toml");
         if !folder.is_dir() {
-            return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
+            return Err(vec![Fault::new("no such folder", folder).remedy("give a folder with a dataset.toml")]);
         }
         if !file.exists() {
             if let Some(home) = euroc::home(folder) {
@@ -136,7 +136,7 @@ impl Dataset {
                 return kitti::read(folder, Cameras::Any, pairs_only);
             }
             let fault = Fault::new("a folder without a data set", folder);
-            let remedy = "it has neither a dataset.toml, nor EuRoC's mav0/cam0, nor KITTI's calib.txt and image_0";
+            let remedy = "give a folder with dataset.toml, with EuRoC's mav0/cam0, or with KITTI's calib.txt and image_0";
             return Err(vec![fault.remedy(remedy)]);
         }
         let source = read_text(&file).map_err(|fault| vec![fault])?;

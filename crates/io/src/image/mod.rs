@@ -29,8 +29,8 @@ impl Default for ImageLimits {
 
 /// Reads a PNG, JPEG or PNM image as grey values.
 ///
-/// Values range from 0 (black) to 255 (white) at the full depth of the file. Colour becomes luma (Rec. 709). `expected` is the calibrated size, `bits` the number of
-/// significant bits in images of 16 bits.
+/// Values range from 0 (black) to 255 (white) at the full depth of the file. Colour becomes luma (Rec. 709).
+/// `expected` is the calibrated size, `bits` the number of significant bits in images of 16 bits.
 ///
 /// # Errors
 /// An unreadable, truncated or unsupported file, an animation, a CMYK image, transparent pixels, values above `bits`, a
