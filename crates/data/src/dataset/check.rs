@@ -110,7 +110,7 @@ pub const INSPECTED_PAIRS: usize = 3;
 /// The number of pairs for the estimate of the right camera's rotation.
 const ASKED: usize = 8;
 
-/// The swap check by three frames over the complete data set: left and right images may be exchanged.
+/// The fault of exchanged left and right images, by a swap check on three frames over the complete data set.
 pub fn swapped(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides(dataset), &dataset.folder.join(&dataset.table))
 }

@@ -193,7 +193,7 @@ impl Dataset {
 
     /// Skips, with a warning, the pairs with an image of another size than its camera's calibration; a data set
     /// recorded in two modes has some. If these are more than half of the pairs, none is skipped: the calibration is
-    /// wrong then, and reading the images states it.
+    /// wrong then, and the fault occurs when the images are read.
     pub fn leave_out_mismatches(&mut self) {
         let sizes = [self.rig.left().size(), self.rig.right().size()];
         let faults: Vec<Option<Fault>> = self

@@ -43,7 +43,7 @@ pub(super) type Poses = (Vec<Stamped<World, Camera>>, Option<Vec<Covariance6<Wor
 
 impl Bag {
     /// Reads `path`, decodes every image, and checks rig and images for consistency. A pair with an unreadable image is
-    /// skipped with a warning; more than half of the pairs must be readable.
+    /// skipped with a warning; at least half of the pairs must be readable.
     pub(super) fn open(path: &Path, settings: &Mcap) -> Result<Self, Fault> {
         let recording =
             Recording::open(path, |topic: &Topic| topic.encoding == "cdr").map_err(|error| fault(path, &error))?;
