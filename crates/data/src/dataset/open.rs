@@ -136,7 +136,8 @@ impl Dataset {
                 return kitti::read(folder, Cameras::Any, pairs_only);
             }
             let fault = Fault::new("a folder without a data set", folder);
-            let remedy = "give a folder with dataset.toml, with EuRoC's mav0/cam0, or with KITTI's calib.txt and image_0";
+            let remedy =
+                "give a folder with dataset.toml, with EuRoC's mav0/cam0, or with KITTI's calib.txt and image_0";
             return Err(vec![fault.remedy(remedy)]);
         }
         let source = read_text(&file).map_err(|fault| vec![fault])?;
