@@ -177,7 +177,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
         (output.status.code(), String::from_utf8(output.stderr).unwrap(), out)
     };
     let (code, said, out) = run("out", &[]);
-    let counted = "1 of 2 pairs left out: an image of another size than the calibration in";
+    let counted = "1 of 2 pairs skipped: an image of another size than the calibration in";
     assert!(code == Some(0) && said.contains(counted) && said.contains("c.pgm"), "{said}");
     let rows = fs::read_to_string(out.join("results.csv")).unwrap().lines().count() - 1;
     assert_eq!(rows, 1, "one pair, one object");
@@ -194,7 +194,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
 fn a_truncated_image() {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();
-    sample.refused(3, &["a.pgm", "PNG, JPEG and PNM"]);
+    sample.refused(3, &["a.pgm", "PNG, JPEG or PNM"]);
 }
 
 /// Seen to fail when lines are counted one too far.
@@ -290,7 +290,8 @@ fn png_header(width: u32, height: u32) -> Vec<u8> {
 
 #[test]
 fn images_of_no_size_and_of_any() {
-    with_image(b"P5 60000 60000 255\n1").refused(3, &["a.pgm", "60000×60000", "at most 67108864 pixels", "max-pixels"]);
+    with_image(b"P5 60000 60000 255\n1")
+        .refused(3, &["a.pgm", "60000×60000", "the limit is 67108864 pixels", "max-pixels"]);
     with_image(b"P5 0 0 255\n").refused(3, &["a.pgm"]);
     with_image(&png_header(8_000_000, 4_000_000_000)).refused(3, &["a.pgm"]);
     with_image(&png_header(0, 48)).refused(3, &["a.pgm"]);
@@ -305,8 +306,8 @@ fn the_limits_of_images_are_settings() {
         refused(&["run", folder, "--set", set, "--out", out.to_str().unwrap()], code, parts);
         assert!(!out.exists(), "something was written");
     };
-    run("source.max-pixels=3071", 3, &["a.pgm", "64×48; at most 3071 pixels are read"]);
-    run("source.max-bytes=100", 3, &["a.pgm", "at most 100 bytes are read"]);
+    run("source.max-pixels=3071", 3, &["a.pgm", "64×48; the limit is 3071 pixels"]);
+    run("source.max-bytes=100", 3, &["a.pgm", "the limit is 100 bytes"]);
     run("source.max-pixels=0", 2, &["max-pixels = 0"]);
     let check = |more: &[&str]| program().args(["check", folder]).args(more).output().unwrap().status.code();
     assert_eq!(
@@ -328,9 +329,9 @@ fn one_image_for_both_cameras() {
     assert!(code == Some(0) && said.contains("in order"), "{said}");
     fs::copy(sample.path("a.pgm"), sample.path("b.pgm")).unwrap();
     let (code, said) = checked(&sample);
-    let reported = said.contains("left and right images that are the same in") && said.contains("1 of 1 pairs");
+    let reported = said.contains("identical left and right images in") && said.contains("1 of 1 pairs");
     assert!(code == Some(1) && reported && !said.contains("in order"), "{said}");
-    sample.refused(3, &["a.pgm", "left and right images that are the same", "one image twice has no depth"]);
+    sample.refused(3, &["a.pgm", "identical left and right images", "one image twice has no depth"]);
     // Two images of nothing are alike and no mistake.
     let dark = format!("P2\n64 48\n255\n{}", "9\n".repeat(64 * 48));
     sample.put("a.pgm", &dark).put("b.pgm", &dark);
@@ -360,7 +361,7 @@ fn what_has_no_end_is_not_read() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for path in [Path::new("/dev/zero"), &pipe, folder.path()] {
         let (path, rig) = (path.to_str().unwrap(), rig.to_str().unwrap());
-        refused(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is no file", "; name a file"]);
+        refused(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is not a file", "; name a file"]);
     }
     refused(&["cloud", "a.pgm", "a.pgm", "--rig", "/dev/zero"], 3, &["/dev/zero", "text file too large"]);
 }
@@ -490,20 +491,20 @@ fn a_fault_is_reported_where_it_stands() {
                 ("`slover`, did you mean `solver`?", "6:7"),
                 ("not a number: string \"far\"", "10:16"),
                 ("distance = -1", "10:23"),
-                ("there twice", "10:29"),
+                ("a duplicate value", "10:29"),
             ],
         ),
         (
             "source = 'virtual-points'\n[[vary]]\nkey = 'pipeline.solver'\nvalues = ['kabsch', 'kabch', 'kabsch']\n\
              [[vary]]\nkey = 'k'\nzip = { 'source.distance' = [2.0, 3.0], 'source.fraems' = [1, 2] }\n",
-            &[("did you mean `kabsch`?", "5:21"), ("there twice", "5:30"), ("did you mean `frames`?", "8:41")],
+            &[("did you mean `kabsch`?", "5:21"), ("a duplicate value", "5:30"), ("did you mean `frames`?", "8:41")],
         ),
         (
             "source = 'virtual-points'\n[[vary]]\nkey = 'k'\ncases = [\n{ label = 'a', set = { 'source.fraems' = 1 } },\n\
              { label = 'a', set = { 'pipeline.serch' = 'icp', 'pipeline.gate' = { bx = 1.0 } } },\n]\n",
             &[
                 ("did you mean `frames`?", "6:24"),
-                ("two cases of one name", "7:11"),
+                ("two cases with the same name", "7:11"),
                 ("`serch`, did you mean `search`?", "7:24"),
                 ("unknown word `bx`, did you mean `box`?", "7:50"),
             ],

@@ -1,4 +1,4 @@
-//! The table of results, as CSV and as Parquet: made piece by piece, then joined.
+//! The table of results as CSV and Parquet, written piece by piece and then joined.
 
 mod join;
 mod table;

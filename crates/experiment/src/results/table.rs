@@ -1,4 +1,4 @@
-//! Rows in memory, column by column, on their way into files.
+//! Rows in memory, stored by column, before they are written to files.
 
 use std::{fs::File, path::Path, sync::Arc};
 
@@ -16,10 +16,10 @@ use seafix_log::{
     quantities::{Kind, QUANTITIES, Value},
 };
 
-/// Rows of one row group of the Parquet table, where there are as many.
+/// The number of rows of a full row group of the Parquet table.
 pub(super) const ROW_GROUP: usize = 8192;
 
-/// Rows of one trial: their text as CSV (RFC 4180; unknown values are empty), and their columns.
+/// The rows of one trial: as CSV text (RFC 4180, unknown values empty) and as columns.
 #[derive(Debug)]
 pub(crate) struct Table {
     pub(crate) rows: usize,
@@ -27,7 +27,7 @@ pub(crate) struct Table {
     columns: Vec<Values>,
 }
 
-/// The values of one column; of those that may be unknown the known ones, and for every row whether it has one.
+/// The values of one column. A column with unknown values has the known ones, and for every row whether it has one.
 #[derive(Debug)]
 enum Values {
     Text(Vec<ByteArray>),
@@ -50,7 +50,7 @@ impl Default for Table {
 }
 
 impl Table {
-    /// The head of the table as CSV.
+    /// The header of the table as CSV.
     pub(super) fn head() -> String {
         QUANTITIES.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
     }
@@ -73,7 +73,7 @@ impl Table {
         self.text.push('\n');
     }
 
-    /// Adds the rows of a row group to the columns; their text is not made again.
+    /// Adds the rows of a row group to the columns, but not to the text.
     pub(super) fn read(&mut self, group: &dyn RowGroupReader) -> Result<(), ParquetError> {
         let rows = group.metadata().num_rows() as usize;
         self.rows += rows;
@@ -83,8 +83,8 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the columns as row groups of [`ROW_GROUP`] rows, and forgets them; how many groups. What is left over is a
-    /// smaller group where this is the `end`, else it waits.
+    /// Writes the columns as row groups of [`ROW_GROUP`] rows and removes them. The result is the number of groups. The
+    /// remaining rows are written as a smaller group if this is the `end`.
     pub(crate) fn write(&mut self, file: &mut SerializedFileWriter<File>, end: bool) -> Result<usize, ParquetError> {
         let mut groups = 0;
         while self.rows >= ROW_GROUP || (end && self.rows > 0) {
@@ -114,7 +114,7 @@ impl Values {
             (Self::Integer(all, levels), Value::Integer(value)) => known((all, levels), value),
             (Self::Real(all, levels), Value::Real(value)) => known((all, levels), value),
             (Self::Flag(all, levels), Value::Flag(value)) => known((all, levels), value),
-            _ => unreachable!("a column fills cells of its own kind"),
+            _ => unreachable!("a column has cells of its own type"),
         }
     }
 
@@ -132,11 +132,11 @@ impl Values {
             (Self::Flag(all, levels), ColumnReader::BoolColumnReader(mut reader)) => {
                 reader.read_records(rows, Some(levels), None, all).map(drop)
             }
-            _ => Err(ParquetError::General("a column of another kind".to_owned())),
+            _ => Err(ParquetError::General("a column of another type".to_owned())),
         }
     }
 
-    /// Writes the first `rows` rows and forgets them.
+    /// Writes the first `rows` rows and removes them.
     fn write(&mut self, writer: &mut ColumnWriter<'_>, rows: usize) -> Result<(), ParquetError> {
         fn first<T>(values: &mut Vec<T>, levels: &mut Vec<i16>, rows: usize) -> (Vec<T>, Vec<i16>) {
             let levels: Vec<i16> = levels.drain(..rows).collect();
@@ -160,12 +160,12 @@ impl Values {
                 let (values, levels) = first(all, levels, rows);
                 writer.write_batch(&values, Some(&levels), None).map(drop)
             }
-            _ => Err(ParquetError::General("a column of another kind".to_owned())),
+            _ => Err(ParquetError::General("a column of another type".to_owned())),
         }
     }
 }
 
-/// An empty Parquet table, ZSTD.
+/// Creates an empty Parquet table with ZSTD compression.
 pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetError> {
     let fields: String = QUANTITIES
         .iter()
@@ -192,14 +192,14 @@ pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetE
 
 fn write_cell(text: &mut String, cell: &Value) {
     use std::fmt::Write;
-    // Writing into a string cannot fail.
+    // Writing to a string does not fail.
     let _ = match cell {
         Value::Text(word) => {
             quote(text, word);
             Ok(())
         }
         Value::Integer(Some(number)) => write!(text, "{number}"),
-        // All its digits; very small ones with an exponent instead of many zeros.
+        // A real number has all its digits; a very small one has an exponent instead of many zeros.
         Value::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
         Value::Real(Some(x)) => write!(text, "{x}"),
         Value::Flag(Some(flag)) => write!(text, "{flag}"),
@@ -207,7 +207,7 @@ fn write_cell(text: &mut String, cell: &Value) {
     };
 }
 
-/// A word as a CSV field: quoted where it must be; a spreadsheet shall not take it for a formula.
+/// A CSV field, quoted if necessary. A spreadsheet does not read it as a formula.
 fn quote(text: &mut String, word: &str) {
     let formula = word.starts_with(['=', '+', '-', '@', '\t', '\r']);
     if formula || word.contains([',', '"', '\n', '\r']) {
