@@ -104,7 +104,7 @@ impl Support {
     }
 }
 
-/// The answer to one problem, with the keys of FORMATS.
+/// The answer to one problem, with the keys of `docs/formats.md`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
     /// The file.
