@@ -37,6 +37,8 @@
 //! ground truth.
 //!
 //! Units are metres, radians, nanoseconds and pixels. `a_from_b` maps column vectors: `p_a = a_from_b · p_b`.
+//!
+//! The terms are those of the field; `GLOSSARY.md` at the root of the repository defines each with its literature.
 
 mod error;
 mod event;
