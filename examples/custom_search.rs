@@ -1,4 +1,4 @@
-//! A search of one's own in the default pipeline: `cargo run --release --example custom_search`.
+//! A custom search in the default pipeline: `cargo run --release --example custom_search`.
 
 #![allow(clippy::print_stdout)]
 
@@ -10,7 +10,7 @@ use seafix::{
     referencing::{Correspondence, Identification, Problem, Rejected, Search},
 };
 
-/// Takes for each model point its nearest candidate that agrees with the pairs taken before.
+/// A greedy search: each model point takes its first candidate that is coherent with the pairs taken before.
 #[derive(Debug)]
 struct Greedy;
 

@@ -1,4 +1,4 @@
-//! A solver of one's own in the default pipeline: `cargo run --release --example custom_solver`.
+//! A custom solver in the default pipeline: `cargo run --release --example custom_solver`.
 
 #![allow(clippy::print_stdout)]
 
@@ -9,7 +9,7 @@ use seafix::{
     referencing::{Degenerate, Observations, Solver},
 };
 
-/// Kabsch's rotation about the centroids, from a singular value decomposition.
+/// The method of Kabsch (1976): the least-squares rotation about the centroids by singular value decomposition.
 #[derive(Debug)]
 struct MyKabsch;
 
@@ -21,7 +21,7 @@ impl Solver for MyKabsch {
         let (camera, object) = (centroid.0 / pairs.len() as f64, centroid.1 / pairs.len() as f64);
         let h: Matrix3<f64> = pairs.iter().map(|(c, o)| (o - object) * (c - camera).transpose()).sum();
         let svd = h.svd(true, true);
-        let (u, vt) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+        let (u, vt) = (svd.u.expect("computed by svd(true, true)"), svd.v_t.expect("computed by svd(true, true)"));
         let sign = Vector3::new(1.0, 1.0, (u * vt).determinant().signum());
         let rotation = Rotation3::from_matrix_unchecked(u * Matrix3::from_diagonal(&sign) * vt);
         let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
@@ -36,7 +36,7 @@ fn main() -> Result<(), seafix::Error> {
     let localizer = Localizer::new(&site, &rig)?.with_solver(Box::new(MyKabsch));
     for target in localizer.localize(&images, None)? {
         match target.outcome {
-            // The covariance is that of this solver, by numerical derivatives.
+            // The covariance of a custom solver is computed by numerical derivatives.
             Outcome::Fix(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
             rejected => println!("{}: {rejected}", target.name),
         }

@@ -1,4 +1,4 @@
-//! Errors of a trajectory, as evo defines them: `cargo run --release --example evaluate_trajectory`.
+//! Absolute and relative pose errors (APE and RPE as in evo): `cargo run --release --example evaluate_trajectory`.
 
 #![allow(clippy::print_stdout)]
 
@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let truth = Trajectory::read(format!("{folder}/truth.tum").as_ref())?;
     let prior = Trajectory::read(format!("{folder}/prior.tum").as_ref())?;
 
-    // Poses belong together where their stamps differ by no more than 10 ms.
+    // Poses are associated if their stamps differ by at most 10 ms.
     let (Some(stamps), Some(others)) = (&truth.stamps, &prior.stamps) else { return Err("no stamps".into()) };
     let matched = associate(stamps, others, 10_000_000, 0);
     let reference: Vec<_> = matched.iter().map(|&(index, _)| truth.poses[index]).collect();

@@ -11,7 +11,7 @@ fn main() -> Result<(), seafix::Error> {
     let site = Site::from_file(format!("{folder}/site.toml"))?;
     let images = StereoImages::open(format!("{folder}/left000.png"), format!("{folder}/right000.png"), &rig)?;
 
-    // The prior pose comes from acoustics and odometry: the position to 0.1 m, the attitude to 0.5°.
+    // The prior pose, as from acoustics and odometry, has standard deviations of 0.1 m and 0.5° per axis.
     let attitude = UnitQuaternion::from_quaternion(Quaternion::new(-0.31943, -0.10266, -0.03577, 0.94135));
     let world_from_camera = Transform::new(attitude, Vector3::new(-23.459, -5.727, 36.558));
     let prior = PosePrior::isotropic(world_from_camera, 0.5_f64.to_radians(), 0.1);

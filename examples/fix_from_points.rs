@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let rig = Rig::from_file(folder)?;
     let site = Site::from_file(format!("{folder}/site.toml")).map_err(seafix::Error::from)?;
 
-    // One point a line: x, y, z in the camera frame and their standard deviation (m).
+    // Each line is a point: x, y, z in the camera frame and their standard deviation (m).
     let mut cloud = Vec::new();
     for line in include_str!("data/cloud.csv").lines().skip(1) {
         let numbers: Vec<f64> = line.split(',').map(str::parse).collect::<Result<_, _>>()?;
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let attitude = UnitQuaternion::from_quaternion(Quaternion::new(-0.31943, -0.10266, -0.03577, 0.94135));
     let world_from_camera = Transform::new(attitude, Vector3::new(-23.459, -5.727, 36.558));
     let prior = PosePrior::isotropic(world_from_camera, 0.5_f64.to_radians(), 0.1);
-    // Without pixels the solver weighs the points by their covariances.
+    // The points have no pixels: this solver weights them by their covariances.
     let localizer = Localizer::from_toml(&site, &rig, "solver = 'mahalanobis'")?;
     for target in localizer.localize_points(&cloud, &prior) {
         match target.outcome {

@@ -80,6 +80,12 @@ mod tests {
     }
 
     #[test]
+    fn the_documentation_lists_the_quantities() {
+        let begin = "<!-- quantities: `seafix_log::quantities` -->\n";
+        holds("docs/quantities.md", begin, "<!-- end of quantities -->", &seafix_log::quantities::markdown());
+    }
+
+    #[test]
     fn the_readme_has_the_published_table() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/virtual-direct");
         let summary = fs::read_to_string(folder.join("summary.txt")).unwrap();

@@ -1,26 +1,25 @@
-//! What a user writes to pick a component.
+//! The choice of a component in an experiment file.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// The choice of a component: its name and the settings that differ from the defaults.
+/// A choice: the name of a component and the settings that differ from its defaults.
 ///
-/// In TOML a bare name or a table: `solver = "triad"` or
-/// `solver = { name = "triad", choose = "first" }`.
+/// In TOML it is a name or a table: `solver = "triad"` or `solver = { name = "triad", choose = "first" }`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// The component's name, as its registry lists it.
+    /// The component's name in its registry.
     pub name: String,
-    /// Settings by key; what is absent keeps its default.
+    /// Settings by key; absent settings keep their defaults.
     pub settings: toml::Table,
 }
 
 impl Choice {
-    /// The named component with all its defaults.
+    /// The component `name` with default settings.
     pub fn named(name: &str) -> Self {
         Self { name: name.to_owned(), settings: toml::Table::new() }
     }
 
-    /// The same choice with one setting given.
+    /// The choice with one more setting.
     #[must_use]
     pub fn with(mut self, key: &str, value: impl Into<toml::Value>) -> Self {
         self.settings.insert(key.to_owned(), value.into());
@@ -42,11 +41,12 @@ impl Choice {
         }
     }
 
-    /// A choice whose table need not say a name: without one its settings are those of `unnamed`. For a stage that had
-    /// settings before it had a choice.
+    /// A choice whose table may omit the name; its settings then belong to the component `unnamed`.
+    ///
+    /// It serves stages that had settings before they had a choice of components.
     ///
     /// # Errors
-    /// What is neither a name nor a table.
+    /// A value that is neither a string nor a table.
     pub fn deserialize_or<'de, D: Deserializer<'de>>(deserializer: D, unnamed: &str) -> Result<Self, D::Error> {
         Self::read(toml::Value::deserialize(deserializer)?, Some(unnamed))
     }

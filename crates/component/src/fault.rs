@@ -1,4 +1,4 @@
-//! What is wrong with a file, in one line.
+//! Faults in files, as one-line messages.
 
 use std::{
     fmt,
@@ -7,40 +7,40 @@ use std::{
 
 use crate::{nearest, plain};
 
-/// One fault of an input: what, in which file, on which line, the value, and the remedy.
+/// A fault in an input file: description, place, value and remedy.
 ///
-/// Printed as `what in file:line:column: value; remedy`, one line whatever the input contains.
+/// It is printed as `what in file:line:column: value; remedy`, in one line for every input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// What is wrong.
+    /// The description of the fault.
     pub what: String,
     /// The file.
     pub file: PathBuf,
-    /// The line, from 1, where it is known.
+    /// The line, from 1, if it is known.
     pub line: Option<usize>,
-    /// The column (letters, from 1), where it is known.
+    /// The column (characters, from 1), if it is known.
     pub column: Option<u32>,
-    /// The value at fault; empty where there is none.
+    /// The invalid value; empty if there is none.
     pub value: String,
-    /// What to do about it; empty where nothing helps.
+    /// The remedy; empty if there is none.
     pub remedy: String,
 }
 
 impl Fault {
-    /// The fault `what` of `file`.
+    /// A fault with the description `what` in `file`.
     pub fn new(what: impl Into<String>, file: &Path) -> Self {
         let (value, remedy) = (String::new(), String::new());
         Self { what: what.into(), file: file.to_owned(), line: None, column: None, value, remedy }
     }
 
-    /// The same fault on a line (from 1), if one is known.
+    /// The fault with its line (from 1), if one is known.
     #[must_use]
     pub fn on_line(mut self, line: impl Into<Option<usize>>) -> Self {
         self.line = line.into();
         self
     }
 
-    /// The same fault in a line and column (from 1), if they are known.
+    /// The fault with its line and column (from 1), if they are known.
     #[must_use]
     pub fn at(mut self, place: Option<(usize, usize)>) -> Self {
         self.line = place.map(|(line, _)| line);
@@ -48,22 +48,23 @@ impl Fault {
         self
     }
 
-    /// The same fault with the value that is wrong.
+    /// The fault with the invalid value.
     #[must_use]
     pub fn value(mut self, value: impl fmt::Display) -> Self {
         self.value = value.to_string();
         self
     }
 
-    /// The same fault with its remedy.
+    /// The fault with its remedy.
     #[must_use]
     pub fn remedy(mut self, remedy: impl Into<String>) -> Self {
         self.remedy = remedy.into();
         self
     }
 
-    /// The fault that the TOML reader found in `text`, the content of `file`; an unknown key is
-    /// answered with the nearest right one.
+    /// The fault that the TOML parser found in `text`, the content of `file`.
+    ///
+    /// For an unknown key the remedy is the nearest known one.
     pub fn in_toml(file: &Path, text: &str, error: &toml::de::Error) -> Self {
         let place = error.span().filter(|_| !text.is_empty()).map(|span| place_at(text, span.start));
         let message = error.message().trim_end();
@@ -83,7 +84,7 @@ impl Fault {
     }
 }
 
-/// Of a value so many letters are told.
+/// Maximum length of a printed value (characters).
 const LONGEST_VALUE: usize = 120;
 
 impl fmt::Display for Fault {
@@ -103,19 +104,19 @@ impl fmt::Display for Fault {
         if !self.remedy.is_empty() {
             text += &format!("; {}", self.remedy);
         }
-        // Names come from files: nothing in them may move the cursor or start a new line.
+        // Names come from files: control characters must neither move the cursor nor start a line.
         f.write_str(&text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>())
     }
 }
 
 impl std::error::Error for Fault {}
 
-/// What of a setting is at fault.
+/// The part of a setting that is at fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
-    /// Its key: there is none of that name, or something is missing below it.
+    /// The key: it is unknown, or a key below it is missing.
     Key,
-    /// Its value.
+    /// The value.
     Value,
 }
 
@@ -124,23 +125,27 @@ pub fn line_at(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
-/// The line and column (letters, from 1) of the byte at `offset`.
+/// The line and column (characters, from 1) of the byte at `offset`.
 pub fn place_at(text: &str, offset: usize) -> (usize, usize) {
     let before = &text.as_bytes()[..offset.min(text.len())];
     let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
-    // Bytes that continue a letter are none of their own.
+    // Continuation bytes of UTF-8 do not count as characters.
     (line_at(text, offset), 1 + before[start..].iter().filter(|&&b| b & 0xC0 != 0x80).count())
 }
 
-/// The line (from 1) of the key at `path` in a TOML text, or of the nearest table above it that
-/// exists; numbers in the path are places in arrays: `["object", "2", "id"]`.
+/// The line (from 1) of the key at `path` in a TOML text.
+///
+/// If the key does not exist, it is the line of the nearest existing table above. Numbers in the path are indices of
+/// arrays: `["object", "2", "id"]`.
 pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
     place_of(text, path, Part::Key).map(|(_, (line, _))| line)
 }
 
-/// The same with the column, or of its value, behind how many steps of `path` lead to it: fewer than all where only a table above
-/// is there. The value of a table is what stands in it, so its key is told. A component that is written as its bare name has a
-/// `name`.
+/// The position of the key at `path` or of its value, in a TOML text.
+///
+/// The result is (number of existing steps of `path`, (line, column)). The number is smaller than the path's length if
+/// only a table above exists. The position of a table is that of its key. A component given by its bare name counts as
+/// having a `name`.
 pub fn place_of(text: &str, path: &[&str], part: Part) -> Option<(usize, (usize, usize))> {
     let (document, _) = toml::de::DeTable::parse_recoverable(text);
     let mut place = None;
@@ -157,7 +162,7 @@ pub fn place_of(text: &str, path: &[&str], part: Part) -> Option<(usize, (usize,
             })
         };
         let Some(value) = value else {
-            // A bare name, or a value where a table should be.
+            // A bare name, or a value in place of a table.
             if let Some(start) = scalar {
                 place = Some((depth + usize::from(*step == "name"), place_at(text, start)));
             }

@@ -1,10 +1,9 @@
-//! Things with a name, settings and a source, built from TOML.
+//! Components with a name, settings and a source, built from TOML.
 //!
-//! Every choice a researcher compares (a detector, a search, a solver) is a *component*:
-//! a struct that **is** its settings, three constants that say what it is, and one small
-//! object-safe trait that says what it does. It joins its [`Registry`] by one line,
-//! [`entry!`]`(Kabsch)`, in the list of its folder. From that line follow its name in every
-//! experiment file, the lists the command prints, and the laws it is tested against.
+//! Every method that a researcher compares (a detector, a search, a solver) is a *component*: a struct whose fields are
+//! its settings, constants that describe it, and a small object-safe trait with its function. One line adds it to its
+//! [`Registry`]: [`entry!`]`(Kabsch)` in the list of its module. The registry makes it available to experiment files,
+//! command-line listings and property tests.
 //!
 //! ```
 //! use seafix_component::{Choice, Component, Registry, entry};

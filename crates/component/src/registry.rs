@@ -1,76 +1,78 @@
-//! The visible list of the components of one kind.
+//! Registries: the components of one kind.
 
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{Choice, Part, nearest, plain, suggest::unknown};
 
-/// What is told of a component, and what: `("time", "N log N for N candidate pairs")`.
+/// Properties of a component as (name, value): `("time", "N log N for N candidate pairs")`.
 pub type Properties = &'static [(&'static str, &'static str)];
 
-/// What every component says of itself, whatever it does.
+/// The description and settings of a component.
 ///
-/// The implementing struct *is* its settings: its fields are the keys a user may write,
-/// its `Default` the values they have otherwise.
+/// The fields of the implementing struct are its settings; `Default` gives their default values.
 pub trait Component: Default + Serialize + DeserializeOwned + 'static {
     /// The name in experiment files: the method's name in kebab-case.
     const NAME: &'static str;
-    /// What it does, in one line of the field's words.
+    /// A one-line description in the field's words.
     const SUMMARY: &'static str;
-    /// Where it comes from: author, title, year.
+    /// The literature source: author, title, year.
     const SOURCE: &'static str;
-    /// What else those who choose between components of its kind ask, and the answers: of a search what it `maximises`, whether it
-    /// is `exact`, what `time` it takes.
+    /// Further properties that help to choose between components of one kind.
+    ///
+    /// A search, for example, states what it `maximises`, whether it is `exact`, and its `time`.
     const PROPERTIES: Properties = &[];
-    /// The version of its results. Raise it with every change that alters a result for some input: runs that `seafix publish`
-    /// keeps are made again by it.
+    /// The version of the results.
+    ///
+    /// Increase it with every change that alters a result for some input; `seafix publish` then repeats the stored
+    /// runs.
     const VERSION: u32 = 1;
 
-    /// Whether its settings can be: a component is built only from settings that pass.
+    /// Checks the ranges of the settings; only valid settings can build a component.
     ///
     /// # Errors
-    /// The setting that is out of its range, its value, and the range: `ratio = -1; give a number from 0 to 1`.
+    /// The invalid setting, its value and the valid range: `ratio = -1; give a number from 0 to 1`.
     fn check(&self) -> Result<(), String> {
         Ok(())
     }
 }
 
-/// Why a component could not be built.
+/// The reason why a component could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BuildError {
-    /// No component of the kind has the name.
+    /// An unknown name.
     #[error("no {kind} is called `{name}`{hint}")]
     UnknownName {
-        /// The kind looked through.
+        /// The kind of the registry.
         kind: &'static str,
-        /// The name that was asked for.
+        /// The requested name.
         name: String,
-        /// The name that was meant, where one is near enough.
+        /// The nearest known name, if one is close enough.
         near: Option<&'static str>,
-        /// The nearest name and the list of all.
+        /// The nearest name and the list of all names.
         hint: String,
     },
-    /// The component has no such setting.
+    /// An unknown setting.
     #[error("{kind} `{name}` has no setting `{key}`{hint}")]
     UnknownKey {
         /// The kind of the component.
         kind: &'static str,
-        /// The component.
+        /// The name of the component.
         name: &'static str,
-        /// The key that was written.
+        /// The unknown key.
         key: String,
-        /// The nearest key and the list of all.
+        /// The nearest key and the list of all keys.
         hint: String,
     },
-    /// A setting has a value the component cannot take.
+    /// An invalid value of a setting.
     #[error("{kind} `{name}`: {message}")]
     BadValue {
         /// The kind of the component.
         kind: &'static str,
-        /// The component.
+        /// The name of the component.
         name: &'static str,
-        /// The key at fault, where it is known.
+        /// The key of the setting, if it is known.
         key: Option<String>,
-        /// What is wrong with it.
+        /// The description of the error.
         message: String,
     },
 }
@@ -85,25 +87,25 @@ impl BuildError {
         }
     }
 
-    /// What of that key is at fault.
+    /// The part of the setting that is at fault.
     pub fn part(&self) -> Part {
         if matches!(self, Self::UnknownKey { .. }) { Part::Key } else { Part::Value }
     }
 
-    /// The name that was meant by one that nothing has.
+    /// The known name nearest to an unknown one.
     pub fn near(&self) -> Option<&'static str> {
         if let Self::UnknownName { near, .. } = self { *near } else { None }
     }
 }
 
-/// Why settings could not become a component: the key if one is known, dotted, and the reason.
+/// An error in the settings of a component: the dotted key, if one is known, and the message.
 #[derive(Debug)]
 pub struct SettingsError {
     key: Option<String>,
     message: String,
 }
 
-/// One line of a registry; written with [`entry!`](crate::entry).
+/// An entry of a registry; written with [`entry!`](crate::entry).
 #[derive(Debug)]
 pub struct Entry<T: ?Sized> {
     name: &'static str,
@@ -138,12 +140,12 @@ macro_rules! entry {
     };
 }
 
-/// A component from its settings, or all that is wrong with them; [`entry!`](crate::entry) calls it.
+/// The component with these settings, or all errors in them; [`entry!`](crate::entry) calls it.
 #[doc(hidden)]
 pub fn settings<C: Component>(mut settings: toml::Table) -> Result<C, Vec<SettingsError>> {
     let mut errors = Vec::new();
-    // One key at a time first, so that the message can name the one at fault. What is wrong is taken out, for the rest to be
-    // looked at.
+    // Each key is checked alone first, so that the message can name it. An invalid value is removed, so that the others
+    // can be checked.
     for key in settings.keys().cloned().collect::<Vec<_>>() {
         while let Some(value) = settings.get(&key) {
             let refused = |value: &toml::Value| {
@@ -168,7 +170,7 @@ pub fn settings<C: Component>(mut settings: toml::Table) -> Result<C, Vec<Settin
         };
         let key = out_of_range(&message);
         let written = key.as_deref().and_then(|key| key.split(['.', '[']).next());
-        // Where nothing is written the fault is a consequence of another.
+        // An absent key means that the error results from another one.
         let next = written.and_then(|key| settings.remove(key)).is_some();
         if next || errors.is_empty() {
             errors.push(SettingsError { key, message });
@@ -179,8 +181,9 @@ pub fn settings<C: Component>(mut settings: toml::Table) -> Result<C, Vec<Settin
     }
 }
 
-/// Where in `value` the fault is that is told as `message`: the steps to it are added to `path`. `refused` says what is
-/// wrong with another value in its place.
+/// Appends to `path` the steps that lead to the error `message` inside `value`.
+///
+/// The function `refused` gives the error message for a replacement value.
 fn culprit(
     value: &toml::Value,
     message: &str,
@@ -188,7 +191,7 @@ fn culprit(
     path: &mut Vec<String>,
 ) {
     let is_it = |rest: &toml::Value| {
-        // Without it the fault is gone, or another one comes up.
+        // The removed part is at fault if the error disappears or another one appears.
         refused(rest).is_none_or(|other| other != message && !other.starts_with("missing field"))
     };
     let steps: Vec<String> = match value {
@@ -219,7 +222,7 @@ fn culprit(
     }
 }
 
-/// What is one step below a value: in a table by its key, in a list by its place.
+/// The child of a value: by key in a table, by index in an array.
 pub fn inside<'a>(value: &'a mut toml::Value, step: &str) -> Option<&'a mut toml::Value> {
     match value {
         toml::Value::Table(table) => table.get_mut(step),
@@ -240,7 +243,7 @@ fn remove(value: &mut toml::Value, step: &str) {
     }
 }
 
-/// Takes what is at `path` out of settings.
+/// Removes the setting at `path`.
 pub fn take_out(settings: &mut toml::Table, path: &[impl AsRef<str>]) {
     let Some((last, above)) = path.split_last() else { return };
     let Some((first, above)) = above.split_first() else {
@@ -256,7 +259,7 @@ pub fn take_out(settings: &mut toml::Table, path: &[impl AsRef<str>]) {
     }
 }
 
-/// The message of a setting that is out of its range, for [`Component::check`]: `Err` unless `holds`.
+/// The range check of a setting for [`Component::check`]: `Err` unless `holds`.
 ///
 /// # Errors
 /// `name = value; give range`.
@@ -264,21 +267,22 @@ pub fn in_range(holds: bool, name: &str, value: impl std::fmt::Display, range: &
     if holds { Ok(()) } else { Err(format!("{name} = {value}; give {range}")) }
 }
 
-/// The setting, as a dotted key, that a message of [`in_range`] is about.
+/// The dotted key of the setting in a message of [`in_range`].
 pub fn out_of_range(message: &str) -> Option<String> {
     let (name, _) = message.split_once(" = ")?;
     name.chars().all(|c| c.is_ascii_alphanumeric() || "-.[]".contains(c)).then(|| name.to_owned())
 }
 
-/// All that `check` finds in settings that are no component's: what it finds first is put back to its default, and the rest
-/// looked at.
+/// All errors that `check` finds in settings that belong to no component.
+///
+/// After each error the setting is reset to its default and the check repeated.
 pub fn each_invalid<T: Clone + Serialize + DeserializeOwned>(
     full: &T,
     check: fn(&T) -> Result<(), String>,
 ) -> Vec<String> {
     let (mut found, mut rest) = (Vec::new(), full.clone());
     while let Err(message) = check(&rest) {
-        // A default that is unfit by itself ends it.
+        // An invalid default ends the loop.
         let next = if found.contains(&message) { None } else { without(&rest, &message) };
         found.push(message);
         match next {
@@ -290,7 +294,7 @@ pub fn each_invalid<T: Clone + Serialize + DeserializeOwned>(
     found
 }
 
-/// The settings without the one that a message is about, where they can do without.
+/// The settings with the one named in `message` reset to its default, if possible.
 fn without<T: Serialize + DeserializeOwned>(full: &T, message: &str) -> Option<T> {
     let own = message.split_once(": ").map_or(message, |(_, own)| own);
     let key = out_of_range(message).or_else(|| out_of_range(own))?;
@@ -304,22 +308,22 @@ fn defaults<C: Component>() -> toml::Table {
     toml::Table::try_from(C::default()).expect("a component's settings are a table of plain values")
 }
 
-/// What a registry tells of one component.
+/// The description of one component in a registry.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Listing {
     /// The kind: `solver`, `search`, …
     pub kind: &'static str,
     /// The name in experiment files.
     pub name: &'static str,
-    /// One line on what it does.
+    /// The one-line description.
     pub summary: &'static str,
-    /// Its literature source.
+    /// The literature source.
     pub source: &'static str,
-    /// What else there is to say: what is told of, and what.
+    /// Further properties as (name, value).
     pub properties: Properties,
-    /// The version of its results.
+    /// The version of the results.
     pub version: u32,
-    /// Its settings with their default values.
+    /// The settings with their default values.
     pub defaults: toml::Table,
 }
 
@@ -331,7 +335,7 @@ pub struct Registry<T: ?Sized + 'static> {
 }
 
 impl<T: ?Sized> Registry<T> {
-    /// The registry of `kind` with these entries.
+    /// A registry of `kind` with these entries.
     pub const fn new(kind: &'static str, entries: &'static [Entry<T>]) -> Self {
         Self { kind, entries }
     }
@@ -346,7 +350,7 @@ impl<T: ?Sized> Registry<T> {
         self.entries.iter().map(|entry| entry.name)
     }
 
-    /// What there is to say of each component, in the order of the list.
+    /// The descriptions of all components, in the order of the list.
     pub fn listings(&self) -> Vec<Listing> {
         self.entries
             .iter()
@@ -362,20 +366,20 @@ impl<T: ?Sized> Registry<T> {
             .collect()
     }
 
-    /// The component that `choice` names, with its settings.
+    /// Builds the component that `choice` names, with its settings.
     ///
     /// # Errors
-    /// An unknown name or key (with the nearest right one), or a value of the wrong type or range: the first of
-    /// [`faults`](Self::faults).
+    /// The first of [`faults`](Self::faults): an unknown name or key (with the nearest known one), or a value of the
+    /// wrong type or range.
     pub fn build(&self, choice: &Choice) -> Result<Box<T>, BuildError> {
         let entry = self.find(&choice.name)?;
         (entry.build)(choice.settings.clone()).map_err(|errors| {
-            let first = errors.into_iter().next().expect("what is refused has a fault");
+            let first = errors.into_iter().next().expect("a rejected table has at least one error");
             self.fault(entry, first)
         })
     }
 
-    /// Everything that keeps `choice` from being built; of a misspelt name the settings are those of the one that was meant.
+    /// All errors of `choice`; for a misspelt name the settings are checked against the nearest known component.
     pub fn faults(&self, choice: &Choice) -> Vec<BuildError> {
         match self.find(&choice.name) {
             Err(error) => {
@@ -403,7 +407,7 @@ impl<T: ?Sized> Registry<T> {
         if let Some((word, known)) = nested {
             return BuildError::UnknownKey { kind, name, hint: unknown(word, known), key };
         }
-        // What a check says names its setting by itself.
+        // The message of a range check names its setting.
         let message = match out_of_range(&message) {
             Some(_) => message,
             None => format!("setting `{key}`: {}", plain(&message)),
@@ -411,7 +415,7 @@ impl<T: ?Sized> Registry<T> {
         BuildError::BadValue { kind, name, key: Some(key), message }
     }
 
-    /// The choice with every setting written out: what a resolved experiment stores.
+    /// The choice with all settings written out, as a resolved experiment stores it.
     ///
     /// # Errors
     /// As [`build`](Self::build).
@@ -509,7 +513,7 @@ mod tests {
         assert_eq!(error.to_string(), "shape `square`: setting `side-length`: not a number: string \"long\"");
     }
 
-    /// Seen to fail when the first fault ends the search.
+    /// The test fails if the check stops at the first error.
     #[test]
     fn all_faults_are_reported_each_with_its_place() {
         let settings: toml::Table = toml::from_str(

@@ -1,11 +1,11 @@
-//! The nearest right word to a wrong one.
+//! Suggestions for misspelt words.
 
-/// The option nearest to `word` in edit distance, if it is near enough to be what was meant.
+/// The option nearest to `word` by edit distance, if it is close enough to be meant.
 ///
 /// ```
 /// assert_eq!(seafix_component::nearest("umeyma", ["horn", "umeyama"]), Some("umeyama"));
 /// assert_eq!(seafix_component::nearest("banana", ["horn", "umeyama"]), None);
-/// assert_eq!(seafix_component::nearest("a", ["id"]), None, "no letter of it is meant");
+/// assert_eq!(seafix_component::nearest("a", ["id"]), None, "no common letter");
 /// ```
 pub fn nearest<'a>(word: &str, options: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = word.chars().count();
@@ -18,7 +18,7 @@ pub fn nearest<'a>(word: &str, options: impl IntoIterator<Item = &'a str>) -> Op
         .map(|(_, option)| option)
 }
 
-/// The second half of a message about an unknown word: the nearest option, then all of them.
+/// The second half of a message about an unknown word: the nearest option, then all options.
 ///
 /// ```
 /// assert_eq!(seafix_component::unknown("trad", &["kabsch", "triad"]), ", did you mean `triad`? There are kabsch, triad");

@@ -1,10 +1,10 @@
-//! Text files as people write them.
+//! Reading of text files.
 
 use std::{io::Read, path::Path};
 
 use crate::Fault;
 
-/// The text of a file: UTF-8, a byte order mark and CRLF accepted, at most 64 MiB.
+/// The text of a file of at most 64 MiB: UTF-8, with an optional byte order mark and LF or CRLF line ends.
 ///
 /// # Errors
 /// A file that is missing, too large, or not UTF-8.
@@ -12,7 +12,9 @@ pub fn read_text(path: &Path) -> Result<String, Fault> {
     read_long_text(path, 64 << 20)
 }
 
-/// The same of at most `limit` bytes: for files that programs write and that grow with a run.
+/// The text of a file of at most `limit` bytes.
+///
+/// It serves files that programs write and that grow with a run.
 ///
 /// # Errors
 /// As [`read_text`].
@@ -21,7 +23,7 @@ pub fn read_long_text(path: &Path, limit: u64) -> Result<String, Fault> {
         Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
     };
     let mut bytes = Vec::new();
-    // A device has no size before it is read, and no end.
+    // The size is limited while reading: a device file reports no size and may have no end.
     let file = std::fs::File::open(path).map_err(unreadable)?;
     file.take(limit + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > limit {

@@ -1,8 +1,8 @@
-//! Words and numbers of a message, as whoever writes the file would put them.
+//! Wording of messages: counts, numbers and type names.
 
 use crate::nearest;
 
-/// So many of a thing: `1 point`, `2 points`.
+/// A count with its noun: `1 point`, `2 points`.
 ///
 /// ```
 /// assert_eq!([0, 1, 2].map(|n| seafix_component::counted(n, "point")), ["0 points", "1 point", "2 points"]);
@@ -11,7 +11,9 @@ pub fn counted(n: usize, one: &str) -> String {
     format!("{n} {one}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A number to four decimals or digits, without zeros at its end; a very large or small one with a power of ten.
+/// A number with at most four decimals or significant digits and no trailing zeros.
+///
+/// Very large and very small numbers have a power of ten.
 ///
 /// ```
 /// assert_eq!([0.0, -3.0, 1.23456, 0.04, 0.0034921].map(seafix_component::number), ["0", "-3", "1.2346", "0.04", "0.003492"]);
@@ -28,7 +30,7 @@ pub fn number(x: f64) -> String {
     text.split_once('e').map_or(text.clone(), |(digits, power)| format!("{}e{power}", short(digits.to_owned())))
 }
 
-/// The message of a deserialiser without names of Rust's types: `expected u64` becomes `expected a whole number, at least 0`.
+/// The message of a deserialiser without Rust's type names: `expected u64` becomes `not a whole number of at least 0`.
 ///
 /// ```
 /// assert_eq!(
@@ -54,7 +56,7 @@ pub fn plain(message: &str) -> String {
         return format!("`{field}` is missing");
     }
     if message.starts_with("data did not match any variant") {
-        return "a value of none of the forms that can stand here".to_owned();
+        return "a value of an unsupported form".to_owned();
     }
     let kinds = ["invalid type: ", "invalid value: ", "invalid length "];
     let found = kinds.iter().find_map(|kind| message.strip_prefix(kind)?.rsplit_once(", expected "));
@@ -74,7 +76,7 @@ pub fn plain(message: &str) -> String {
     }
 }
 
-/// What a value must be, by the name that the deserialiser has for it.
+/// The description of an expected type, by the deserialiser's name for it.
 fn kind(expected: &str) -> String {
     let length = |start: &str, end: &str| expected.strip_prefix(start)?.strip_suffix(end).map(str::to_owned);
     let many = length("an array of length ", "").or_else(|| length("a tuple of size ", ""));
@@ -95,8 +97,8 @@ fn kind(expected: &str) -> String {
         other if other.starts_with("struct ") => "a table",
         other if other.starts_with("tuple struct ") => "a list",
         other if other.starts_with("a nonzero ") => "a whole number of at least 1",
-        // `enum Gate`, `unit variant Gate::Open`, …
-        other if other.contains("enum ") || other.contains("variant ") => "one of the words that can stand here",
+        // Such as `enum Gate` or `unit variant Gate::Open`.
+        other if other.contains("enum ") || other.contains("variant ") => "one of the accepted words",
         other => other,
     };
     known.to_owned()
@@ -109,14 +111,14 @@ mod tests {
 
     #[derive(Debug, Deserialize)]
     #[serde(rename_all = "kebab-case")]
-    #[expect(dead_code, reason = "only what is wrong with them matters")]
+    #[expect(dead_code, reason = "only their errors matter")]
     enum Lens {
         Pinhole,
         FishEye { order: u8 },
     }
 
     #[derive(Debug, Deserialize)]
-    #[expect(dead_code, reason = "only what is wrong with them matters")]
+    #[expect(dead_code, reason = "only their errors matter")]
     struct Settings {
         budget: u64,
         size: [u32; 2],
@@ -125,7 +127,7 @@ mod tests {
         name: String,
     }
 
-    /// What is said of `wrong` in the place of a value of sound settings.
+    /// The message for an invalid value of one setting among valid ones.
     fn said(key: &str, wrong: &str) -> String {
         let mut all: toml::Table =
             toml::from_str("budget = 1\nsize = [1, 2]\nlens = 'pinhole'\non = true\nname = 'n'").unwrap();

@@ -1,4 +1,4 @@
-//! Sequences of stereo pairs or clouds, simulated and recorded.
+//! Simulated and recorded sequences of stereo pairs or clouds.
 
 pub mod dataset;
 pub mod log_conversion;

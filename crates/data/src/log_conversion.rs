@@ -1,4 +1,4 @@
-//! Between what a method is given and what its log holds of it, both ways and to the last bit.
+//! Lossless conversion between the inputs of a method and their log records.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ use seafix_vision::Image;
 
 use crate::source::{FrameData, Hints, SensorFrame, TrueAnswer, Truth, WorldPrior};
 
-/// A rigid motion as a log holds it.
+/// The log's record of a rigid motion.
 pub fn pose<A: Frame, B: Frame>(pose: &Transform<A, B>) -> ExactPose {
     let (q, t) = (pose.rotation(), pose.translation());
     ExactPose { rotation: [q.i, q.j, q.k, q.w], translation: t.into() }
 }
 
-/// The rigid motion that a log holds.
+/// The rigid motion in a log's record.
 pub fn transform<A: Frame, B: Frame>(pose: &ExactPose) -> Transform<A, B> {
     let [x, y, z, w] = pose.rotation;
     Transform::new(UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)), pose.translation.into())
@@ -49,7 +49,7 @@ fn matches(pairs: &[(usize, usize)]) -> Vec<[u32; 2]> {
     pairs.iter().map(|&(model, cloud)| [model as u32, cloud as u32]).collect()
 }
 
-/// Whether 8 bits hold the images as they are.
+/// Whether 8 bits represent the images exactly.
 pub fn is_exact(frame_data: &FrameData) -> bool {
     let full = |image: &Image| image.pixels().iter().all(|&level| level.fract() == 0.0);
     match frame_data {
@@ -58,7 +58,7 @@ pub fn is_exact(frame_data: &FrameData) -> bool {
     }
 }
 
-/// What a log holds of a sight and the cloud that was made of it; its images are still to be judged.
+/// The log's record of a sensor frame and its cloud, without results.
 pub fn inputs(sensor_frame: &SensorFrame, cloud: &[MeasuredPoint], targets: &[Target]) -> Inputs {
     Inputs {
         prior: sensor_frame.prior.map(|prior| (pose(&prior.world_from_camera), rows6(&prior.covariance.matrix))),
@@ -90,10 +90,10 @@ fn reading(reading: &Reading) -> SensorReading {
     }
 }
 
-/// What the navigation sensors told.
+/// The sensor readings in a log's record.
 ///
 /// # Errors
-/// The name of a device that this version does not know.
+/// The name of an unknown device.
 pub fn readings(inputs: &Inputs) -> Result<Vec<Reading>, String> {
     let reading = |said: &SensorReading| {
         let device =
@@ -116,7 +116,7 @@ fn problem_record(object: &Target, problem: &CoherenceProblem) -> ProblemRecord 
     }
 }
 
-/// What a log holds of the truth.
+/// The log's record of the truth.
 pub fn truth(truth: &Truth, site: &Site) -> TrueState {
     let places = (0..).zip(truth.world_from_object.iter().zip(&site.objects));
     let moved = places.filter(|(_, (place, object))| **place != object.world_from_object);
@@ -133,7 +133,7 @@ pub fn truth(truth: &Truth, site: &Site) -> TrueState {
     }
 }
 
-/// The cloud that a log holds; `None` where the covariance of a pixel pair is missing.
+/// The cloud in a log's record; `None` if the covariance of a pixel pair is missing.
 pub fn cloud(points: &[CloudPoint], inputs: &Inputs) -> Option<Vec<MeasuredPoint>> {
     let mut covariances = inputs.pixel_covariances.iter();
     points
@@ -154,7 +154,7 @@ pub fn cloud(points: &[CloudPoint], inputs: &Inputs) -> Option<Vec<MeasuredPoint
         .collect()
 }
 
-/// What was told.
+/// The hints in a log's record.
 pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint]) -> Hints {
     if let Some(names) = &inputs.names {
         return Hints::Names(indices(names));
@@ -176,13 +176,13 @@ pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint]) -> Hints {
     }))
 }
 
-/// The rough pose.
+/// The prior pose.
 pub fn prior(inputs: &Inputs) -> Option<WorldPrior> {
     let (pose, covariance) = inputs.prior.as_ref()?;
     Some(WorldPrior { world_from_camera: transform(pose), covariance: covariance6(covariance) })
 }
 
-/// The truth that a log holds, of objects that were `surveyed`.
+/// The truth in a log's record, for objects that were `surveyed`.
 pub fn truth_of(state: &TrueState, surveyed: Vec<Option<Transform<World, Object>>>) -> Truth {
     let mut world_from_object = surveyed;
     for (index, place) in &state.moved {
@@ -202,7 +202,7 @@ pub fn truth_of(state: &TrueState, surveyed: Vec<Option<Transform<World, Object>
     }
 }
 
-/// What is searched for, wherever it stands.
+/// The targets, wherever they are.
 pub fn model(target: &Target) -> TargetModel {
     let point = |point: &ModelPoint| seafix_log::ModelPoint {
         id: point.id.clone(),

@@ -1,12 +1,12 @@
-//! The Cramér–Rao bound: how well any unbiased estimate of a pose could be.
+//! The Cramér–Rao bound of a pose estimate.
 
 use nalgebra::{Matrix4, Matrix4x3, Matrix4x6, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
 
-/// A model point and how well it is seen and known.
+/// A model point with the covariances of its pixels and of its model coordinates.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
-    /// Its true place.
+    /// Its true position.
     pub at: Point<Object>,
     /// Standard deviation of each of its coordinates in the model (m).
     pub model_sigma: f64,
@@ -14,12 +14,13 @@ pub struct Seen {
     pub pixels: Matrix4<f64>,
 }
 
-/// The least covariance of any unbiased estimate of the true pose from these points: the inverse of Fisher's
-/// information Σ Jᵀ S⁻¹ J, J the derivative of a point's four pixel coordinates by ξ, S the covariance of their
-/// noise and of the model's error as it appears in the images. `None` when a point is not seen or the points
+/// The Cramér–Rao bound: the minimum covariance of an unbiased estimate of the pose from these points.
+///
+/// It is the inverse of the Fisher information Σ Jᵀ S⁻¹ J, with J the derivative of a point's four pixel coordinates by
+/// ξ and S the covariance of pixel noise and projected model error. `None` if a point is not visible or the points
 /// determine no pose.
 ///
-/// Derivatives are central differences of the projection: nothing is shared with any estimator.
+/// Derivatives are central differences of the projection, so that the bound shares no code with an estimator.
 pub fn cramer_rao(
     rig: &StereoRig,
     object_from_camera: &Transform<Object, Camera>,
@@ -30,7 +31,7 @@ pub fn cramer_rao(
         Some(rig.project(&(pose.inverse() * *point))?.coordinates())
     };
     if points.len() < 3 {
-        return None; // the turn about their line is open, whatever rounding says
+        return None; // the rotation about their line is undetermined
     }
     let mut information = Matrix6::zeros();
     for point in points {
@@ -54,7 +55,7 @@ pub fn cramer_rao(
     Some(Covariance6::new(information.cholesky()?.inverse()))
 }
 
-/// The bound on m2 (m): root mean square over `model` of the standard deviation of a transferred point.
+/// The bound of the target registration error (m): RMS over `model` of a transferred point's standard deviation.
 pub fn transfer_bound(
     bound: &Covariance6<Object, Camera>,
     object_from_camera: &Transform<Object, Camera>,
@@ -65,11 +66,14 @@ pub fn transfer_bound(
     (sum / model.len() as f64).sqrt()
 }
 
-/// How far the images leave the linear model that the bound rests on, within the bound's own uncertainty: root mean
-/// square, over poses at √6 standard deviations along twelve directions that span the bound, of the whitened pixel
-/// residual that J ξ leaves, over that of J ξ. Small (a tenth) where the bound's Gaussian describes the near poses
-/// (Bates and Watts, *Relative curvature measures of nonlinearity*, 1980); it says nothing of another valley far away.
-/// `None` where a pose so far off sees a point no more.
+/// The relative nonlinearity of the projection within the bound.
+///
+/// It is the RMS of the whitened pixel residual that J ξ leaves, relative to that of J ξ, over poses at √6 standard
+/// deviations along twelve directions that span the bound. A small value (0.1) means that the bound's Gaussian
+/// describes the poses nearby; it does not exclude a distant local minimum. `None` if one of these poses does not see a
+/// point.
+///
+/// Source: Bates and Watts, *Relative curvature measures of nonlinearity*, 1980.
 pub fn nonlinearity(
     rig: &StereoRig,
     object_from_camera: &Transform<Object, Camera>,
@@ -104,8 +108,8 @@ mod tests {
     use super::*;
     use seafix_geometry::Pinhole;
 
-    /// Many points on a far ring about the axis: the lateral position is known as f·σ_x/z = σ_px/√(2n) says, when
-    /// the attitude is known; with the attitude open it is known less.
+    /// Many points on a distant ring about the axis: with known attitude the lateral position has σ_px/√(2n) in pixels;
+    /// with unknown attitude it is less accurate.
     #[test]
     fn depth_is_known_as_disparity_and_scale_state() {
         let camera = Pinhole::new([1000, 1000], [500.0, 500.0], [499.5, 499.5], &[]).unwrap();
@@ -120,9 +124,9 @@ mod tests {
         };
         let points: Vec<Seen> = (0..n).map(seen).collect();
         let bound = cramer_rao(&rig, &pose, &points).unwrap();
-        // By symmetry depth is independent of all else but the turn about y, which the right camera's offset
-        // mixes in. Its information alone: each camera sees a point move by f r/z² per metre of depth, r its
-        // distance from that camera's axis.
+        // By symmetry the depth is correlated only with the rotation about y, through the right camera's offset. Its
+        // own information: in each camera a point moves by f r/z² per metre of depth, with r its distance from that
+        // camera's axis.
         let information: f64 = points
             .iter()
             .map(|p| {
@@ -135,8 +139,11 @@ mod tests {
         assert!(bound.matrix[(5, 5)] >= alone);
         let tre = transfer_bound(&bound, &pose, &points.iter().map(|p| p.at).collect::<Vec<_>>());
         assert!(tre > 0.0 && tre < 0.01, "{tre}");
-        assert!(cramer_rao(&rig, &pose, &points[..2]).is_none(), "two points leave a turn about their line");
-        // What is left is of second order: it grows as the noise.
+        assert!(
+            cramer_rao(&rig, &pose, &points[..2]).is_none(),
+            "two points leave the rotation about their line undetermined"
+        );
+        // The remainder is of second order and grows with the noise.
         let bent = nonlinearity(&rig, &pose, &points, &bound).unwrap();
         let louder: Vec<Seen> = points.iter().map(|p| Seen { pixels: p.pixels * 4.0, ..*p }).collect();
         let twice = nonlinearity(&rig, &pose, &louder, &Covariance6::new(bound.matrix * 4.0)).unwrap();

@@ -1,13 +1,13 @@
-//! The errors of one fix (FORMATS: m1, m2, m3, NEES).
+//! Errors of one fix: fit RMS, target registration error, position and attitude error, NEES (docs/formats.md).
 //!
-//! With E = object_from_camera_est · camera_from_object_true, an estimate is right when E is the
-//! identity.
+//! The error transform is E = object_from_camera_est · camera_from_object_true, the identity for an exact estimate.
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, so3};
 
-/// m1: root mean square of ‖object_from_camera · C − P‖ over identified points (m): what the
-/// paper reports. It holds the evaluated points' own noise. `None` without points.
+/// The fit RMS (the paper's m1): RMS of ‖object_from_camera · C − P‖ over identified points (m).
+///
+/// It includes the noise of the evaluated points themselves. `None` without points.
 pub fn residual_rms(
     object_from_camera: &Transform<Object, Camera>,
     pairs: &[(Point<Camera>, Point<Object>)],
@@ -15,8 +15,9 @@ pub fn residual_rms(
     root_mean_square(pairs.iter().map(|(c, p)| (*object_from_camera * *c).distance(p)))
 }
 
-/// m2: root mean square of ‖E·p − p‖ over all model points of the target (m): how far the estimate
-/// transfers the model from its place. `None` without points.
+/// The target registration error (the paper's m2): RMS of ‖E·p − p‖ over all model points (m).
+///
+/// `None` without points.
 pub fn transfer_rms(
     estimate: &Transform<Object, Camera>,
     truth: &Transform<Object, Camera>,
@@ -26,32 +27,32 @@ pub fn transfer_rms(
     root_mean_square(model.iter().map(|p| (e * *p).distance(p)))
 }
 
-/// m3, position: the distance between the left camera's estimated and true place in the object frame (m).
+/// The position error: distance between the estimated and true position of the left camera in the object frame (m).
 pub fn position_error(estimate: &Transform<Object, Camera>, truth: &Transform<Object, Camera>) -> f64 {
     (estimate.translation() - truth.translation()).norm()
 }
 
-/// m3, attitude: the rotation angle of E (rad).
+/// The attitude error: the rotation angle of E (rad).
 pub fn attitude_error(estimate: &Transform<Object, Camera>, truth: &Transform<Object, Camera>) -> f64 {
     so3::angle(&(estimate.rotation() * truth.rotation().inverse()))
 }
 
-/// The normalised error squared of a pose with its covariance: εᵀ Σ⁻¹ ε, χ² with six degrees of
-/// freedom for an honest covariance.
+/// The normalised estimation error squared (NEES) εᵀ Σ⁻¹ ε: χ² with six degrees of freedom for a consistent covariance.
 ///
-/// ε = (φ, displacement of the centroid of the used points), camera axes, the covariance transported there. The
-/// centroid is a point of the object, the one that the estimate places at `centroid` (camera frame): its
-/// displacement is from where the truth has it to there. A point at rest in the camera's frame would be turned
-/// by φ about the error of the depth besides, which is of second order and yet, for a small object far away,
-/// as large as the centroid's own error across the line of sight. In this form ε stays χ² when the rotation is weak.
-/// `None` when the covariance is not positive definite.
+/// The error is ε = (φ, displacement of the centroid of the used points), along the camera axes; the covariance is
+/// transformed accordingly. The centroid is a point of the object: the one that the estimate places at `centroid`
+/// (camera frame). Its displacement is measured from its true position. A point fixed in the camera's frame would also
+/// move by φ times the depth error. That term is of second order, yet for a small, distant object it is as large as the
+/// lateral error of the centroid. This form keeps ε χ² even if the rotation is poorly determined.
+///
+/// `None` if the covariance is not positive definite.
 pub fn nees(
     estimate: &Transform<Object, Camera>,
     truth: &Transform<Object, Camera>,
     covariance: &Covariance6<Object, Camera>,
     centroid: &Point<Camera>,
 ) -> Option<f64> {
-    // T_true = T_est·Exp(ξ): what the estimate places at c is truly at Exp(−ξ)·c, by φ×c + ρ from c to first order.
+    // With T_true = T_est·Exp(ξ) the point estimated at c is truly at Exp(−ξ)·c; to first order the error is φ×c + ρ.
     let step = estimate.inverse() * *truth;
     let phi = so3::log(&step.rotation());
     let moved: Vector3<f64> = *centroid - step.inverse() * *centroid;
@@ -65,16 +66,17 @@ pub fn nees(
     Some(error.dot(&information.solve(&error)))
 }
 
-/// The error of a point `arm` metres from another one that the estimate displaces by `displacement` (m), where it is turned
-/// by `angle` (rad): root mean square over all directions of the arm (m).
+/// The RMS error (m) at the distance `arm` (m) from a point with a known error.
 ///
-/// With E = (R, t) and a unit vector u, ‖E(c + a·u) − (c + a·u)‖² = ‖E·c − c + a·(R − I)·u‖². Over all u the mixed term vanishes
-/// and the mean of ‖(R − I)·u‖² is tr((R − I)ᵀ(R − I)) / 3 = 8/3·sin²(θ/2).
+/// The known point is displaced by `displacement` (m), and the estimate is rotated by `angle` (rad); the mean is over
+/// all directions of the arm. With E = (R, t) and a unit vector u, ‖E(c + a·u) − (c + a·u)‖² = ‖E·c − c + a·(R −
+/// I)·u‖². Averaged over u the mixed term vanishes, and the mean of ‖(R − I)·u‖² is tr((R − I)ᵀ(R − I)) / 3 =
+/// 8/3·sin²(θ/2).
 pub fn lever_arm_error(displacement: f64, angle: f64, arm: f64) -> f64 {
     (displacement * displacement + 8.0 / 3.0 * (arm * (0.5 * angle).sin()).powi(2)).sqrt()
 }
 
-/// The error beyond which a fix is wrong (m): 0.10 m or 5 % of the object's diameter, the smaller.
+/// The alert limit (m): 0.10 m or 5 % of the object's diameter, the smaller one. A fix with a larger error is wrong.
 pub fn alert_limit(diameter: f64) -> f64 {
     (0.05 * diameter).min(0.10)
 }
@@ -108,7 +110,9 @@ mod tests {
         assert!((attitude_error(&pose(0.0, 0.3), &pose(0.0, 0.1)) - 0.2).abs() < 1e-15);
     }
 
-    /// A right angle moves a point one metre off across the axis by √2, along it not at all. Seen to fail with 4/3 for 8/3.
+    /// A rotation by 90° moves a point at one metre by √2 m or, along the axis, not at all.
+    ///
+    /// The test fails with 4/3 for 8/3.
     #[test]
     fn a_lever_arm_shows_the_turn() {
         let (angle, arm) = (std::f64::consts::FRAC_PI_2, 1.0);
@@ -127,7 +131,7 @@ mod tests {
         let reported = lever_arm_error(moved(c), so3::angle(&e.rotation()), 2.0);
         assert!(
             (rms - reported).abs() < 1e-12,
-            "the six ends along the axes have the mean square of the sphere: {rms} {reported}"
+            "the six ends along the axes have the sphere's mean square: {rms} {reported}"
         );
     }
 
@@ -147,14 +151,15 @@ mod tests {
         assert!((n - 1.0).abs() < 1e-12);
     }
 
-    /// A pose wrong by 3° and 5 cm in depth that sees the centroid where it is: the error is what the camera sees,
-    /// not the turn about the error of the depth.
+    /// A pose with errors of 3° and of 5 cm in depth, and an exact direction of the centroid.
+    ///
+    /// The rotation does not enter the displacement of the centroid.
     #[test]
     fn the_centroid_is_a_point_of_the_object() {
         let estimate = pose(0.0, 0.0);
         let seen = Point::new(0.0, 0.0, 5.0);
         let deeper = Point::new(0.0, 0.0, 5.05);
-        // The truth has the object's point at `deeper`, turned about it.
+        // The true object point is at `deeper`, rotated about it.
         let turn = so3::exp(&Vector3::new(0.05, 0.0, 0.0));
         let moved = Transform::<Camera, Camera>::new(turn, seen.coords - turn * deeper.coords);
         let truth = estimate * moved;

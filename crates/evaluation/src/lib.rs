@@ -1,6 +1,26 @@
-//! Errors of poses and trajectories, rates of outcomes: pure functions of estimates and truth.
+//! Errors of poses and trajectories, bounds, and statistics: pure functions of estimates and ground truth.
 //!
-//! Nothing here can see which algorithm made a number.
+//! - One fix: [`residual_rms`], [`transfer_rms`], [`position_error`], [`attitude_error`], [`nees`]; its lower bound by
+//!   [`cramer_rao`].
+//! - Object pose benchmarks: ADD, ADI and MSSD by [`mean_distance`], [`mean_nearest_distance`], [`symmetric_distance`].
+//! - Trajectories: APE, RPE and drift in [`trajectory`].
+//! - Statistics: quantiles, confidence intervals ([`Bootstrap`], [`clopper_pearson`]) and tests ([`signed_rank`],
+//!   [`mcnemar`]).
+//!
+//! No function depends on the algorithm that made an estimate.
+//!
+//! ```
+//! use seafix_evaluation::{attitude_error, position_error, transfer_rms};
+//! use seafix_geometry::{Camera, Object, Point, Transform};
+//!
+//! let truth = Transform::<Object, Camera>::identity();
+//! let estimate = Transform::<Object, Camera>::exp(&[0.0, 0.0, 0.0, 0.03, 0.0, 0.04].into());
+//! let model = [Point::new(0.0, 0.0, 0.0), Point::new(1.0, 0.0, 0.0)];
+//!
+//! assert!((position_error(&estimate, &truth) - 0.05).abs() < 1e-12);
+//! assert!(attitude_error(&estimate, &truth) < 1e-12);
+//! assert!((transfer_rms(&estimate, &truth, &model).unwrap() - 0.05).abs() < 1e-12);
+//! ```
 
 mod bound;
 mod fix;

@@ -1,29 +1,30 @@
-//! When the pose of an identification problem counts as found.
+//! The criterion by which the pose of an identification problem counts as correct.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, Transform};
 
 use crate::{attitude_error, transfer_rms};
 
-/// By which rule a pose is right: it misplaces all model points by no more than three times what the least-squares pose
-/// of the true pairs does (RMS), or
+/// The criterion of a correct pose.
 ///
-/// - where shells or nothing bound the candidates: the centroid of the model by less than 5 cm, and its attitude is
-///   off by less than 2°;
-/// - where putative pairs are given: all model points by less than 1 cm (RMS).
+/// A pose is correct if the RMS error of all model points is at most three times that of the least-squares pose of the
+/// true pairs, or if
 ///
-/// Where the true pairs determine no pose, none is right.
+/// - with gates or without a prior: the error of the model's centroid is below 5 cm and the attitude error below 2°;
+/// - with putative pairs: the RMS error of all model points is below 1 cm.
+///
+/// No pose is correct if the true pairs determine none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved {
-    /// RMS over all model points of where the least-squares pose of the true pairs misplaces them (m); `None` where they
-    /// determine no pose.
+    /// RMS error (m) of all model points under the least-squares pose of the true pairs; `None` if they determine no
+    /// pose.
     pub ideal_rms: Option<f64>,
-    /// Whether putative pairs are given.
+    /// Whether the problem gives putative pairs.
     pub putative: bool,
 }
 
 impl Solved {
-    /// Whether `estimate` is right.
+    /// Whether `estimate` is correct.
     pub fn holds(
         &self,
         estimate: &Transform<Object, Camera>,
@@ -65,11 +66,11 @@ mod tests {
         let gates = Solved { ideal_rms: Some(0.001), putative: false };
         assert!(solved(gates, 0.049, 0.0) && !solved(gates, 0.051, 0.0));
         assert!(solved(gates, 0.0, 1.9) && !solved(gates, 0.0, 2.1));
-        // Poorly determined: what no method could do better is right.
+        // With poorly determined true pairs the best possible pose is correct.
         let poor = Solved { ideal_rms: Some(0.1), putative: false };
         assert!(solved(poor, 0.29, 0.0) && !solved(poor, 0.31, 0.0));
         let putative = Solved { ideal_rms: Some(0.001), putative: true };
         assert!(solved(putative, 0.009, 0.0) && !solved(putative, 0.011, 0.0));
-        assert!(!solved(Solved { ideal_rms: None, putative: false }, 0.0, 0.0), "nothing determines a pose");
+        assert!(!solved(Solved { ideal_rms: None, putative: false }, 0.0, 0.0), "the pairs determine no pose");
     }
 }

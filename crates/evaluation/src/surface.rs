@@ -1,12 +1,14 @@
-//! Errors of a fix as the benchmarks of object poses measure them, with E as for m2: how far points of the object's surface
-//! are from where they should be. An object that looks the same from several sides has several right poses.
+//! Errors of object poses as benchmarks define them: ADD, ADI and MSSD.
+//!
+//! They are distances of surface points under the error transform E of [`transfer_rms`](crate::transfer_rms). A
+//! symmetric object has several correct poses.
 
 use seafix_geometry::{Camera, Object, Point, Transform};
 
-/// ADD: the mean of ‖E·p − p‖ over the points (m). `None` without points.
+/// ADD: the mean of ‖E·p − p‖ over the points (m); `None` without points.
 ///
-/// Source: Hinterstoisser et al., *Model based training, detection and pose estimation of texture-less 3D objects in heavily
-/// cluttered scenes*, ACCV 2012.
+/// Source: Hinterstoisser et al., *Model based training, detection and pose estimation of texture-less 3D objects in
+/// heavily cluttered scenes*, ACCV 2012.
 pub fn mean_distance(
     estimate: &Transform<Object, Camera>,
     truth: &Transform<Object, Camera>,
@@ -16,8 +18,9 @@ pub fn mean_distance(
     mean(points.iter().map(|p| (e * *p).distance(p)))
 }
 
-/// ADI: the mean of min_q ‖E·p − q‖ over the points p, q any of them (m): what an object's symmetries exchange is no error.
-/// `None` without points. (Hinterstoisser et al.)
+/// ADI: the mean of min_q ‖E·p − q‖ over the points (m), for symmetric objects; `None` without points.
+///
+/// Source: Hinterstoisser et al., 2012.
 pub fn mean_nearest_distance(
     estimate: &Transform<Object, Camera>,
     truth: &Transform<Object, Camera>,
@@ -31,8 +34,9 @@ pub fn mean_nearest_distance(
     mean(points.iter().map(nearest))
 }
 
-/// MSSD: the least over the symmetries S, the identity among them, of the greatest ‖E·S·p − p‖ over the points (m).
-/// `symmetries` holds the others: motions that the object looks the same after. `None` without points.
+/// MSSD: the minimum over the symmetries S of the maximum ‖E·S·p − p‖ over the points (m); `None` without points.
+///
+/// `symmetries` holds the object's symmetries without the identity.
 ///
 /// Source: Hodaň et al., *BOP challenge 2020 on 6D object localization*, ECCV workshops 2020.
 pub fn symmetric_distance(
@@ -69,7 +73,7 @@ mod tests {
             Vector3::zeros(),
         );
         let estimate = quarter * truth;
-        // Each corner is a side, 2 m, from its own place, and on another's.
+        // Each corner is one side (2 m) away from its own position and at that of another corner.
         assert!((mean_distance(&estimate, &truth, &points).unwrap() - 2.0).abs() < 1e-12);
         assert!(mean_nearest_distance(&estimate, &truth, &points).unwrap() < 1e-12);
         assert!((symmetric_distance(&estimate, &truth, &points, &[]).unwrap() - 2.0).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! What differs between two runs: first in what they were told, then in what came of it.
+//! Comparison of two runs: of their configurations and inputs, then of their results.
 
 use std::{
     cmp::Ordering,
@@ -13,48 +13,49 @@ use serde::Deserialize;
 
 use crate::manifest;
 
-/// One value that differs; `None` where it is only in the other run.
+/// A value that differs; `None` if it exists in the other run only.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Change {
-    /// Which: a dotted key of the configuration, a file, or a row and its column.
+    /// The name: a dotted key of the configuration, a file, or a row and its column.
     pub what: String,
-    /// Its value in the first run.
+    /// The value in the first run.
     pub first: Option<String>,
-    /// Its value in the second.
+    /// The value in the second run.
     pub second: Option<String>,
 }
 
-/// What differs between two runs.
+/// The differences of two runs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Difference {
-    /// Settings, trials and seeds.
+    /// The settings, trials and seeds.
     pub configuration: Vec<Change>,
-    /// Files they were made from.
+    /// The input files.
     pub inputs: Vec<Change>,
-    /// Values of the results, durations left out: the first hundred of them.
+    /// The first hundred values of the results, without durations.
     pub results: Vec<Change>,
-    /// How many values differ in each column.
+    /// The number of differing values in each column.
     pub columns: BTreeMap<String, u64>,
-    /// Rows that both runs have.
+    /// The number of rows in both runs.
     pub rows: u64,
 }
 
-/// So many differing values are kept one by one.
+/// The maximum number of listed values.
 const MAX: usize = 100;
 
 impl Difference {
-    /// Whether nothing differs.
+    /// Whether the runs are equal.
     pub fn is_none(&self) -> bool {
         self.configuration.is_empty() && self.inputs.is_empty() && self.columns.is_empty()
     }
 }
 
-/// Compares the runs in two folders. A trial belongs to that of the other run which has its values of all settings that vary
-/// in either run, wherever it stands; rows of two such trials belong together by frame and object, in order. Durations,
-/// versions and machines are not compared.
+/// Compares the runs in two folders.
+///
+/// Trials are paired by their values of all settings that vary in either run, regardless of order. Rows of paired
+/// trials are compared by frame and object, in order. Durations, versions and machines are not compared.
 ///
 /// # Errors
-/// A folder that is no finished run, or files that cannot be read.
+/// A folder without a finished run, or files that cannot be read.
 pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
     let (a, b) = (RunInputs::read(first)?, RunInputs::read(second)?);
     let pairs = pairs(&a.trials, &b.trials);
@@ -68,7 +69,7 @@ pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
         .columns
         .iter()
         .enumerate()
-        // The name of a trial holds its settings, which are compared above.
+        // The trial's name consists of settings, which are compared as configuration.
         .filter(|(_, name)| *name != "trial" && !name.ends_with("_ms"))
         .filter_map(|(i, name)| Some((i, two.columns.iter().position(|other| other == name)?)))
         .collect();
@@ -86,7 +87,7 @@ pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
 }
 
 impl Difference {
-    /// Row by row.
+    /// Compares the rows of paired trials.
     fn rows_of_a_trial(&mut self, one: &mut Table, two: &mut Table, common: &[(usize, usize)]) -> Result<(), Fault> {
         let (mut left, mut right) = (one.next()?, two.next()?);
         loop {
@@ -123,7 +124,7 @@ impl Difference {
     }
 }
 
-/// Which trial of the second run is which of the first; those without another in the end.
+/// Pairs the trials of both runs; unpaired trials of the second come last.
 fn pairs(a: &[OfTrial], b: &[OfTrial]) -> Vec<(Option<usize>, Option<usize>)> {
     let varies = |trials: &[OfTrial]| -> BTreeSet<String> {
         let keys = trials.iter().flat_map(|trial| trial.settings.keys());
@@ -136,7 +137,7 @@ fn pairs(a: &[OfTrial], b: &[OfTrial]) -> Vec<(Option<usize>, Option<usize>)> {
     let mut left: Vec<Option<usize>> = (0..b.len()).map(Some).collect();
     let mut pairs: Vec<(Option<usize>, Option<usize>)> = Vec::new();
     for (place, trial) in a.iter().enumerate() {
-        // Of several alike the first that is left.
+        // The first unpaired one of several identical trials.
         let same = left.iter_mut().find(|other| other.is_some_and(|k| identity(&b[k]) == identity(trial)));
         pairs.push((Some(place), same.and_then(Option::take)));
     }
@@ -144,7 +145,7 @@ fn pairs(a: &[OfTrial], b: &[OfTrial]) -> Vec<(Option<usize>, Option<usize>)> {
     pairs
 }
 
-/// What differs in what the trials were told: what does so in all pairs alike is said once.
+/// The differences of the configurations. A difference common to all pairs is listed once.
 fn configuration(a: &RunInputs, b: &RunInputs, pairs: &[(Option<usize>, Option<usize>)]) -> Vec<Change> {
     let (mut found, mut alone) = (BTreeMap::<Change, Vec<&str>>::new(), Vec::new());
     let mut both = 0;
@@ -197,20 +198,20 @@ fn changes(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Ch
     keys.into_iter().map(change).filter(|change| change.first != change.second).collect()
 }
 
-/// What a run was told, from its manifest.
+/// The inputs of a run, from its manifest.
 struct RunInputs {
     inputs: BTreeMap<String, String>,
     trials: Vec<OfTrial>,
 }
 
-/// What one of its trials was told.
+/// The inputs of one trial.
 struct OfTrial {
     name: String,
-    /// Every setting by its dotted key.
+    /// The settings by dotted key.
     settings: BTreeMap<String, String>,
 }
 
-/// What of `manifest.json` is compared.
+/// The compared part of `manifest.json`.
 #[derive(Deserialize)]
 struct Manifest {
     format: String,
@@ -243,8 +244,8 @@ impl RunInputs {
             return Err(Fault::new("not a run's manifest", &file).value(manifest.format));
         }
         let unfinished = match manifest.state.as_str() {
-            "shard" => Some("a shard of a run; join all with `seafix merge`"),
-            "running" | "interrupted" => Some("a run that did not end; go on with it with --resume"),
+            "shard" => Some("a shard of a run; join all shards with `seafix merge`"),
+            "running" | "interrupted" => Some("an unfinished run; resume it with --resume"),
             _ => None,
         };
         if let Some((what, remedy)) = unfinished.and_then(|said| said.split_once("; ")) {
@@ -266,7 +267,7 @@ impl RunInputs {
     }
 }
 
-/// Every value of a TOML tree by its dotted key.
+/// Lists every value of a TOML tree by its dotted key.
 fn flatten(path: &str, value: &toml::Value, into: &mut BTreeMap<String, String>) {
     let below = |key: &str| if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
     match value {
@@ -277,9 +278,9 @@ fn flatten(path: &str, value: &toml::Value, into: &mut BTreeMap<String, String>)
     }
 }
 
-/// One row of a table of results.
+/// A row of a table of results.
 struct Row {
-    /// The frame, and the attempt's place in it.
+    /// The frame, and the index of the attempt in it.
     key: (u64, u64),
     trial: String,
     object: String,
@@ -292,13 +293,13 @@ impl Row {
     }
 }
 
-/// A table of results, read row by row, a trial at a time.
+/// A reader of a table of results, row by row for one trial at a time.
 struct Table {
     file: PathBuf,
     input: BufReader<File>,
     line: usize,
     columns: Vec<String>,
-    /// Where the rows of each trial begin: byte, and lines before. They stand together.
+    /// The position of each trial's rows: byte offset, and number of lines before. They are contiguous.
     starts: BTreeMap<String, (u64, usize)>,
     trial: Option<String>,
     last: Option<(u64, u64)>,
@@ -325,7 +326,7 @@ impl Table {
         }
     }
 
-    /// Goes to the rows of a trial; of none there are none.
+    /// Moves to the rows of a trial; without a trial there are none.
     fn begin(&mut self, trial: Option<&str>) -> Result<(), Fault> {
         self.last = None;
         let start = trial.and_then(|trial| Some((trial.to_owned(), *self.starts.get(trial)?)));
@@ -358,7 +359,8 @@ impl Table {
         let Some(trial) = self.trial.clone() else { return Ok(None) };
         let Some(cells) = self.cells()? else { return Ok(None) };
         if cells.len() != self.columns.len() {
-            let fault = Fault::new(format!("{} cells under {} heads", cells.len(), self.columns.len()), &self.file);
+            let fault =
+                Fault::new(format!("{} cells in a table of {} columns", cells.len(), self.columns.len()), &self.file);
             return Err(fault.on_line(self.line));
         }
         if self.cell(&cells, "trial") != trial {
@@ -367,7 +369,7 @@ impl Table {
         }
         let frame = self.cell(&cells, "frame").parse::<u64>().map_err(|_| {
             let value = format!("{trial} frame {}", self.cell(&cells, "frame"));
-            Fault::new("a row of no frame", &self.file).on_line(self.line).value(value)
+            Fault::new("a row without a frame number", &self.file).on_line(self.line).value(value)
         })?;
         let object = self.cell(&cells, "object").to_owned();
         let attempt = self.last.filter(|(at, _)| *at == frame).map_or(0, |(_, attempt)| attempt + 1);
@@ -376,7 +378,7 @@ impl Table {
     }
 }
 
-/// The fields of a line (RFC 4180); names of trials and objects hold no line ends.
+/// The fields of a line (RFC 4180); names of trials and objects have no line breaks.
 fn cells(line: &str) -> Vec<String> {
     let mut cells = vec![String::new()];
     let mut quoted = false;
@@ -419,7 +421,7 @@ mod tests {
             trial("2", &[("solver", "x"), ("range", "2"), ("seed", "3")]),
             trial("3", &[("solver", "x"), ("range", "5"), ("seed", "3")]),
         ];
-        // The seed varies in neither: it is a difference, and parts nothing.
+        // The seed varies in neither run: it is a difference and does not pair trials.
         assert_eq!(pairs(&a, &b), [(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))]);
         assert_eq!(pairs(&b, &a), [(Some(0), Some(1)), (Some(1), Some(0)), (Some(2), None)]);
         let run_inputs = |trials| RunInputs { inputs: BTreeMap::new(), trials };
@@ -432,7 +434,7 @@ mod tests {
         .map(|change| format!("{} {:?} {:?}", change.what, change.first, change.second))
         .collect();
         assert_eq!(said, ["seed None Some(\"3\")", "trials Some(\"2\") Some(\"3\")", "trial 3 None Some(\"there\")"]);
-        // Of trials that are alike the first belongs to the first.
+        // The first of several identical trials is paired with the first.
         let same = [trial("1", &[]), trial("2", &[])];
         assert_eq!(pairs(&same, &same), [(Some(0), Some(0)), (Some(1), Some(1))]);
     }

@@ -1,4 +1,4 @@
-//! The experiment file, and its resolution into trials.
+//! Experiment files and their resolution into trials.
 
 use std::{
     io::Read as _,
@@ -23,30 +23,30 @@ use crate::{
     sweep::{self, Cell},
 };
 
-/// An experiment as its file says it: one question, a source, a pipeline, what varies.
+/// An experiment file: a question, a source, a pipeline, and the settings that vary.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
-    /// The question, in one English sentence.
+    /// The question, an English sentence.
     pub question: String,
-    /// The seed that every random number of the experiment comes from.
+    /// The seed of all random numbers of the experiment.
     #[serde(default)]
     pub seed: u64,
-    /// The whole is done so many times, with seeds of their own: every method sees the same frames each time.
+    /// The number of repetitions with different seeds; all trials of a repetition see the same frames.
     #[serde(default = "once", skip_serializing_if = "is_once")]
     pub repetitions: u32,
-    /// Where the frames come from.
+    /// The source of the frames.
     pub source: Choice,
-    /// The way from a frame to a fix.
+    /// The pipeline from a sensor frame to a fix.
     #[serde(default)]
     pub pipeline: Pipeline,
-    /// The way from fix to fix; without it every frame is by itself.
+    /// The navigation between fixes; without it every frame is processed separately.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub navigation: Option<Navigation>,
-    /// What is logged besides the results.
+    /// The content of the logs.
     #[serde(default, skip_serializing_if = "Logging::is_default")]
     pub log: Logging,
-    /// What varies; the grid of all its values gives the trials.
+    /// The axes of the grid; each point of the grid is a trial.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vary: Vec<Axis>,
 }
@@ -60,14 +60,14 @@ fn is_once(repetitions: &u32) -> bool {
 }
 
 impl Experiment {
-    /// What varies: the seed first, where the whole is repeated.
+    /// The axes of the grid, with the seed first if there are repetitions.
     fn axes(&self) -> Vec<Axis> {
         let seeds = (0..u64::from(self.repetitions)).map(|k| toml::Value::Integer((self.seed + k) as i64)).collect();
         let repeated = (self.repetitions > 1).then(|| Axis::listed("seed", seeds));
         repeated.into_iter().chain(self.vary.iter().cloned()).collect()
     }
 
-    /// Every setting that nothing can be built from.
+    /// All invalid settings.
     fn invalid(&self) -> Vec<InvalidSetting> {
         let source = SOURCES.faults(&self.source).into_iter().map(|error| InvalidSetting::new(&["source"], error));
         let pipeline = self.pipeline.invalid().into_iter().map(InvalidSetting::pipeline);
@@ -75,7 +75,7 @@ impl Experiment {
         source.chain(pipeline).chain(navigation).collect()
     }
 
-    /// The experiment that a data set alone is: exactly one pipeline, the default.
+    /// The experiment for a data set: the default pipeline on all of its frames.
     pub fn of_dataset(folder: &Path, name: &str) -> Self {
         Self {
             question: format!("How well does the default pipeline reference {name}?"),
@@ -89,7 +89,7 @@ impl Experiment {
         }
     }
 
-    /// It as a file says it.
+    /// The experiment as TOML.
     pub(crate) fn to_toml(&self) -> String {
         toml::to_string(self).expect("an experiment is a table of plain values")
     }
@@ -104,43 +104,43 @@ impl Experiment {
     }
 }
 
-/// A resolved experiment: its trials, built and ready to run.
+/// A resolved experiment with its trials, ready to run.
 #[derive(Debug)]
 pub struct Plan {
-    /// A short name: that of the file or folder.
+    /// The short name: that of the file or folder.
     pub name: String,
     /// The folder that relative paths start from.
     pub folder: PathBuf,
     /// The command that runs it.
     pub command: String,
-    /// What the experiment asks, and its axes.
+    /// The experiment with its axes.
     pub experiment: Experiment,
     /// One trial for each point of the grid.
     pub trials: Vec<Trial>,
 }
 
-/// One resolved configuration.
+/// A trial: one resolved configuration.
 #[derive(Debug)]
 pub struct Trial {
-    /// Its name: a number and what distinguishes it.
+    /// The name: a number and the trial's values on the axes.
     pub name: String,
-    /// Its value on each axis.
+    /// The value on each axis.
     pub cell: Vec<AxisValue>,
-    /// The resolved experiment of this trial alone, nothing varying: running it gives this trial again.
+    /// The resolved experiment of this trial without axes; running it reproduces the trial.
     pub resolved: Experiment,
-    /// Where its frames come from.
+    /// The source of the frames.
     pub source: Box<dyn Source>,
-    /// Its pipeline.
+    /// The pipeline.
     pub stages: PipelineStages,
-    /// What navigates between its fixes, where anything does.
+    /// The navigation stack, if the experiment navigates.
     pub navigation_stack: Option<NavigationStack>,
 }
 
-/// A setting that no component can be built from, and its path in the file.
+/// An invalid setting with its path in the file.
 struct InvalidSetting {
     path: Vec<String>,
     part: Part,
-    /// The component that was meant by a name that none has.
+    /// The existing component whose name is closest to an unknown name.
     near: Option<&'static str>,
     message: String,
 }
@@ -152,7 +152,7 @@ impl InvalidSetting {
         Self { path, part: error.part(), near: error.near(), message: error.to_string() }
     }
 
-    /// What is said of this part of the setting at `path`.
+    /// The fault `message` for this part of the setting at `path`.
     fn of(path: &[&str], part: Part, message: String) -> Self {
         Self { path: path.iter().map(|&step| step.to_owned()).collect(), part, near: None, message }
     }
@@ -175,7 +175,8 @@ impl InvalidSetting {
         }
     }
 
-    /// It where the file has it: on the axis that sets it, at the point `cell` of the grid, or where the experiment itself does.
+    /// The fault at its place in the file: on the axis that sets it for the grid point `cell`, otherwise in the
+    /// experiment itself.
     fn fault(&self, experiment: &Experiment, cell: &Cell, texts: &Texts) -> Fault {
         let (path, part) = sweep::written(&experiment.vary, cell, &self.path, self.part)
             .unwrap_or_else(|| (self.path.clone(), self.part));
@@ -184,27 +185,28 @@ impl InvalidSetting {
     }
 }
 
-/// The steps of a dotted key with places in lists: `lamps[1].aim` is `lamps`, `1`, `aim`.
+/// The parts of a dotted key with list indices: `lamps[1].aim` is `lamps`, `1`, `aim`.
 fn steps(key: &str) -> impl Iterator<Item = String> {
     key.split(['.', '[', ']']).filter(|step| !step.is_empty()).map(str::to_owned)
 }
 
 impl Plan {
-    /// What the run is called: the experiment's name, and a number that changes with any of its settings.
+    /// The id of the run: the experiment's name, and a hash of its settings.
     pub(crate) fn id(&self) -> String {
         let settings: String = self.trials.iter().map(|trial| trial.resolved.to_toml()).collect();
         format!("{}-{}", self.name, &hex(&Sha256::hash(settings.as_bytes()))[..8])
     }
 
-    /// Reads an experiment file, or takes a data set's folder for an experiment of its own; then
-    /// gives each of `settings`, `key=value` with a dotted key and a TOML value, the last word.
+    /// Reads an experiment file, or makes an experiment from a data set's folder, and applies `settings`.
+    ///
+    /// Each setting is `key=value` with a dotted key and a TOML value; it overrides the file.
     ///
     /// # Errors
-    /// Everything that is wrong with the file, with its lines, or with the settings.
+    /// All faults of the file, with their lines, and of the settings.
     pub fn read(path: &Path, settings: &[String]) -> Result<Self, Vec<Fault>> {
         let name = path.file_stem().map_or_else(|| "run".to_owned(), |stem| stem.to_string_lossy().into_owned());
         if path.is_dir() {
-            // A name even for `.`; the path itself stays as it was given.
+            // The canonical path has a name even for `.`; messages keep the path as given.
             let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
             let name = real.file_name().map_or(name, |name| name.to_string_lossy().into_owned());
             let experiment = changed(Experiment::of_dataset(path, &name), settings)?;
@@ -225,13 +227,13 @@ impl Plan {
             Ok(_) => {}
             Err(more) => faults.extend(more),
         }
-        // In the order of the file; what two ways of looking found is one fault.
+        // Faults are sorted by their place in the file; the same fault found twice is reported once.
         faults.sort_by_key(|fault| (fault.file != path, fault.line, fault.column));
         faults.dedup();
         Err(faults)
     }
 
-    /// The plan of an experiment that `file` holds, as `texts` write it; relative paths start from `folder`.
+    /// The plan of the experiment in `file` with its texts `texts`; relative paths start from `folder`.
     pub(crate) fn resolve(
         experiment: Experiment,
         name: &str,
@@ -245,17 +247,19 @@ impl Plan {
         let invalid = experiment.invalid();
         faults.extend(invalid.iter().map(|invalid| invalid.fault(&experiment, &Vec::new(), texts)));
         if experiment.question.trim().is_empty() {
-            faults.push(fault(&["question"], "no question").remedy("say in one sentence what the experiment asks"));
+            faults.push(
+                fault(&["question"], "no question").remedy("state the question of the experiment in one sentence"),
+            );
         }
         if experiment.seed > i64::MAX as u64 - u64::from(experiment.repetitions) {
-            faults.push(fault(&["seed"], "a seed too large").remedy("TOML holds integers up to 2^63 - 1"));
+            faults.push(fault(&["seed"], "a seed too large").remedy("give at most 2^63 - 1, the limit of TOML"));
         }
         if experiment.repetitions == 0 {
-            faults.push(fault(&["repetitions"], "no repetition").remedy("1 does it once"));
+            faults.push(fault(&["repetitions"], "no repetition").remedy("give 1 or more"));
         }
         if experiment.repetitions > 1 && experiment.vary.iter().any(|axis| axis.key == "seed") {
-            let remedy = "leave out one of repetitions and the axis `seed`";
-            faults.push(fault(&["repetitions"], "the seed varies already").remedy(remedy));
+            let remedy = "remove `repetitions` or the axis `seed`";
+            faults.push(fault(&["repetitions"], "repetitions beside an axis `seed`").remedy(remedy));
         }
         if !faults.is_empty() {
             faults.extend(experiment.faults_of_axes(&invalid, folder, texts));
@@ -270,11 +274,11 @@ impl Plan {
 }
 
 impl Experiment {
-    /// What is wrong with values of axes, looked at one by one, where something else is wrong too: that is left out.
+    /// The faults of axis values, checked one by one without the settings in `invalid`.
     fn faults_of_axes(&self, invalid: &[InvalidSetting], folder: &Path, texts: &Texts) -> Vec<Fault> {
         let mut table = toml::Table::try_from(self).expect("an experiment is a table of plain values");
         let mut source_is_known = true;
-        // Of lists the last first, so that the others keep their places.
+        // List elements are removed from the last to the first, so that indices stay valid.
         for InvalidSetting { path, near, .. } in invalid.iter().rev() {
             let is_name = path.last().is_some_and(|last| last == "name");
             match (&path[..], near) {
@@ -298,7 +302,7 @@ impl Experiment {
     }
 }
 
-/// Puts a component's right name in the place of the wrong one.
+/// Replaces an unknown component name by the closest existing one.
 fn rename(table: &mut toml::Table, path: &[String], near: &str) {
     let Some((first, below)) = path.split_first() else { return };
     let place =
@@ -308,7 +312,7 @@ fn rename(table: &mut toml::Table, path: &[String], near: &str) {
     }
 }
 
-/// The trials of these points of the grid, or what is wrong with all of them.
+/// The trials of these points of the grid, or all of their faults.
 fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts) -> Result<Vec<Trial>, Vec<Fault>> {
     let base = experiment.resolved().map_err(|invalid| vec![invalid.fault(experiment, &Vec::new(), texts)])?;
     let base = Experiment { vary: Vec::new(), repetitions: 1, ..base };
@@ -317,7 +321,7 @@ fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts
     for (index, cell) in grid.into_iter().enumerate() {
         match trial(&base, index, &cell, folder) {
             Ok(trial) => trials.push(trial),
-            // A fault of an axis is that of many points.
+            // A fault of an axis value occurs at many points of the grid.
             Err(invalid) => {
                 for fault in invalid.iter().map(|invalid| invalid.fault(experiment, &cell, texts)) {
                     if !faults.contains(&fault) {
@@ -330,7 +334,7 @@ fn trials(experiment: &Experiment, grid: Vec<Cell>, folder: &Path, texts: &Texts
     if faults.is_empty() { Ok(trials) } else { Err(faults) }
 }
 
-/// The experiment `base` with what one point of the grid sets; without the settings that no experiment has, which are told.
+/// The experiment `base` with the settings of one grid point. Unknown settings are skipped and returned as faults.
 fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<InvalidSetting>) {
     let settings = || cell.iter().flat_map(|place| &place.set);
     let with = |table: &toml::Table, key: &str, value: &toml::Value| -> Result<toml::Table, InvalidSetting> {
@@ -343,7 +347,7 @@ fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<InvalidSettin
     if let Some(experiment) = all.ok().and_then(|table| table.try_into().ok()) {
         return (Some(experiment), Vec::new());
     }
-    // One after the other, to know which it is.
+    // Settings are applied one by one to identify the invalid one.
     let (mut table, mut invalid) = (base.clone(), Vec::new());
     for (key, value) in settings() {
         let read = with(&table, key, value).and_then(|more| match more.clone().try_into::<Experiment>() {
@@ -364,7 +368,7 @@ fn at(base: &toml::Table, cell: &Cell) -> (Option<Experiment>, Vec<InvalidSettin
     (table.try_into().ok(), invalid)
 }
 
-/// The trial at one point of the grid, or everything that is wrong with it.
+/// The trial at one point of the grid, or all of its faults.
 fn trial(base: &toml::Table, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, Vec<InvalidSetting>> {
     let (trial, mut invalid) = at(base, cell);
     invalid.extend(trial.iter().flat_map(Experiment::invalid));
@@ -374,7 +378,7 @@ fn trial(base: &toml::Table, index: usize, cell: &Cell, folder: &Path) -> Result
     }
 }
 
-/// The trial that a sound experiment is.
+/// Builds the trial of a valid experiment.
 fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<Trial, InvalidSetting> {
     let invalid = |message: String, path: &[&str]| InvalidSetting::of(path, Part::Value, message);
     let mut trial = trial.resolved()?;
@@ -384,7 +388,7 @@ fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<
     let stages = trial.pipeline.build().map_err(InvalidSetting::pipeline)?;
     if stages.needs_pixels() && !source.has_pixels() {
         let (solver, source) = (&trial.pipeline.solver.name, &trial.source.name);
-        let what = format!("solver `{solver}` needs pixels, which source `{source}` has not; use `mahalanobis`");
+        let what = format!("solver `{solver}` needs pixels, which source `{source}` does not have; use `mahalanobis`");
         return Err(invalid(what, &["pipeline", "solver"]));
     }
     let navigation_stack = trial.navigation.as_ref().map(Navigation::build).transpose();
@@ -392,12 +396,12 @@ fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<
     if navigation_stack.as_ref().is_some_and(NavigationStack::listens) && !source.may_have_readings() {
         let source = &trial.source.name;
         let what = format!(
-            "goes by a Doppler log and a gyro, which source `{source}` has not; use `stereo`, or the source `dive`"
+            "needs a Doppler log and a gyro, which source `{source}` does not have; use `stereo`, or the source `dive`"
         );
         return Err(invalid(what, &["navigation", "odometry"]));
     }
     if navigation_stack.is_some() && trial.pipeline.target != TargetKind::Object {
-        let what = "navigation goes from object to object; use target = \"object\"".to_owned();
+        let what = "navigation needs single objects as targets; use target = \"object\"".to_owned();
         return Err(invalid(what, &["pipeline", "target"]));
     }
     Ok(Trial {
@@ -410,9 +414,9 @@ fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<
     })
 }
 
-/// What a file is that is no experiment, by how it begins.
+/// The fault of a file of another kind, recognised by its first bytes.
 fn another_kind(path: &Path) -> Option<Fault> {
-    // Reading a pipe would take its beginning away.
+    // Reading a pipe would consume its beginning.
     if !std::fs::metadata(path).is_ok_and(|file| file.is_file()) {
         return None;
     }
@@ -429,12 +433,12 @@ fn another_kind(path: &Path) -> Option<Fault> {
     bag.then(|| fault.value(looks_like(&start)).remedy(format!("then write an experiment file with {source}")))
 }
 
-/// The experiment with some of its settings changed from the command line.
+/// The experiment with `settings` from the command line.
 fn changed(experiment: Experiment, settings: &[String]) -> Result<Experiment, Vec<Fault>> {
     if settings.is_empty() {
         return Ok(experiment);
     }
-    // Components are written out first, so that a setting of a default component can be changed.
+    // Defaults are written out first, so that a setting of a default component can be changed.
     sweep::changed(&experiment.resolved().unwrap_or(experiment), settings, "pipeline.solver=triad")
 }
 
@@ -480,7 +484,7 @@ mod tests {
         assert_eq!(names, ["001-camera-near", "002-camera-far"]);
         let settings = &plan_of.trials[1].resolved.source.settings;
         assert_eq!((settings["distance"].as_float(), settings["rig"]["focal"].as_float()), (Some(5.0), Some(800.0)));
-        assert!(plan(&text.replace("'far'", "'near'")).unwrap_err().contains("two cases of one name"));
+        assert!(plan(&text.replace("'far'", "'near'")).unwrap_err().contains("two cases with the same name"));
         assert!(
             plan(&text.replace("key = 'camera'", "key = 'camera'\nvalues = [1]")).unwrap_err().contains("and cases")
         );

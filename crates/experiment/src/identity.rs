@@ -1,8 +1,8 @@
-//! The identity of a run: a hash of everything its untimed bytes depend on.
+//! The identity of a run: a hash of everything that determines its results.
 //!
-//! It covers the resolved configuration of every trial and all else that its log begins with, the SHA-256 of every input
-//! file, the version of every component that the trials use, and the versions of the code that all of them share. It covers
-//! neither the commit nor the machine: two runs of one identity have the same results.
+//! It covers the resolved configuration of every trial and the rest of its log header, the SHA-256 of every input file,
+//! the versions of all components in use, and the versions of the shared code. It covers neither commit nor machine:
+//! two runs with the same identity have the same results.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -20,28 +20,28 @@ use seafix_data::{dataset::hex, source::SOURCES};
 
 use crate::{Plan, Trial, manifest::Input, run::Group};
 
-/// Versions of the code that no component owns. Raise one with every change of that code that alters a result for some
-/// input; `tests/versions.rs` fails where a result changed and no version did.
+/// The versions of the code outside of components. A change that alters a result for some input raises one;
+/// `tests/versions.rs` fails if a result changed without a new version.
 pub const SHARED: [SharedPart; 8] = [
-    // Cameras, rigs, distortion, transforms, covariances.
+    // Cameras, rigs, distortion, transforms and covariances.
     SharedPart { name: "geometry", version: 1, used: |_| true },
-    // Candidates, gates, tolerance, acceptance tests, integrity, joint fixes.
+    // Candidates, gates, tolerance, acceptance tests, integrity and joint fixes.
     SharedPart { name: "acceptance", version: 1, used: |_| true },
-    // Errors, rates, bounds; the comparison with truth.
+    // Errors, rates and bounds; the comparison with truth.
     SharedPart { name: "evaluation", version: 1, used: |_| true },
-    // What is logged of a frame, and which frames are.
+    // The logged quantities and the choice of logged frames.
     SharedPart { name: "log", version: 1, used: |_| true },
     // The order of the stages on a stereo pair.
     SharedPart { name: "front-end", version: 1, used: |used| used.images },
-    // The navigator, the pose graph, key frames.
+    // The navigator, the pose graph and key frames.
     SharedPart { name: "navigation", version: 1, used: |used| used.navigates },
-    // Sites, dives, sensors, noisy points, problems, random streams.
+    // Sites, dives, sensors, noisy points, problems and random streams.
     SharedPart { name: "simulation", version: 1, used: |used| used.simulated },
     // Images of dives and of the virtual site.
     SharedPart { name: "renderer", version: 1, used: |used| used.simulated && used.images },
 ];
 
-/// A part of the code that components share, and the version of its results.
+/// A part of the shared code with the version of its results.
 #[derive(Debug, Clone, Copy)]
 pub struct SharedPart {
     /// The name of the part.
@@ -51,7 +51,7 @@ pub struct SharedPart {
     used: fn(&Used) -> bool,
 }
 
-/// The parts of the method that a trial uses.
+/// The parts of the code that a trial uses.
 struct Used {
     images: bool,
     labelled: bool,
@@ -59,7 +59,7 @@ struct Used {
     simulated: bool,
 }
 
-/// All components, a list for each kind, in the order in which a frame meets them.
+/// All components, one list for each kind, in the order of the pipeline.
 pub fn components() -> Vec<Vec<Listing>> {
     fn of<T: ?Sized>(registry: &Registry<T>) -> Vec<Listing> {
         registry.listings()
@@ -86,7 +86,7 @@ static ALL: LazyLock<Vec<Listing>> = LazyLock::new(|| components().concat());
 /// The version of every component and shared part, by `solver kabsch` or `shared geometry`.
 pub(crate) type Versions = BTreeMap<String, u32>;
 
-/// The versions of all that the trials of a plan use.
+/// The versions of everything that the trials of a plan use.
 pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
     let mut versions = Versions::new();
     for (group, input) in groups.iter().zip(inputs) {
@@ -95,7 +95,7 @@ pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
                 images: group.sequence.images(),
                 labelled: group.sequence.labelled(),
                 navigates: trial.navigation_stack.is_some(),
-                // Recordings are files, simulations are settings.
+                // A recording has input files, a simulation has none.
                 simulated: input.files.is_empty(),
             };
             versions.extend(of_trial(trial, &used));
@@ -121,14 +121,15 @@ fn of_trial(trial: &Trial, used: &Used) -> Versions {
     found.versions
 }
 
-/// The components among some settings, however deep.
+/// The components in a tree of settings.
 ///
-/// A setting chooses a component by its name, alone or in a table as `name`. Where the setting's key does not tell the kind, a
-/// name that several kinds have counts for each of them: a run that is made again without need is the lesser evil.
+/// A setting chooses a component by its bare name, or by `name` in a table. If the setting's key does not determine the
+/// kind, a name that several kinds have counts for all of them: an unnecessary repetition of a run does less harm than
+/// a stale result.
 #[derive(Default)]
 struct Found {
     versions: Versions,
-    /// Components whose defaults were looked at.
+    /// The components whose defaults have been searched.
     defaults: BTreeSet<(&'static str, &'static str)>,
 }
 
@@ -146,7 +147,7 @@ impl Found {
         }
     }
 
-    /// The components of a name, and those among the defaults that `settings` leave.
+    /// Adds the components of this name, and those among the defaults that `settings` do not override.
     fn component(&mut self, key: &str, name: &str, settings: &toml::Table) {
         let reported = match key {
             "filters" => Some("filter"),
@@ -167,7 +168,7 @@ impl Found {
 /// The identity of a run.
 pub(crate) fn identity(plan: &Plan, groups: &[Group<'_>], inputs: &[Input], versions: &Versions) -> String {
     let mut hash = Sha256::new();
-    // A length before every part keeps two parts from passing for others of the same joined text.
+    // The length in front of every part prevents two lists of parts from giving the same text.
     let mut add = |text: &str| {
         hash.update((text.len() as u64).to_le_bytes());
         hash.update(text);
@@ -184,7 +185,7 @@ pub(crate) fn identity(plan: &Plan, groups: &[Group<'_>], inputs: &[Input], vers
     for group in groups {
         add(&group.sequence.frames().to_string());
         for header in &group.headers {
-            // The commit and the package are no part of a result.
+            // The commit and the package do not affect results.
             add(&format!("{:?}", TrialHeader { versions: Vec::new(), ..header.clone() }));
         }
     }
@@ -238,7 +239,7 @@ mod tests {
         {
             assert!(of_images.contains_key(part), "no {part} in {of_images:?}");
         }
-        // The descriptor's kind is known by its key, although a detector has the same name.
+        // The key determines the kind `descriptor`, although a detector has the same name.
         assert!(of_images.contains_key("descriptor surf") && !of_images.contains_key("detector surf"));
         assert!(!of_images.contains_key("shared navigation"));
     }
@@ -253,7 +254,7 @@ mod tests {
         for part in parts {
             assert!(owned.contains_key(part), "no {part} in {owned:?}");
         }
-        // Chosen by its name alone, a component brings what its defaults own.
+        // A component chosen by its bare name includes the components of its defaults.
         let mut found = Found::default();
         found.visit("odometry", &toml::Value::from("stereo"));
         assert!(found.versions.contains_key("solver p3p-stereo"), "{:?}", found.versions);
@@ -264,7 +265,7 @@ mod tests {
     fn all_that_a_result_depends_on_is_in_the_identity() {
         let of = |text: &str, change: &dyn Fn(&mut Vec<Input>, &mut Versions)| {
             let mut plan = plan(text);
-            // The command stands in the logs, and names a folder that is another at each call.
+            // The command is part of the logs and contains a temporary folder.
             plan.command.clear();
             let groups = open(&plan, false).unwrap();
             let files = BTreeMap::from([("a.csv".to_owned(), "12".to_owned())]);
@@ -278,7 +279,7 @@ mod tests {
         let version = of(POINTS, &|_, versions| *versions.get_mut("solver stereo-reprojection").unwrap() += 1);
         let input = of(POINTS, &|inputs, _| drop(inputs[0].files.insert("a.csv".to_owned(), "13".to_owned())));
         let seed = of(&format!("seed = 1\n{POINTS}"), &|_, _| {});
-        let setting = of(&format!("{POINTS}[pipeline]\nwiden = true\n"), &|_, _| {});
+        let setting = of(&format!("{POINTS}[pipeline]\nexpand-gates = true\n"), &|_, _| {});
         let question = of(&POINTS.replace("why", "how"), &|_, _| {});
         let all = BTreeSet::from([same, version, input, seed, setting, question]);
         assert_eq!(all.len(), 6);

@@ -1,4 +1,4 @@
-//! What the vehicle is there for: where it has the points of interest, against where they are.
+//! Errors of the points of interest: estimated against true positions in the camera frame.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Object, Point, StereoRig, Transform, World};
@@ -9,11 +9,11 @@ use seafix_referencing::{Interest, Outcome, Site, TargetKind};
 use seafix::{FrameResult, NavigationState};
 use seafix_data::source::Truth;
 
-/// The points of interest that truly lie in both images and are turned towards the left camera.
+/// The points of interest in both true images and facing the left camera.
 ///
-/// What is believed comes from the navigated pose, and without navigation from the fix of the point's own object, else
-/// from the first of the frame: e = camera_from_object_est · p − camera_from_object_true · p. To an object that is not
-/// the pose's own it goes by the survey, whose errors it then has. What hides a point is not looked for.
+/// Their error is e = camera_from_object_est · p − camera_from_object_true · p. The estimate is the navigated pose;
+/// without navigation it is the fix of the point's own object, otherwise the first fix of the frame. The pose of
+/// another object follows by the survey and has the survey's errors. Occlusion is not considered.
 pub(crate) fn poi(
     truth: &Truth,
     site: &Site,
@@ -54,12 +54,12 @@ pub(crate) fn poi(
     points
 }
 
-/// Whether the side that is to be looked at is turned towards a place, object frame.
+/// Whether a point of interest faces a position in the object frame.
 fn turned(interest: &Interest, camera: &Point<Object>) -> bool {
     interest.normal.is_none_or(|normal| normal.dot(&(*camera - interest.at)) > 0.0)
 }
 
-/// The pose relative to `object` that is known after a frame.
+/// The estimated pose relative to `object` after a frame.
 fn object_pose(
     object: usize,
     site: &Site,
@@ -67,7 +67,7 @@ fn object_pose(
     frame_result: &FrameResult,
     navigation_state: Option<&NavigationState>,
 ) -> Option<ObjectPose> {
-    // The object whose frame a target's pose is in.
+    // The object whose frame the pose of a target refers to.
     let own = |target: usize| if kind == TargetKind::Site { site.frame } else { target };
     let known = match navigation_state {
         Some(navigation_state) => {

@@ -1,4 +1,4 @@
-//! Where an answer meets the truth: after the method is done, and nowhere else.
+//! The only place where results and ground truth meet, after the pipeline has finished.
 
 use nalgebra::Vector3;
 use seafix_evaluation::{
@@ -14,21 +14,21 @@ use seafix_data::{log_conversion, source::Truth};
 
 use crate::inspect;
 
-/// A pair is correct when its cloud point shows within this distance (px) of the true projections.
+/// The maximum distance (px) between a correct pair's cloud point and its model point's true projections.
 const CORRECT_PX: f64 = 2.0;
 
-/// A target with the truth about it at one instant.
+/// A target with its ground truth at one instant.
 struct TrueTarget<'a> {
     target: &'a Target,
-    /// The true place of the target's frame.
+    /// The true pose of the target's frame.
     world_from_object: Transform<World, Object>,
-    /// The true place of each of its points, camera frame; an object of its own may be displaced.
+    /// The true position of each of its points in the camera frame; single objects may be displaced.
     points: Vec<Point<Camera>>,
-    /// Which of them both cameras see; `None` where nobody knows.
+    /// The visibility of its points to both cameras; `None` if unknown.
     visible: Option<Vec<bool>>,
 }
 
-/// What a trial is judged by: the truth of an instant, and what it searches for.
+/// The evaluation of a trial: the ground truth of an instant, and the targets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Evaluator<'a> {
     pub(crate) truth: &'a Truth,
@@ -39,7 +39,7 @@ pub(crate) struct Evaluator<'a> {
 }
 
 impl<'a> Evaluator<'a> {
-    /// Fills in the evaluation of every attempt.
+    /// Adds the evaluation of every attempt.
     pub(crate) fn evaluate(
         &self,
         record: &mut FrameRecord,
@@ -72,7 +72,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// Fills in the truth itself, which only a log holds.
+    /// Adds the ground truth, which only a log holds.
     pub(crate) fn annotate(&self, record: &mut FrameRecord) {
         let known: Vec<TrueTarget<'_>> = (0..self.targets.len()).filter_map(|index| self.known(index)).collect();
         record.truth = Some(TruthRecord {
@@ -88,7 +88,7 @@ impl<'a> Evaluator<'a> {
         }
     }
 
-    /// The truth about one target.
+    /// The ground truth of one target.
     fn known(&self, index: usize) -> Option<TrueTarget<'a>> {
         let objects = match self.kind {
             TargetKind::Object | TargetKind::Joint => index..index + 1,
@@ -98,7 +98,7 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// How the navigated poses compare with truth, each relative to its own object.
+/// The errors of the navigated poses, each relative to its own object.
 fn errors(navigation_state: &NavigationState, judge: &Evaluator<'_>) -> NavigationErrors {
     let mut errors = NavigationErrors::default();
     let of = |navigated: &Navigated| {
@@ -156,7 +156,7 @@ fn visible_points(known: &TrueTarget<'_>) -> Vec<VisiblePoint> {
     seen.map(|(point, _)| VisiblePoint { object: known.target.name.clone(), point: point as u32 }).collect()
 }
 
-/// How many of the target's points both cameras see: as the data set says, else those in both images.
+/// The number of the target's points in view of both cameras: by the data set, otherwise by projection.
 fn count_visible(known: &TrueTarget<'_>, rig: &StereoRig) -> Option<u32> {
     let count = match &known.visible {
         Some(mask) => mask.iter().filter(|seen| **seen).count(),
@@ -203,7 +203,7 @@ fn evaluate(
     };
 }
 
-/// Whether the cloud point of `pair` shows where its model point truly is, in both images.
+/// Whether the cloud point of `pair` is at its model point's true projections in both images.
 fn shows_the_point(pair: &Correspondence, known: &TrueTarget<'_>, frame_result: &FrameResult, rig: &StereoRig) -> bool {
     let measured = &frame_result.cloud[pair.cloud];
     let shown: Option<StereoPixels> =

@@ -1,4 +1,4 @@
-//! The file of key frames that an experiment starts from.
+//! The pose graph file that an experiment starts from.
 
 use std::path::Path;
 
@@ -8,10 +8,11 @@ use seafix_component::{Fault, read_long_text};
 use seafix_data::dataset::hex;
 use seafix_navigation::PoseGraph;
 
-/// A network is read up to this length (bytes): some five thousand key frames.
+/// The maximum size of a pose graph file (bytes), about five thousand key frames.
 const MAX: u64 = 1 << 30;
 
-/// Writes down which file is read, where that is not said; a file that cannot be read is told of when it is opened.
+/// Records the hash of the file that is read, unless the settings have one. A file that cannot be read is reported on
+/// opening.
 pub(crate) fn pin(keyframes: &mut Keyframes, folder: &Path) {
     if !keyframes.read.is_empty()
         && keyframes.sha256.is_empty()
@@ -21,10 +22,10 @@ pub(crate) fn pin(keyframes: &mut Keyframes, folder: &Path) {
     }
 }
 
-/// The network that is read, if one is.
+/// Opens the pose graph that the settings name, if there is one.
 ///
 /// # Errors
-/// A file that is no network, or not the one that was meant.
+/// A file without a valid pose graph, or with another hash than expected.
 pub(crate) fn open(keyframes: &Keyframes, folder: &Path) -> Result<Option<PoseGraph>, Fault> {
     if keyframes.read.is_empty() {
         return Ok(None);
@@ -33,14 +34,14 @@ pub(crate) fn open(keyframes: &Keyframes, folder: &Path) -> Result<Option<PoseGr
     let text = read_long_text(&path, MAX)?;
     let found = digest(&text);
     if found != keyframes.sha256 {
-        return Err(Fault::new("another network than the one that was meant", &path)
+        return Err(Fault::new("a pose graph with another SHA-256 than expected", &path)
             .value(format!("sha256 {found}"))
-            .remedy(format!("give the one with {}, or leave `sha256` out", keyframes.sha256)));
+            .remedy(format!("give the file with {}, or remove `sha256`", keyframes.sha256)));
     }
     PoseGraph::read(&path, &text, &keyframes.settings.recognition).map(Some)
 }
 
-/// Of the text, which is what is read: byte order mark and line ends do not count.
+/// The hash of the text; byte order mark and line ends are ignored.
 fn digest(text: &str) -> String {
     hex(&Sha256::hash(text.as_bytes()))
 }

@@ -1,9 +1,9 @@
-//! Experiments: from a question in TOML to logs, results and a manifest.
+//! Experiments: from a question in TOML to results, logs and a manifest.
 //!
-//! An [`Experiment`] asks one English question and says what varies. A [`Plan`] resolves it into
-//! trials; [`run`] opens the [`Source`](seafix_data::source::Source)s, leads every frame through each trial's
-//! [`Pipeline`](seafix::Pipeline), compares with truth where there is truth, and logs it all. Methods and truth meet
-//! in one file, `judge.rs`, after the method has answered.
+//! An [`Experiment`] states a question and the settings that vary. A [`Plan`] resolves it into trials. [`run`] opens
+//! the [`Source`](seafix_data::source::Source)s, processes every frame with each trial's
+//! [`Pipeline`](seafix::Pipeline), compares the result with the ground truth if there is one, and writes the log. Only
+//! `judge.rs` sees both results and ground truth, after the pipeline has finished.
 
 mod diff;
 mod experiment;
@@ -34,7 +34,6 @@ pub use navigation::Navigation;
 pub use odometry_fault::OdometryFault;
 pub use range::{Number, Range};
 pub use replay::{Replay, ReplayFrom};
-pub use results::COLUMNS;
 pub use run::{
     Existing, Finished, Observer, Options, Remade, RunError, RunEstimate, Shard, Silent, estimate, merge, remake, run,
 };

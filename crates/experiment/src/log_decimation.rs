@@ -1,8 +1,9 @@
-//! Which frames of a trial are logged when all of them would be too many.
+//! Decimation of logs: the choice of frames when all would be too many.
 
 use seafix_log::{FrameRecord, Outcome, Totals};
 
-/// Every k-th frame and every failure, as long as they stay within a budget; and what all frames add up to.
+/// A filter for logged frames: every k-th frame, and every failure within a budget. It also accumulates the totals of
+/// all frames.
 #[derive(Debug)]
 pub(crate) struct Thinned {
     pub(crate) totals: Totals,
@@ -10,12 +11,12 @@ pub(crate) struct Thinned {
 }
 
 impl Thinned {
-    /// Logs frames whose number `every` divides, and so many failures besides.
+    /// Logs every frame whose index is a multiple of `every`, and at most `failures` others.
     pub(crate) fn new(every: u64, failures: u64) -> Self {
         Self { totals: Totals { every, ..Totals::default() }, failures }
     }
 
-    /// Counts a frame; whether it is logged.
+    /// Counts a frame and returns whether it is logged.
     pub(crate) fn keeps(&mut self, frame: &FrameRecord) -> bool {
         self.totals.add(frame);
         if frame.frame.is_multiple_of(self.totals.every) {
@@ -34,7 +35,7 @@ impl Thinned {
     }
 }
 
-/// Whether something was refused in a frame, or is wrong.
+/// Whether a target of a frame has no fix or a wrong one.
 pub(crate) fn failed(frame: &FrameRecord) -> bool {
     let failed =
         |target: &seafix_log::TargetRecord| target.outcome != Outcome::Fix || target.evaluation.wrong == Some(true);
@@ -71,7 +72,7 @@ mod tests {
     #[test]
     fn of_many_every_kth_is_kept_and_failures_within_the_budget() {
         let mut thinned = Thinned::new(20, 5);
-        // Frames 0, 20, 40, 60, 80, and the first five of the wrong ones besides.
+        // Kept are frames 0, 20, 40, 60, 80, and the first five wrong ones of the others.
         let kept: Vec<u64> = (0..100).filter(|&number| thinned.keeps(&frame(number, number % 10 == 1))).collect();
         assert_eq!(kept, [0, 1, 11, 20, 21, 31, 40, 41, 60, 80]);
         let totals = &thinned.totals;

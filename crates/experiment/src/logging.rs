@@ -1,41 +1,41 @@
-//! What of a run is logged besides its results.
+//! Settings for the content of logs.
 
 use seafix_log::GreyImage;
 use serde::{Deserialize, Serialize};
 
-/// What is logged of each frame.
+/// The content of a log for each frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Logging {
-    /// Its images.
+    /// The form of the images.
     pub images: ImagesLogged,
 }
 
-/// How images are logged: they are nearly all of a log.
+/// The form of logged images, which make up most of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ImagesLogged {
-    /// As they are: any method can be run on them again.
+    /// Full images, on which any method can be replayed.
     #[default]
     All,
-    /// Small enough to see where the vehicle was.
+    /// Thumbnails of at least 256 columns, enough to see the scene.
     Thumbnails,
-    /// Not at all; clouds and results are logged all the same.
+    /// No images; clouds and results are logged in any case.
     None,
 }
 
-/// Columns of a thumbnail, at least.
+/// The minimum width of a thumbnail (px).
 const COLUMNS: u32 = 256;
 
 impl Logging {
-    /// Whether nothing is said that is not so anyway.
+    /// Whether all settings are defaults.
     pub(crate) fn is_default(&self) -> bool {
         *self == Self::default()
     }
 }
 
 impl ImagesLogged {
-    /// By how much images of so many columns become smaller.
+    /// The factor by which images with this number of columns are reduced.
     pub(crate) fn factor(self, columns: u32) -> u32 {
         match self {
             Self::All | Self::None => 1,
@@ -43,7 +43,7 @@ impl ImagesLogged {
         }
     }
 
-    /// The image as it is logged.
+    /// The logged form of an image.
     pub(crate) fn logged(self, image: GreyImage) -> Option<GreyImage> {
         match self {
             Self::All => Some(image),
@@ -53,7 +53,7 @@ impl ImagesLogged {
     }
 }
 
-/// An image of which each pixel is the mean of `factor`² of the other's.
+/// The image reduced by `factor`: each pixel is the mean of `factor`² pixels.
 fn smaller(image: &GreyImage, factor: u32) -> GreyImage {
     let (width, height) = (image.width / factor, (image.height / factor).max(1));
     let mean = |x: u32, y: u32| {

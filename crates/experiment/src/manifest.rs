@@ -1,4 +1,4 @@
-//! `manifest.json`: what made a run.
+//! The manifest of a run, `manifest.json`.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -22,11 +22,11 @@ use crate::{
 /// The format that this version writes.
 const FORMAT: &str = "seafix-manifest/2";
 
-/// What made a run: enough to make it again and to know whether it would be the same.
+/// The manifest of a run: the information to reproduce it and to compare it with another.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Manifest {
     pub(crate) format: String,
-    /// `running` (or killed), `interrupted`, `finished`; of a part that is to be merged `shard`.
+    /// The state: `running` (or killed), `interrupted`, `finished`, or `shard` for a finished part.
     pub(crate) state: String,
     pub(crate) question: String,
     pub(crate) seafix: String,
@@ -36,28 +36,28 @@ pub(crate) struct Manifest {
     pub(crate) experiment: String,
     pub(crate) trials: Vec<TrialEntry>,
     pub(crate) inputs: Vec<Input>,
-    /// SHA-256 of what was written; empty until the run is finished.
+    /// The SHA-256 of the output files; empty until the run is finished.
     pub(crate) outputs: BTreeMap<String, String>,
     /// Whether durations are logged.
     #[serde(default = "yes")]
     pub(crate) timed: bool,
-    /// Whether every trial computed all of its stages itself; else the durations of stages that trials share are those of
-    /// one computation.
+    /// Whether every trial computed all of its stages. Otherwise shared stages were computed once, and each trial has
+    /// their durations.
     #[serde(default = "yes")]
     pub(crate) separate: bool,
-    /// Into how many pieces the run is cut.
+    /// The number of pieces of the run.
     #[serde(default)]
     pub(crate) pieces: usize,
-    /// Which part of the run this is, as `k/n`.
+    /// The part of the run, as `k/n`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) shard: Option<String>,
-    /// Rows of the tables, once they are there.
+    /// The number of rows of the tables; zero until they are written.
     #[serde(default)]
     pub(crate) rows: usize,
-    /// The hash of everything that the results depend on; empty in a manifest before 1.2.
+    /// The hash of everything that determines the results; empty in a manifest before 1.2.
     #[serde(default)]
     pub(crate) identity: String,
-    /// The versions of the components and of the shared code that the results depend on.
+    /// The versions of the components and of the shared code.
     #[serde(default)]
     pub(crate) versions: Versions,
 }
@@ -66,7 +66,7 @@ fn yes() -> bool {
     true
 }
 
-/// One trial of the run.
+/// A trial of the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct TrialEntry {
     pub(crate) name: String,
@@ -79,20 +79,20 @@ pub(crate) struct TrialEntry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Input {
     pub(crate) source: String,
-    /// What was odd about them, pairs left out among it.
+    /// The warnings about them, including skipped pairs.
     #[serde(default)]
     pub(crate) warnings: Vec<String>,
     pub(crate) files: BTreeMap<String, String>,
 }
 
-/// The state of the code, where it was run from a checkout.
+/// The state of the source code, if the program was built in a checkout.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Git {
     pub(crate) commit: Option<String>,
     pub(crate) dirty: Option<bool>,
 }
 
-/// The kind of machine: what times depend on.
+/// The kind of machine, which affects durations.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Machine {
     os: String,
@@ -102,7 +102,7 @@ pub(crate) struct Machine {
 }
 
 impl Manifest {
-    /// What is to be run; nothing is written yet.
+    /// The manifest of a run to be made; nothing is written yet.
     ///
     /// # Errors
     /// An input that cannot be read.
@@ -147,10 +147,10 @@ impl Manifest {
         })
     }
 
-    /// The manifest of the run in `folder`.
+    /// Reads the manifest of the run in `folder`.
     ///
     /// # Errors
-    /// A folder that has none, or one that this version cannot read.
+    /// A folder without a manifest, or one of an unsupported version.
     pub(crate) fn read(folder: &Path) -> Result<Self, Fault> {
         let file = folder.join(NAME);
         let text =
@@ -163,10 +163,10 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Writes it into `folder`, with a new state.
+    /// Writes the manifest into `folder` with a new state.
     pub(crate) fn write(&mut self, folder: &Path, state: &str) -> Result<(), RunError> {
         state.clone_into(&mut self.state);
-        let text = serde_json::to_string_pretty(self).expect("a manifest is plain data") + "\n";
+        let text = serde_json::to_string_pretty(self).expect("a manifest has plain values") + "\n";
         let (file, partial) = (folder.join(NAME), folder.join(format!("{NAME}.partial")));
         let write = || {
             let mut file = std::fs::File::create(&partial)?;
@@ -177,35 +177,33 @@ impl Manifest {
         std::fs::rename(&partial, &file).map_err(|error| RunError::unwritable(&file, error))
     }
 
-    /// What of the files in `folder` is not as the run wrote it, a fault each.
+    /// The faults of output files that differ from the manifest.
     fn changed(&self, folder: &Path) -> Vec<Fault> {
-        let remedy = "`seafix run --overwrite` makes it again";
+        let remedy = "`seafix run --overwrite` repeats the run";
         let fault = |(name, hash): (&String, &String)| {
             let path = folder.join(name);
             if !path.exists() {
-                return Some(Fault::new("a file of the run that is gone", &path).remedy(remedy));
+                return Some(Fault::new("a missing file of the run", &path).remedy(remedy));
             }
             match sha256(&path) {
                 Ok(found) if found == *hash => None,
-                Ok(_) => {
-                    Some(Fault::new("not the file that the run wrote", &path).value("another SHA-256").remedy(remedy))
-                }
+                Ok(_) => Some(Fault::new("a changed file of the run", &path).value("another SHA-256").remedy(remedy)),
                 Err(fault) => Some(fault),
             }
         };
         self.outputs.iter().filter_map(fault).collect()
     }
 
-    /// Whether this run is complete, with all its files, and has the results that `other` would have.
+    /// Whether this run is complete and has the results that `other` would have. All its files must exist.
     pub(crate) fn stands_for(&self, other: &Self, folder: &Path) -> bool {
         let complete = self.state == "finished" && self.outputs.keys().all(|name| folder.join(name).is_file());
         complete && !self.identity.is_empty() && self.identity == other.identity
     }
 
-    /// The reason why `other` is made again in place of this run, for people.
+    /// The reason for a repetition of this run as `other`, as a sentence.
     pub(crate) fn outdated(&self, other: &Self) -> String {
         if self.identity == other.identity {
-            let why = if self.state == "finished" { "a file of it is missing" } else { "it did not end" };
+            let why = if self.state == "finished" { "a file of it is missing" } else { "it was not finished" };
             return why.to_owned();
         }
         let version = |versions: &Versions, part: &String| versions.get(part).map_or("none".to_owned(), u32::to_string);
@@ -221,14 +219,14 @@ impl Manifest {
         reported.collect::<Vec<_>>().join(", ")
     }
 
-    /// What keeps this run from being the same as another: which of the things that the answer depends on differs.
+    /// The first difference of two manifests that can change results.
     pub(crate) fn differs(&self, other: &Self) -> Option<&'static str> {
         let trials = |manifest: &Self| -> Vec<(String, usize)> {
             manifest.trials.iter().map(|trial| (trial.name.clone(), trial.frames)).collect()
         };
         let differing = [
             ("the version of the program", self.seafix != other.seafix || self.format != other.format),
-            ("the commit of the program, or whether it has changes", self.git.contradicts(&other.git)),
+            ("the commit of the program, or its uncommitted changes", self.git.contradicts(&other.git)),
             ("the version of a component", self.versions != other.versions),
             ("the experiment", self.experiment != other.experiment),
             ("the trials", trials(self) != trials(other)),
@@ -236,13 +234,13 @@ impl Manifest {
             ("the inputs", self.inputs != other.inputs),
             ("whether durations are logged", self.timed != other.timed),
             ("whether trials share stages", self.timed && self.separate != other.separate),
-            ("how the run is cut into pieces", self.pieces != other.pieces),
+            ("the partition of the run into pieces", self.pieces != other.pieces),
         ];
         differing.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
     }
 }
 
-/// Everything that is wrong with the run in `folder`: that it did not end, and what of its files is not as it wrote them.
+/// The faults of the run in `folder`: unfinished, or files that differ from its manifest.
 #[must_use]
 pub fn check_run(folder: &Path) -> Vec<Fault> {
     let manifest = match Manifest::read(folder) {
@@ -252,26 +250,26 @@ pub fn check_run(folder: &Path) -> Vec<Fault> {
     if ["finished", "shard"].contains(&&manifest.state[..]) {
         return manifest.changed(folder);
     }
-    let fault = Fault::new("a run that has not ended", folder).value(&manifest.state);
-    vec![fault.remedy("`seafix run --resume` goes on with it, `seafix recover` saves what is there")]
+    let fault = Fault::new("an unfinished run", folder).value(&manifest.state);
+    vec![fault.remedy("`seafix run --resume` resumes it, `seafix recover` recovers the finished part")]
 }
 
-/// The identity of the complete run in `folder`, where there is one and its manifest states it: a hash of everything that its
-/// results depend on.
+/// The identity of the complete run in `folder`, a hash of everything that determines its results; `None` without a
+/// complete run or an identity.
 #[must_use]
 pub fn kept_identity(folder: &Path) -> Option<String> {
     let manifest = Manifest::read(folder).ok()?;
     (manifest.state == "finished" && !manifest.identity.is_empty()).then_some(manifest.identity)
 }
 
-/// Whether `folder` is that of a run.
+/// Whether `folder` holds a run.
 #[must_use]
 pub fn is_run(folder: &Path) -> bool {
     folder.join(NAME).is_file()
 }
 
-/// Logs, tables and networks of the run in `folder` that are not as the run wrote them, by the SHA-256 of its manifest; none
-/// where it has no manifest, or has not ended.
+/// The faults of logs, tables and pose graphs in `folder` whose SHA-256 differs from the manifest; none without the
+/// manifest of a finished run.
 ///
 /// # Errors
 /// A manifest that cannot be read.
@@ -282,7 +280,7 @@ pub fn changed_outputs(folder: &Path) -> Result<Vec<Fault>, Fault> {
     Ok(Manifest::read(folder)?.changed(folder))
 }
 
-/// What is wrong with a folder that has logs and no manifest.
+/// The fault of a folder that has logs and no manifest.
 pub(crate) fn without(folder: &Path) -> Option<Fault> {
     let logs = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path());
     let mut logs: Vec<_> = logs.filter(|path| path.extension().is_some_and(|end| end == "mcap")).collect();
@@ -295,20 +293,19 @@ pub(crate) fn without(folder: &Path) -> Option<Fault> {
     let fault = Fault::new("logs without a manifest", folder).remedy("name the folder of a finished run");
     let first = logs.first()?;
     Some(match lacking(first) {
-        Some(lost) => Fault::new("logs that were saved of a run that is not whole", first)
+        Some(lost) => Fault::new("logs recovered from an incomplete run", first)
             .value(lost)
-            .remedy("`seafix report` and `seafix compare` read them; to have the run, --resume it"),
+            .remedy("use `seafix report` or `seafix compare` on them, or resume the run with --resume"),
         None => fault,
     })
 }
 
-/// The name of its file.
+/// The file name.
 pub(crate) const NAME: &str = "manifest.json";
 
 impl Git {
-    /// The last commit that changed this program, in the checkout it was built in, as that is now, and whether there are
-    /// changes since; nothing for a program that was carried elsewhere. What else a commit changes, reports for instance,
-    /// leaves runs the same.
+    /// The last commit that changed this program, and whether there are uncommitted changes. Both come from the
+    /// checkout of the build and are empty without it. Commits of other files, such as reports, do not affect runs.
     pub(crate) fn here() -> Self {
         static HERE: OnceLock<Git> = OnceLock::new();
         HERE.get_or_init(Self::find).clone()
@@ -331,7 +328,8 @@ impl Git {
         }
     }
 
-    /// Whether both say something, and not the same. What `git` could not tell, short of memory for instance or not
+    /// Whether both are known and differ. An unknown state, for example without `git`, is no difference, so that a run
+    /// can be resumed.
     /// installed, is no difference: it must not keep a run from being resumed.
     fn contradicts(&self, other: &Self) -> bool {
         fn differ<T: PartialEq>(a: Option<&T>, b: Option<&T>) -> bool {

@@ -1,4 +1,4 @@
-//! The `[navigation]` table of an experiment: the navigation of the library, and how its odometry fails.
+//! The `[navigation]` table of an experiment: the library's settings, and faults of the odometry.
 
 use seafix::{Keyframes, NavigationStack, PipelineError, invalid_setting};
 use seafix_component::Choice;
@@ -6,20 +6,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::odometry_fault::OdometryFault;
 
-/// The settings of the navigation between fixes.
+/// The settings of navigation between fixes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Navigation {
-    /// Moves the last fix along.
+    /// The odometry that moves the last fix from frame to frame.
     pub odometry: Choice,
-    /// Decides when a fix is attempted.
+    /// The policy that decides when a fix is due.
     pub policy: Choice,
-    /// Joins a fix to the navigated pose.
+    /// The fusion of a fix with the navigated pose.
     pub fusion: Choice,
-    /// Failures of the odometry, with their times.
+    /// The failures of the odometry, with their times.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<OdometryFault>,
-    /// Key frames where no object is in view; none without it.
+    /// The key frames that support navigation where no object is in view; none if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose_graph: Option<Keyframes>,
 }
@@ -41,31 +41,31 @@ impl Navigation {
         seafix::Navigation { odometry, policy, fusion, pose_graph }
     }
 
-    /// The same with every setting of its components written out.
+    /// The same settings with the defaults of all components written out.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
         Ok(Self::with_faults(self.without_faults().resolved()?, self.faults.clone()))
     }
 
-    /// Every setting that it cannot be built with.
+    /// All faults that keep the navigation stack from being built.
     pub(crate) fn invalid(&self) -> Vec<PipelineError> {
         let mut all = self.without_faults().invalid();
         all.extend(self.unsound());
         all
     }
 
-    /// The faults that are none.
+    /// The faults of the odometry faults' settings.
     fn unsound(&self) -> impl Iterator<Item = PipelineError> {
         let all = self.faults.iter().enumerate().filter_map(|(k, fault)| fault.check(k).err());
         all.map(|message| invalid_setting("faults", message))
     }
 
-    /// Ready to work.
+    /// Builds all components.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn build(&self) -> Result<NavigationStack, PipelineError> {
         self.unsound().next().map_or(Ok(()), Err)?;
         self.without_faults().build()

@@ -1,4 +1,4 @@
-//! An odometry that fails, between what it found and what is navigated by.
+//! Simulated failures of an odometry, applied between odometry and navigator.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Transform, so3};
@@ -6,21 +6,21 @@ use seafix_navigation::RelativeMotion;
 use seafix_simulation::{Purpose, Stream, sensors::FaultKind};
 use serde::{Deserialize, Serialize};
 
-/// Of a slow odometry only every so many-th motion comes.
+/// The interval of motions that a slow odometry gives: every fifth.
 const SLOW: u64 = 5;
 
-/// An odometry that fails for a while, in the words of PX4's failure injection: its motions do not come (`off`, `slow`,
-/// `intermittent`) or are others than it found (`stuck`, `garbage`, `wrong`, `delayed`), with the covariance that it claims.
+/// A temporary failure of the odometry, named as in PX4's failure injection. Motions are missing (`off`, `slow`,
+/// `intermittent`) or wrong (`stuck`, `garbage`, `wrong`, `delayed`), with unchanged covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct OdometryFault {
-    /// How it fails.
+    /// The kind of failure.
     pub kind: FaultKind,
-    /// When it begins, after the first frame (s).
+    /// The time of its beginning since the first frame (s).
     pub from: f64,
-    /// When it ends (s), not before `from`; at `from` it never acts.
+    /// The time of its end (s), not before `from`; with the same value it never acts.
     pub to: f64,
-    /// Seconds of delay, or the probability of a loss.
+    /// The delay (s), or the probability of a loss.
     #[serde(default = "half")]
     pub amount: f64,
 }
@@ -30,7 +30,7 @@ fn half() -> f64 {
 }
 
 impl OdometryFault {
-    /// Whether its numbers are those of a fault.
+    /// Checks the settings.
     ///
     /// # Errors
     /// The first number outside its range: `name = value; give range`.
@@ -43,15 +43,15 @@ impl OdometryFault {
     }
 }
 
-/// The motions of an odometry on their way through its faults.
+/// The motions of an odometry with their faults.
 #[derive(Debug, Default)]
 pub(crate) struct Motions {
-    /// When each pair was taken (s after the first) and the motion that the odometry found to it, the last one last.
+    /// The time of each pair (s since the first) and the odometry's motion to it, in order of time.
     found: Vec<(f64, Option<RelativeMotion>)>,
 }
 
 impl Motions {
-    /// What the navigator is given for the motion to the pair at `time` (s after the first frame).
+    /// The motion to the pair at `time` (s since the first frame) that the navigator receives.
     pub(crate) fn passed(
         &mut self,
         faults: &[OdometryFault],
@@ -77,7 +77,7 @@ impl Motions {
                     motion.map(|local| RelativeMotion { motion: Transform::new(turn, stream.normal3(1.0)), ..local })
                 }
                 FaultKind::Wrong => motion.map(|local| {
-                    // A scale a fifth too large, and a slow turn: what a bumped rig would give.
+                    // A scale error of 20 % and a slow rotation, as of a rig that was hit.
                     let turn = so3::exp(&Vector3::new(0.0, 0.002, 0.002)) * local.motion.rotation();
                     RelativeMotion { motion: Transform::new(turn, local.motion.translation() * 1.2), ..local }
                 }),
@@ -93,13 +93,13 @@ mod tests {
 
     use super::*;
 
-    /// The k-th motion goes k metres.
+    /// The k-th motion, k metres long.
     fn motion(k: u32) -> Option<RelativeMotion> {
         let motion = Transform::new(UnitQuaternion::identity(), Vector3::new(f64::from(k), 0.0, 0.0));
         Some(RelativeMotion::new(motion, Covariance6::isotropic(1e-3, 1e-3)))
     }
 
-    /// The lengths that come of a minute of motions a second while the odometry fails from 20 to 40 s.
+    /// The lengths of one minute's motions at 1 Hz. The odometry fails from 20 to 40 s.
     fn lengths(kind: FaultKind, amount: f64, to: f64) -> Vec<Option<f64>> {
         let faults = [OdometryFault { kind, from: 20.0, to, amount }];
         let mut motions = Motions::default();
@@ -122,7 +122,7 @@ mod tests {
             let failed = lengths(kind, 0.5, 40.0);
             assert_eq!((&failed[..20], &failed[40..]), (&sound[..20], &sound[40..]), "{kind:?}");
             assert_ne!(failed, sound, "{kind:?}");
-            // P72: no time is no fault.
+            // P72: a fault without duration has no effect.
             assert_eq!(lengths(kind, 0.5, 20.0), sound, "{kind:?}");
         }
         let at = |kind, amount, k: usize| lengths(kind, amount, 40.0)[k];
@@ -133,7 +133,7 @@ mod tests {
         assert_eq!((at(FaultKind::Slow, 0.0, 30), at(FaultKind::Slow, 0.0, 31)), (Some(30.0), None));
         let lost = lengths(FaultKind::Intermittent, 0.5, 40.0).iter().filter(|length| length.is_none()).count();
         assert!((4..17).contains(&lost), "{lost}");
-        // P72: no amount is no fault.
+        // P72: a delay of zero has no effect.
         assert_eq!(lengths(FaultKind::Delayed, 0.0, 40.0), sound);
         assert_eq!(lengths(FaultKind::Intermittent, 0.0, 40.0), sound);
     }

@@ -1,4 +1,4 @@
-//! Reading an experiment file, all its faults at once, and the file it is based on.
+//! Parsing of an experiment file and its base, with all faults at once.
 
 use std::{
     ops::Range,
@@ -14,22 +14,22 @@ use toml::{
 
 use crate::Experiment;
 
-/// The texts that an experiment is read from: its own, then that of its base.
+/// The texts of an experiment: its own, then that of its base.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Texts {
     files: Vec<(PathBuf, String)>,
 }
 
 impl Texts {
-    /// One file.
+    /// The texts of a single file.
     pub(crate) fn of(file: &Path, text: &str) -> Self {
         Self { files: vec![(file.to_owned(), text.to_owned())] }
     }
 
-    /// The fault `what` of this part of the setting at `path`, in the file that says it.
+    /// The fault `what` for this part of the setting at `path`, in the file that contains it.
     pub(crate) fn fault(&self, path: &[&str], part: Part, what: &str) -> Fault {
         let places = self.files.iter().map(|(file, text)| (file, place_of(text, path, part)));
-        // Where both say as much, the later word is that of the experiment's own file, which is first.
+        // If both files contain it, the experiment's own file, which is first, has priority.
         let best = places.reduce(|best, next| match (&best.1, &next.1) {
             (Some((depth, _)), Some((deeper, _))) if deeper > depth => next,
             (None, Some(_)) => next,
@@ -42,18 +42,18 @@ impl Texts {
     }
 }
 
-/// An experiment as far as it can be read.
+/// The result of parsing an experiment.
 pub(crate) struct Read {
-    /// It without what is at fault; `None` where nothing is left.
+    /// The experiment without faulty settings; `None` if nothing valid remains.
     pub(crate) experiment: Option<Experiment>,
-    /// What is at fault.
+    /// The faults.
     pub(crate) faults: Vec<Fault>,
-    /// Where it stands.
+    /// The texts, for the places of later faults.
     pub(crate) texts: Texts,
 }
 
-/// The experiment that `file`, whose text is `text`, holds. `base = "other.toml"` names a file whose settings hold where
-/// this one has none of its own.
+/// Parses the experiment in `text`, the content of `file`. `base = "other.toml"` names a file with settings that apply
+/// where this one has none.
 pub(crate) fn experiment(file: &Path, text: &str) -> Read {
     let mut texts = Texts::of(file, text);
     let Below { table: mut full, mut faults, all, files } = below(file, text);
@@ -66,15 +66,11 @@ pub(crate) fn experiment(file: &Path, text: &str) -> Read {
     faults.splice(0..0, reported);
     overlay(&mut full, own);
     for (key, stand_in, remedy) in [
-        ("question", "why?", "say in one sentence what the experiment asks"),
-        (
-            "source",
-            "virtual-points",
-            "say where the frames come from: source = \"NAME\"; `seafix list sources` names them",
-        ),
+        ("question", "why?", "state the question of the experiment in one sentence"),
+        ("source", "virtual-points", "choose a source: source = \"NAME\"; `seafix list sources` lists them"),
     ] {
         if !full.contains_key(key) {
-            // What was at fault has been told already, and what cannot be read may say it.
+            // A setting that is present but faulty, or hidden by a syntax error, is not reported as missing.
             let named = |(_, text): &(PathBuf, String)| place_of(text, &[key], Part::Key).is_some();
             if all && !texts.files.iter().any(named) {
                 faults.push(Fault::new(format!("no `{key}`"), file).remedy(remedy));
@@ -86,20 +82,21 @@ pub(crate) fn experiment(file: &Path, text: &str) -> Read {
     Read { experiment, faults, texts }
 }
 
-/// What lies below an experiment's own settings.
+/// The base of an experiment.
 #[derive(Default)]
 struct Below {
     /// The settings of the base.
     table: toml::Table,
-    /// What is at fault in it, or with it.
+    /// The faults in the base.
     faults: Vec<Fault>,
-    /// Whether nothing else stands below.
+    /// Whether the complete base was parsed.
     all: bool,
-    /// The base, its text, and the text of its own base.
+    /// The base and its text, then those of its own base.
     files: Vec<(PathBuf, String)>,
 }
 
-/// What lies below the experiment that `file` holds. A base of a base is a fault, but read as well: what it says is not missing.
+/// The base of the experiment in `file`. A base of the base is a fault, but is parsed too, so that its settings are not
+/// reported as missing.
 fn below(file: &Path, text: &str) -> Below {
     let Some(base) = written_base(text) else { return Below { all: true, ..Below::default() } };
     let (path, own) = match base_of(file, base.as_deref()) {
@@ -114,7 +111,7 @@ fn below(file: &Path, text: &str) -> Below {
     let mut files = vec![(path.clone(), own.clone())];
     if let Some(second) = written_base(&own) {
         let fault = Texts::of(&path, &own).fault(&["base"], Part::Value, "a base that has a base of its own");
-        faults.push(fault.remedy("an experiment has at most one"));
+        faults.push(fault.remedy("remove one; an experiment has at most one base"));
         let below = base_of(&path, second.as_deref()).ok();
         all = below.as_ref().is_some_and(|(_, text)| written_base(text).is_none());
         if let Some((path, text)) = below {
@@ -133,28 +130,28 @@ fn below(file: &Path, text: &str) -> Below {
     Below { table: lowest, faults, all, files }
 }
 
-/// What a text says its base is, if it says one: `None` of something that is no text.
+/// The value of `base` in a text, if there is one; the inner value is `None` if it is no string.
 fn written_base(text: &str) -> Option<Option<String>> {
     let document = DeTable::parse_recoverable(text).0;
     document.get_ref().get("base").map(|base| base.get_ref().as_str().map(str::to_owned))
 }
 
-/// Whether this is no fault where something below could be read.
+/// Whether the missing part may be in a base that could not be parsed.
 fn may_stand_below(fault: &Fault) -> bool {
     fault.what.contains("needs a `name`")
 }
 
-/// The file that `base` names, and its text.
+/// The file named by `base`, and its text.
 fn base_of(file: &Path, base: Option<&str>) -> Result<(PathBuf, String), (String, &'static str)> {
-    let name = base.ok_or_else(|| ("a base that is no file".to_owned(), "write base = \"FILE.toml\""))?;
+    let name = base.ok_or_else(|| ("a base that is not a file".to_owned(), "write base = \"FILE.toml\""))?;
     let path = file.parent().unwrap_or(Path::new("")).join(name);
     match read_text(&path) {
         Ok(text) => Ok((path, text)),
-        Err(error) => Err((format!("no base ({error})"), "a base is a file, relative to the experiment's")),
+        Err(error) => Err((format!("cannot read the base ({error})"), "give a path relative to the experiment file")),
     }
 }
 
-/// The settings of `over` in place of those of `full`; tables one by one, all else as a whole.
+/// Replaces the settings of `full` by those of `over`; tables are merged, all other values replaced.
 fn overlay(full: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
         match (full.get_mut(&key), value) {
@@ -168,13 +165,13 @@ fn overlay(full: &mut toml::Table, over: toml::Table) {
     }
 }
 
-/// Whether the settings of `above` can belong to what `below` names: another component has settings of its own.
+/// Whether the settings of `above` can apply to the component in `below`: another component has other settings.
 fn same_component(below: &toml::Table, above: &toml::Table) -> bool {
     above.get("name").is_none_or(|name| below.get("name").is_none_or(|known| known == name))
 }
 
-/// The settings of a file that can be read, and what is at fault: that is taken out, and the rest read again. Tables that lie over
-/// ones in `below` may leave their component's name to them.
+/// The valid settings of a file and its faults. A faulty setting is removed and the rest parsed again. A table over one
+/// in `below` may inherit the component's name.
 fn sifted(file: &Path, text: &str, below: &toml::Table) -> (toml::Table, Vec<Fault>) {
     let (mut document, errors) = DeTable::parse_recoverable(text);
     let mut faults: Vec<Fault> = errors.iter().map(|error| Fault::in_toml(file, text, error)).collect();
@@ -191,7 +188,7 @@ fn sifted(file: &Path, text: &str, below: &toml::Table) -> (toml::Table, Vec<Fau
         let Err(error) = Experiment::deserialize(Deserializer::from(settings)) else { break };
         let fault = Fault::in_toml(file, text, &error);
         let path = error.span().and_then(|span| smallest(document.get_ref(), &span));
-        // What follows from a fault of the writing itself is none of its own.
+        // Consequences of a syntax error are not reported.
         if !broken.contains(&fault.line) || broken.is_empty() {
             faults.push(fault);
         }
@@ -204,7 +201,7 @@ fn sifted(file: &Path, text: &str, below: &toml::Table) -> (toml::Table, Vec<Fau
     (table, faults)
 }
 
-/// Names the components whose names only the tables below have.
+/// Adds the component names that only the tables below have.
 fn name(settings: &mut DeTable<'_>, below: &toml::Table) {
     for (key, value) in settings.iter_mut() {
         let (DeValue::Table(own), Some(toml::Value::Table(below))) = (value.get_mut(), below.get(&**key.get_ref()))
@@ -219,12 +216,12 @@ fn name(settings: &mut DeTable<'_>, below: &toml::Table) {
     }
 }
 
-/// What every experiment has, for a file that leaves it to its base.
+/// Placeholders for required settings, for a file that inherits them from its base.
 fn stand_ins() -> Spanned<DeTable<'static>> {
     DeTable::parse("question = 'why?'\nsource = 'virtual-points'\n").expect("two settings")
 }
 
-/// The path to the smallest setting that `span` lies in.
+/// The path to the innermost setting that contains `span`.
 fn smallest(table: &DeTable<'_>, span: &Range<usize>) -> Option<Vec<String>> {
     fn visit(
         path: &mut Vec<String>,
@@ -263,7 +260,7 @@ fn smallest(table: &DeTable<'_>, span: &Range<usize>) -> Option<Vec<String>> {
     best.map(|(_, path)| path)
 }
 
-/// Takes the setting at `path` out of the document; `false` where it is not there.
+/// Removes the setting at `path` from the document; `false` if it is absent.
 fn without(document: &mut Spanned<DeTable<'_>>, path: &[String]) -> bool {
     fn out(value: &mut DeValue<'_>, path: &[String]) -> bool {
         match (value, path) {
@@ -345,7 +342,7 @@ mod tests {
         let read = experiment(&at("e.toml"), own).experiment.unwrap();
         assert_eq!((read.question.as_str(), read.seed), ("how near?", 3));
         assert_eq!((&read.source.settings["frames"], &read.source.settings["rate"]), (&9.into(), &2.0.into()));
-        // Another component keeps nothing of the base's.
+        // Another component inherits nothing from the base's.
         let other = experiment(&at("e.toml"), "base = 'base.toml'\nsource = { name = 'virtual-points' }\n");
         let other = other.experiment.unwrap();
         assert!(other.source.settings.is_empty());

@@ -1,4 +1,4 @@
-//! The images of one frame as logs hold them, made once for all trials.
+//! The images of one frame in the form of logs, encoded once for all trials.
 
 use seafix_log::{GreyImage, encode_png};
 
@@ -11,11 +11,11 @@ use crate::ImagesLogged;
 #[derive(Debug)]
 pub(crate) struct Pictures {
     level: ImagesLogged,
-    /// Left and right, where there are images and they are logged.
+    /// Left and right, if there are images and they are logged.
     pub(crate) grey: Option<[GreyImage; 2]>,
-    /// Whether they are to the last bit what the method saw.
+    /// Whether they equal the images that the pipeline received.
     pub(crate) are_exact: bool,
-    /// The same as PNG.
+    /// The same images as PNG.
     pub(crate) pngs: Option<[Vec<u8>; 2]>,
 }
 
@@ -28,7 +28,7 @@ impl Pictures {
             FrameData::Points(_) => None,
         };
         let are_exact = level == ImagesLogged::All && log_conversion::is_exact(frame_data);
-        // Of an image that cannot be compressed the writer of the log says why.
+        // An image that cannot be compressed is reported by the writer of the log.
         let pngs = grey.as_ref().and_then(|[left, right]| Some([encode_png(left).ok()?, encode_png(right).ok()?]));
         Self { level, grey, are_exact, pngs }
     }
@@ -39,7 +39,7 @@ impl Pictures {
 pub(crate) struct Levels(Vec<Pictures>);
 
 impl Levels {
-    /// Those of a level; the first who asks makes them.
+    /// The images at one level, created at the first request.
     pub(crate) fn at(&mut self, level: ImagesLogged, frame_data: &FrameData) -> &Pictures {
         let known = self.0.iter().position(|pictures| pictures.level == level);
         let place = known.unwrap_or_else(|| {
@@ -49,7 +49,7 @@ impl Levels {
         &self.0[place]
     }
 
-    /// The images of a level as PNG, where somebody asked for it.
+    /// The images of a level as PNG, if they were requested.
     pub(crate) fn pngs(&self, level: ImagesLogged) -> Option<&[Vec<u8>; 2]> {
         self.0.iter().find(|pictures| pictures.level == level)?.pngs.as_ref()
     }

@@ -1,4 +1,4 @@
-//! Numbers at equal steps or ratios, for an axis.
+//! Number ranges in equal steps or ratios.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,25 +11,25 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// The first.
+    /// The first number.
     pub from: Number,
-    /// The last; with `step`, so many steps lead to it.
+    /// The last number; with `step`, reached after a whole number of steps.
     pub to: Number,
-    /// How many there are.
+    /// The number of values, 2 to 10000.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<usize>,
-    /// Instead of that, the way from one to the next.
+    /// The step between values, as an alternative to `count`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
 }
 
-/// A number as a TOML file has it.
+/// A number in TOML.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Number {
-    /// A whole one; from whole numbers at whole steps come whole numbers.
+    /// An integer. A range with integer ends and integer steps has integer values.
     Integer(i64),
-    /// Any other.
+    /// A real number.
     Real(f64),
 }
 
@@ -46,18 +46,18 @@ impl Number {
     }
 }
 
-/// More are a mistake.
+/// The maximum number of values.
 const MAX: usize = 10_000;
 
-/// So much of a step is taken for rounding.
+/// The fraction of a step that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
 impl Range {
-    /// At equal steps.
+    /// The values in equal steps.
     pub fn even(&self) -> impl Iterator<Item = toml::Value> + use<> {
         let (from, to) = (self.from.real(), self.to.real());
         let steps = match self.step {
-            // A last step that rounding makes too long still counts.
+            // The last step may be too long by rounding.
             Some(step) => ((to - from) / step.real() + ROUNDING).floor() as usize,
             None => self.count.unwrap_or(2).saturating_sub(1),
         };
@@ -69,7 +69,7 @@ impl Range {
         })
     }
 
-    /// At equal ratios, rounded to six digits.
+    /// The values in equal ratios, rounded to six digits.
     pub fn geometric(&self) -> impl Iterator<Item = toml::Value> + use<> {
         let (from, to) = (self.from.real().ln(), self.to.real().ln());
         let steps = self.count.unwrap_or(2).saturating_sub(1);
@@ -77,20 +77,20 @@ impl Range {
             .map(move |k| toml::Value::Float(rounded((from + (to - from) * k as f64 / steps.max(1) as f64).exp(), 6)))
     }
 
-    /// Whether it can be, as one of ratios or of steps.
+    /// Checks the range, for equal `ratios` or for equal steps.
     ///
     /// # Errors
-    /// The key at fault and what is wrong with it.
+    /// The faulty key and the message.
     pub(crate) fn check(&self, ratios: bool) -> Result<(), (&'static str, String)> {
         let (from, to) = (self.from.real(), self.to.real());
         let refuse = |key, what: &str| Err((key, what.to_owned()));
         if !(from.is_finite() && to.is_finite()) || from == to {
             let key = if from.is_finite() { "to" } else { "from" };
-            return refuse(key, "a range from a number to itself or to none; give two ends");
+            return refuse(key, "a range without two different finite ends; give two");
         }
         if ratios && !(from > 0.0 && to > 0.0) {
             let key = if from > 0.0 { "to" } else { "from" };
-            return refuse(key, "a log-range that touches zero; give two ends above zero");
+            return refuse(key, "a log-range with an end at or below zero; give two ends above zero");
         }
         match (self.count, self.step) {
             (Some(count), None) if (2..=MAX).contains(&count) => Ok(()),
@@ -116,7 +116,7 @@ impl Range {
     }
 }
 
-/// A number with so many digits that count.
+/// A number rounded to `digits` significant digits.
 fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits - 1).parse().unwrap_or(value)
 }

@@ -1,4 +1,4 @@
-//! From what happened to what is logged.
+//! Conversion of results to log records.
 
 use seafix::{FrameResult, Hints, NavigationState, SensorFrame, TargetAttempt};
 use seafix_component::Registry;
@@ -18,10 +18,10 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, LOCATORS, MATCHERS};
 
 use crate::{AxisValue, Experiment, Plan, Trial, manifest::Git, pictures::Pictures};
 
-/// What stands for the search where every point says which one it is.
+/// The name of the search for labelled points.
 const LABELLED: &str = "labelled";
 
-/// What is the same for every frame of `trial`.
+/// The log header of `trial`, the same for every frame.
 pub(crate) fn header(plan: &Plan, trial: &Trial, sequence: &dyn Sequence, targets: &[Target]) -> TrialHeader {
     let site = sequence.site();
     let world_from_site = site.objects.get(site.frame).and_then(|object| object.world_from_object);
@@ -67,7 +67,7 @@ pub(crate) fn header(plan: &Plan, trial: &Trial, sequence: &dyn Sequence, target
     }
 }
 
-/// What came of one frame, without truth: what the tables of results hold.
+/// The results of one frame, without truth, for the tables of results.
 pub(crate) fn frame(
     number: u64,
     sensor_frame: &SensorFrame,
@@ -100,7 +100,7 @@ pub(crate) fn frame(
     }
 }
 
-/// Adds what only a log holds: what was seen, and what the method was given.
+/// Adds the inputs of the frame, which only a log holds.
 pub(crate) fn complete(
     record: &mut FrameRecord,
     sensor_frame: &SensorFrame,
@@ -121,7 +121,7 @@ pub(crate) fn complete(
     record.prior = sensor_frame.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() });
 }
 
-/// What came of one target.
+/// The result for one target.
 fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) -> TargetRecord {
     let answer = &attempt.answer;
     let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
@@ -160,18 +160,18 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
     let details = answer.outcome.explanation().into_iter().chain(attempt.joint.clone());
-    record.detail = details.collect::<Vec<_>>().join("; ");
+    record.explanation = details.collect::<Vec<_>>().join("; ");
     record
 }
 
-/// The durations of the stages, and which of them other trials share.
+/// The durations of the stages, with those shared between trials.
 fn times(spent: &seafix::FrameTimes, navigation_state: Option<&NavigationState>, shared: SharedStages) -> FrameTimes {
     let seafix::FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *spent;
     let odometry_ms = navigation_state.map(|navigation_state| navigation_state.odometry_ms);
     FrameTimes { detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms, odometry_ms, shared }
 }
 
-/// The state of a trial that navigates, without truth.
+/// The state of navigation, without truth.
 fn navigation(navigation_state: &NavigationState, targets: &[Target]) -> NavigationRecord {
     let pose = |pose: &Navigated| NavigatedRecord {
         object: targets[pose.object].name.clone(),
@@ -208,8 +208,7 @@ fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
     }
 }
 
-/// The components that did some work: a cloud that came without images was not looked at, points that say which ones they
-/// are were not searched.
+/// The components in use. A source of clouds uses no front end, and labelled points use no search.
 fn components(experiment: &Experiment, sequence: &dyn Sequence) -> Vec<Component> {
     let pipeline = &experiment.pipeline;
     let front = [
@@ -223,7 +222,7 @@ fn components(experiment: &Experiment, sequence: &dyn Sequence) -> Vec<Component
         true => Component {
             stage: SEARCHES.kind().to_owned(),
             name: LABELLED.to_owned(),
-            summary: "none: every point says which one it is".to_owned(),
+            summary: "none: all points are labelled".to_owned(),
             source: String::new(),
             settings: Vec::new(),
         },

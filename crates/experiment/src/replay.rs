@@ -1,4 +1,4 @@
-//! Running a method on the logged inputs of another run.
+//! Replay of the logged inputs of another run with a changed pipeline.
 
 use std::path::{Path, PathBuf};
 
@@ -9,37 +9,37 @@ use seafix::Pipeline;
 
 use crate::{Axis, Experiment, Plan, parse::Texts, sweep};
 
-/// Which of a log's frames a replay starts from.
+/// The part of a log's inputs that a replay starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReplayFrom {
-    /// The clouds, unless a stage before the search is another than the logged one.
+    /// The clouds, unless a stage of the front end differs from the logged one.
     #[default]
     Suited,
-    /// The clouds: the same for every search and solver, and no image needed.
+    /// The clouds, for comparisons of searches and solvers without images.
     Clouds,
     /// The images.
     Images,
 }
 
-/// What is changed of a logged trial when its inputs are run again.
+/// The changes to a logged trial for a replay of its inputs.
 #[derive(Debug, Clone, Default)]
 pub struct Replay {
-    /// Searches, by name; the logged one if there is none, several make a trial each.
+    /// The searches by name; the logged one if empty. Several names give one trial each.
     pub searches: Vec<String>,
-    /// Solvers, likewise.
+    /// The solvers by name, like `searches`.
     pub solvers: Vec<String>,
-    /// Further settings, `key=value`: `pipeline.acceptance.confidence=0.999`.
+    /// Other settings, `key=value`: `pipeline.acceptance.confidence=0.999`.
     pub settings: Vec<String>,
-    /// Images or clouds.
+    /// The start from images or clouds.
     pub from: ReplayFrom,
 }
 
 impl Replay {
-    /// The plan that runs the trial logged in `log` again, changed so. Unchanged, it has the trial's own name and gives
-    /// its own results.
+    /// The plan that replays the trial logged in `log` with these changes. Without changes it has the trial's name and
+    /// reproduces its results.
     ///
     /// # Errors
-    /// A log that cannot be read, or a setting that cannot be.
+    /// A log that cannot be read, or an invalid setting.
     pub fn plan(&self, log: &Path) -> Result<Plan, Vec<Fault>> {
         let fault = |what: &str| vec![Fault::new(what, log)];
         if log.is_dir() {
@@ -61,10 +61,10 @@ impl Replay {
         let reader = Reader::open(log).map_err(|error| fault(&error.to_string()))?;
         let header = reader.header().clone();
         let logged: Experiment = toml::from_str(&header.configuration)
-            .map_err(|error| fault(&format!("its configuration is not this version's ({})", error.message())))?;
+            .map_err(|error| fault(&format!("its configuration is of another version ({})", error.message())))?;
         let mut changed: Experiment = sweep::changed(&logged, &self.settings, "pipeline.acceptance.confidence=0.999")?;
         if changed.source != logged.source || changed.seed != logged.seed {
-            let fault = Fault::new("a change of what was logged", Path::new("--set"));
+            let fault = Fault::new("a change of the logged inputs", Path::new("--set"));
             return Err(vec![fault.remedy("change the pipeline; to change source or seed, run the experiment again")]);
         }
         let own = |names: &[String], key: &str| {
@@ -84,7 +84,7 @@ impl Replay {
         let clouds = match self.from {
             ReplayFrom::Clouds => true,
             ReplayFrom::Images => false,
-            // Odometry needs the images.
+            // The odometry needs images.
             ReplayFrom::Suited => changed.navigation.is_none() && same_front_end(&logged.pipeline, &changed.pipeline),
         };
         let read = if clouds { "clouds" } else { "images" };
@@ -111,8 +111,8 @@ impl Replay {
     }
 }
 
-/// Where the network that is read lies, if one is: here, or in the folder of the log or one above it, for the experiment file
-/// that named it is not known any more. Which network it must be its SHA-256 says.
+/// The folder of the pose graph that is read, if there is one: the current folder, the log's folder, or one above it,
+/// because the original experiment file is unknown. The SHA-256 identifies the file.
 fn folder_of_pose_graph(experiment: &Experiment, log: &Path) -> PathBuf {
     let pose_graph = experiment.navigation.as_ref().and_then(|navigation| navigation.pose_graph.as_ref());
     let read = pose_graph.map_or("", |pose_graph| pose_graph.read.as_str());
@@ -121,7 +121,7 @@ fn folder_of_pose_graph(experiment: &Experiment, log: &Path) -> PathBuf {
     folders.filter(|_| !read.is_empty()).find(lies_in).unwrap_or(Path::new("")).to_owned()
 }
 
-/// Whether all stages before the candidates are the same.
+/// Whether all stages of the front end are the same.
 fn same_front_end(a: &Pipeline, b: &Pipeline) -> bool {
     let frame_data = |p: &Pipeline| Pipeline {
         target: Default::default(),

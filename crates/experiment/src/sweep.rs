@@ -1,4 +1,4 @@
-//! What varies: from one experiment to its trials.
+//! Parameter sweeps: axes, their grid, and changed settings.
 
 use std::path::Path;
 
@@ -8,50 +8,51 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::range::Range;
 
-/// One thing that varies over an experiment, written `[[vary]]`: exactly one of the ways to list its places.
+/// An axis `[[vary]]` of the grid; exactly one of its lists of values is given.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Axis {
-    /// The setting, as a dotted path: `source.distance`, `pipeline.solver`; with `cases` and `zip`, only what the axis is
-    /// called.
+    /// The setting as a dotted path: `source.distance`, `pipeline.solver`. With `cases` and `zip` it is only the name
+    /// of the axis.
     pub key: String,
-    /// Its values.
+    /// The values.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<toml::Value>,
-    /// Numbers at equal steps.
+    /// Numbers in equal steps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub range: Option<Range>,
-    /// Numbers at equal ratios.
+    /// Numbers in equal ratios.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_range: Option<Range>,
-    /// Several settings that vary together, under a name.
+    /// Named cases that set several settings together.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cases: Vec<Case>,
-    /// Lists of equal length, each by the dotted path of its setting: all first values go together, all second, …
+    /// Lists of equal length, each by the dotted path of its setting: point k of the axis takes the k-th value of every
+    /// list.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub zip: toml::Table,
 }
 
-/// Settings that go together.
+/// A named set of settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
-    /// What tables call it.
+    /// The name in tables.
     pub label: String,
-    /// A value for each setting, by its dotted path.
+    /// The value of each setting, by its dotted path.
     pub set: toml::Table,
 }
 
-/// The place of a trial on one axis.
+/// The value of a trial on one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisValue {
     /// The axis.
     pub key: String,
-    /// The value there, or the name of the case.
+    /// The value, or the name of the case.
     pub value: toml::Value,
-    /// What is set, by dotted path.
+    /// The settings by dotted path.
     pub(crate) set: Vec<(String, toml::Value)>,
-    /// Its number in its list.
+    /// The index of the value on the axis.
     number: usize,
 }
 
@@ -93,7 +94,7 @@ impl Axis {
         (0..length).map(place).collect()
     }
 
-    /// The settings that it varies.
+    /// The settings that the axis varies.
     fn keys(&self) -> impl Iterator<Item = &str> {
         let own = (self.cases.is_empty() && self.zip.is_empty()).then_some(&self.key);
         own.into_iter()
@@ -102,18 +103,18 @@ impl Axis {
             .map(String::as_str)
     }
 
-    /// Whether one of its settings is this one, or below it.
+    /// Whether the axis varies this setting or one below it.
     pub(crate) fn touches(&self, path: &str) -> bool {
         self.keys().any(|key| key == path || key.strip_prefix(path).is_some_and(|below| below.starts_with('.')))
     }
 
-    /// Whether its ranges have ends.
+    /// Whether its ranges are valid and so finite.
     pub(crate) fn is_bounded(&self) -> bool {
         let fits = |range: &Option<Range>, ratios| range.as_ref().is_none_or(|range| range.check(ratios).is_ok());
         fits(&self.range, false) && fits(&self.log_range, true)
     }
 
-    /// Where `key` of its place of this number stands in it, and what of that is the key, and where its value.
+    /// The places of `key` and of its value in the file, for point `number` of the axis.
     fn written(&self, number: usize, key: &str) -> ((Vec<String>, Part), Vec<String>) {
         let path = |steps: &[&str]| steps.iter().map(|&step| step.to_owned()).collect::<Vec<_>>();
         let number = number.to_string();
@@ -129,14 +130,14 @@ impl Axis {
             (_, Some(_)) => path(&["log-range"]),
             _ => path(&["values", &number]),
         };
-        // What it is called is the value of its key.
+        // The name of the axis is the value of its key.
         ((path(&["key"]), Part::Value), value)
     }
 }
 
-/// Where the fault of the setting at `path` of one point of the grid stands in the experiment's file, if an axis sets it.
+/// The place in the file of the setting at `path`, if an axis sets it at this grid point.
 pub(crate) fn written(axes: &[Axis], cell: &[AxisValue], path: &[String], part: Part) -> Option<(Vec<String>, Part)> {
-    // The last word is that of the last axis.
+    // The last axis has priority.
     for place in cell.iter().rev() {
         let Some((index, axis)) = axes.iter().enumerate().find(|(_, axis)| axis.key == place.key) else { continue };
         for (key, _) in &place.set {
@@ -156,10 +157,10 @@ pub(crate) fn written(axes: &[Axis], cell: &[AxisValue], path: &[String], part: 
     None
 }
 
-/// One point of the grid: a place on each axis, in the order of the axes.
+/// A point of the grid: one value on each axis, in the order of the axes.
 pub(crate) type Cell = Vec<AxisValue>;
 
-/// All points of the grid, the last axis fastest; without axes one empty point.
+/// All points of the grid, with the last axis fastest; one empty point without axes.
 pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
     axes.iter().fold(vec![Vec::new()], |cells, axis| {
         cells
@@ -175,10 +176,10 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
     })
 }
 
-/// `full` with each of `settings`, `key=value` with a dotted key and a TOML value, given the last word.
+/// Applies `settings` to `full`: each is `key=value` with a dotted key and a TOML value.
 ///
 /// # Errors
-/// The setting that cannot be, with `example` as one that could.
+/// The invalid setting, with `example` as a valid one.
 pub fn changed<T: Serialize + DeserializeOwned>(full: &T, settings: &[String], example: &str) -> Result<T, Vec<Fault>> {
     let fault = |what: String, setting: &str| {
         let fault = Fault::new(what, Path::new("--set")).value(setting);
@@ -196,16 +197,16 @@ pub fn changed<T: Serialize + DeserializeOwned>(full: &T, settings: &[String], e
     table.try_into().map_err(|error: toml::de::Error| vec![Fault::in_toml(Path::new("--set"), "", &error)])
 }
 
-/// The pipeline with each of `settings` given the last word.
+/// Applies `settings` to a pipeline.
 ///
 /// # Errors
-/// The setting that cannot be.
+/// The invalid setting.
 pub fn changed_pipeline(pipeline: &Pipeline, settings: &[String]) -> Result<Pipeline, Vec<Fault>> {
     changed(&pipeline.resolved().unwrap_or_else(|_| pipeline.clone()), settings, "detector.sigma=1.5")
 }
 
-/// Puts `value` at the dotted path `key`. A component chosen by its bare name becomes a table
-/// first, so that one of its settings can vary.
+/// Sets `value` at the dotted path `key`. A component given by its bare name becomes a table first, so that one of its
+/// settings can vary.
 ///
 /// # Errors
 /// A part of the path that is neither a table nor a component's name.
@@ -219,13 +220,13 @@ pub(crate) fn set(table: &mut toml::Table, key: &str, value: toml::Value) -> Res
             component.insert("name".to_owned(), name.clone().into());
             *entry = component.into();
         }
-        here = entry.as_table_mut().ok_or_else(|| format!("`{step}` in `{key}` is no table"))?;
+        here = entry.as_table_mut().ok_or_else(|| format!("`{step}` in `{key}` is not a table"))?;
     }
     here.insert(last.to_owned(), value);
     Ok(())
 }
 
-/// The name of a trial: its number and what distinguishes it, fit for a file.
+/// The name of a trial: its number and its axis values, valid as a file name.
 pub(crate) fn name(number: usize, cell: &Cell) -> String {
     let mut name = format!("{number:03}");
     for AxisValue { key, value, .. } in cell {
@@ -240,7 +241,7 @@ pub(crate) fn name(number: usize, cell: &Cell) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || ".-_".contains(c) { c } else { '_' }).take(120).collect()
 }
 
-/// Axes that vary nothing, or something twice, are mistakes.
+/// The faults of axes: without values, or setting something twice.
 pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], Part, &str) -> Fault) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (index, axis) in axes.iter().enumerate() {
@@ -263,7 +264,7 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], Part, &str) -> Fault)
             [_] => {}
             [.., last] => {
                 let what = format!("an axis with {}", given.join(" and "));
-                faults.push(fault(&["vary", &place, last], Part::Key, &what).remedy("make them axes of their own"));
+                faults.push(fault(&["vary", &place, last], Part::Key, &what).remedy("give each an axis of its own"));
             }
         }
         for (name, range, log) in [("range", &axis.range, false), ("log-range", &axis.log_range, true)] {
@@ -275,34 +276,33 @@ pub(crate) fn check(axes: &[Axis], fault: impl Fn(&[&str], Part, &str) -> Fault)
         let labels: Vec<&str> = axis.cases.iter().map(|case| case.label.as_str()).collect();
         for twice in (1..labels.len()).filter(|&k| labels[..k].contains(&labels[k])) {
             let path = ["vary", &place, "cases", &twice.to_string(), "label"];
-            let fault = fault(&path, Part::Value, "two cases of one name").value(labels[twice]);
-            faults.push(fault.remedy("name each case by what is special about it"));
+            let fault = fault(&path, Part::Value, "two cases with the same name").value(labels[twice]);
+            faults.push(fault.remedy("give each case a name of its own"));
         }
         faults.extend(twice(axis).into_iter().map(|(inside, value)| {
             let path: Vec<&str> = ["vary", &place].into_iter().chain(inside.iter().map(String::as_str)).collect();
-            let fault = fault(&path, Part::Value, "a value that is there twice").value(value);
-            fault.remedy("its trials would be made twice; `repetitions` makes all of them again with other seeds")
+            let fault = fault(&path, Part::Value, "a duplicate value").value(value);
+            fault.remedy("remove it; `repetitions` repeats all trials with other seeds")
         }));
         if axes[..index].iter().any(|other| other.key == axis.key) {
             faults.push(
-                fault(&["vary", &place, "key"], Part::Value, "an axis that is there twice")
+                fault(&["vary", &place, "key"], Part::Value, "a duplicate axis")
                     .value(&axis.key)
-                    .remedy("join their values"),
+                    .remedy("merge the values of both"),
             );
         } else if let Some(key) =
             axis.keys().find(|&key| axes[..index].iter().any(|other| other.keys().any(|k| k == key)))
         {
-            let what = format!("an axis that sets `{key}`, which another sets too");
-            faults
-                .push(fault(&["vary", &place, "key"], Part::Value, &what).remedy("the last would have the only word"));
+            let what = format!("an axis that sets `{key}`, as another axis does");
+            faults.push(fault(&["vary", &place, "key"], Part::Value, &what).remedy("remove `{key}` from one of them"));
         }
     }
     faults
 }
 
-/// The values of an axis that come again: where in it, and what they are.
+/// The repeated values of an axis, with their paths in it.
 fn twice(axis: &Axis) -> Vec<(Vec<String>, String)> {
-    /// One number, one component, however it is written.
+    /// A normal form in which equal numbers and equal components compare equal.
     fn plain(value: &toml::Value) -> toml::Value {
         match value {
             toml::Value::Integer(full) => (*full as f64).into(),
@@ -334,14 +334,16 @@ fn twice(axis: &Axis) -> Vec<(Vec<String>, String)> {
     reported.collect()
 }
 
-/// Why the lists of an axis cannot go together.
+/// The fault of an axis whose lists do not match.
 fn zip_fault(axis: &Axis) -> Option<(&str, String)> {
     let mut lengths = axis.zip.iter().map(|(key, list)| (key, list.as_array().map(Vec::len)));
     let first = lengths.next()?;
     let reported = |(key, length): (&'_ String, Option<usize>)| match (length, first.1) {
-        (None, _) => Some(format!("`{key}` is no list; give one value for each place")),
+        (None, _) => Some(format!("`{key}` is not a list; give one value for each point")),
         (Some(0), _) => Some(format!("`{key}` has no values")),
-        (Some(n), Some(m)) if n != m => Some(format!("`{}` has {m} values and `{key}` {n}; give as many", first.0)),
+        (Some(n), Some(m)) if n != m => {
+            Some(format!("`{}` has {m} values and `{key}` {n}; give lists of equal length", first.0))
+        }
         _ => None,
     };
     std::iter::once(first).chain(lengths).find_map(|(key, length)| Some((key.as_str(), reported((key, length))?)))
@@ -374,8 +376,8 @@ mod tests {
             let axis: Axis = toml::from_str(text).unwrap();
             check(&[axis], |_, _, what| Fault::new(what, Path::new("e.toml")))
         };
-        assert!(faults("key = 'k'\nzip = { a = [1], b = [1, 2] }")[0].what.contains("give as many"));
-        assert!(faults("key = 'k'\nzip = { a = 1 }")[0].what.contains("no list"));
+        assert!(faults("key = 'k'\nzip = { a = [1], b = [1, 2] }")[0].what.contains("equal length"));
+        assert!(faults("key = 'k'\nzip = { a = 1 }")[0].what.contains("not a list"));
         assert!(faults("key = 'k'\nvalues = [3]\nrange = { from = 0, to = 1, count = 2 }").len() == 1);
         assert!(faults("key = 'k'\nlog-range = { from = 0, to = 1, count = 3 }")[0].what.contains("above zero"));
     }

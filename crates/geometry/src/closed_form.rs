@@ -1,4 +1,4 @@
-//! Triangulation in closed form.
+//! Closed-form triangulation.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
@@ -8,20 +8,20 @@ use crate::{Camera, Pixel, Point, StereoPixels, StereoRig, Triangulation, Uncert
 const STEP: f64 = 1e-3;
 
 impl StereoRig {
-    /// The midpoint of the closest approach of the two rays.
+    /// Triangulation by the midpoint of the closest approach of both rays.
     ///
-    /// The covariance is that of the pixels, carried to the point to first order.
+    /// The covariance is that of the pixels, propagated to first order.
     ///
     /// # Errors
-    /// [`Untriangulable`] when the rays are parallel or meet behind a camera, or when the covariance has no inverse.
+    /// [`Untriangulable`] if the rays are parallel or meet behind a camera, or if the covariance is singular.
     pub fn triangulate_midpoint(&self, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable> {
         self.in_closed_form(seen, Self::midpoint)
     }
 
-    /// The least-squares solution X of u_i (r₃·X + t₃) = r₁·X + t₁ and v_i (r₃·X + t₃) = r₂·X + t₂ for both cameras,
-    /// (u, v) the undistorted direction. (Hartley and Sturm, *Triangulation*, 1997: Linear-LS.)
+    /// Linear-LS triangulation (Hartley and Sturm, *Triangulation*, 1997).
     ///
-    /// The covariance is that of the pixels, carried to the point to first order.
+    /// It is the least-squares solution X of u_i (r₃·X + t₃) = r₁·X + t₁ and v_i (r₃·X + t₃) = r₂·X + t₂ for both
+    /// cameras, with (u, v) the undistorted direction. The covariance is that of the pixels, propagated to first order.
     ///
     /// # Errors
     /// As [`triangulate_midpoint`](Self::triangulate_midpoint).
@@ -64,7 +64,7 @@ impl StereoRig {
         let normal: Matrix3<f64> = equations.iter().map(|(a, _)| a * a.transpose()).sum();
         let inverse = normal.try_inverse().ok_or(Untriangulable::Parallel)?;
         let mut point = Point::origin();
-        // Normal equations square the rounding of nearly parallel rays; what is left is solved for again.
+        // Iterative refinement: the normal equations square the rounding error of nearly parallel rays.
         for _ in 0..3 {
             let left: Vector3<f64> = equations.iter().map(|(a, b)| a * (b - a.dot(&point.coords))).sum();
             point = point + inverse * left;
@@ -74,7 +74,7 @@ impl StereoRig {
     }
 }
 
-/// The pixels with one of their four coordinates moved.
+/// The pixels with one of their four coordinates moved by `step`.
 fn stepped(seen: &StereoPixels, coordinate: usize, step: f64) -> StereoPixels {
     let mut at = seen.coordinates();
     at[coordinate] += step;
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::{Pinhole, Transform};
 
-    /// Turned, one camera before the other, behind a lens.
+    /// A rig with rotated cameras, one in front of the other, and lens distortion.
     fn rig() -> StereoRig {
         let camera = Pinhole::new([1024, 768], [500.0, 505.0], [511.5, 383.5], &[-0.1, 0.02, 0.0, 0.0]).unwrap();
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.03, -0.12, 0.05));
@@ -104,9 +104,9 @@ mod tests {
             for found in [rig.triangulate_midpoint(&exact).unwrap(), rig.triangulate_linear(&exact).unwrap()] {
                 assert!(found.point.distance(&point) < 1e-9, "{:?}", found.point);
                 assert!(found.disagreement < 1e-12);
-                // Nobody is better than the likeliest, and here nobody is much worse.
+                // The standard deviation is at least that of maximum likelihood, and here at most 10 % larger.
                 let [own, min] = [found.covariance, best.covariance].map(|c| c.trace().sqrt());
-                assert!(own > 0.9999 * min && own < 1.1 * min, "{own} beside {min}");
+                assert!(own > 0.9999 * min && own < 1.1 * min, "{own} against {min}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! How uncertain a pose or a point is.
+//! Covariances of poses and points.
 
 use std::marker::PhantomData;
 
@@ -6,40 +6,40 @@ use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 
 use crate::{Frame, Point, Transform, so3::skew};
 
-/// The covariance of a pose estimate `a_from_b`: of ξ = (φ, ρ) in `T_true = T_estimate · Exp(ξ)`,
-/// rotation (rad²) first, translation (m²) second, both along the axes of frame `B`.
+/// The covariance of a pose estimate `a_from_b`.
+///
+/// It is the covariance of ξ = (φ, ρ) in `T_true = T_estimate · Exp(ξ)`: rotation (rad) first, translation (m) second,
+/// both along the axes of frame `B`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Covariance6<A, B> {
-    /// The 6×6 matrix, symmetric, positive semi-definite.
+    /// The 6×6 matrix, symmetric and positive semidefinite.
     pub matrix: Matrix6<f64>,
     frames: PhantomData<(A, B)>,
 }
 
 impl<A: Frame, B: Frame> Covariance6<A, B> {
-    /// The covariance with this matrix, made symmetric to the last bit.
+    /// A covariance with this matrix, symmetrised.
     pub fn new(matrix: Matrix6<f64>) -> Self {
         Self { matrix: (matrix + matrix.transpose()) * 0.5, frames: PhantomData }
     }
 
-    /// Independent errors: `attitude` (rad) about and `position` (m) along each axis of `B`,
-    /// one standard deviation.
+    /// Independent errors with the standard deviations `attitude` (rad) and `position` (m) for each axis of `B`.
     pub fn isotropic(attitude: f64, position: f64) -> Self {
         let (a, p) = (attitude * attitude, position * position);
         Self::new(Matrix6::from_diagonal(&[a, a, a, p, p, p].into()))
     }
 
-    /// The covariance of `b_from_a` (adjoint of the estimate): the same knowledge, seen from `A`.
+    /// The covariance of the inverse pose `b_from_a`, by the adjoint of the estimate.
     #[must_use]
     pub fn inverse(&self, a_from_b: &Transform<A, B>) -> Covariance6<B, A> {
-        // T = T̂ Exp(ξ) ⇒ T⁻¹ = T̂⁻¹ Exp(−Ad(T̂) ξ).
+        // T = T̂ Exp(ξ) implies T⁻¹ = T̂⁻¹ Exp(−Ad(T̂) ξ).
         let ad = a_from_b.adjoint();
         Covariance6::new(ad * self.matrix * ad.transpose())
     }
 
-    /// The covariance (m², axes of `B`) that this pose gives to the point of `B` where the estimate
-    /// places `a_from_b⁻¹ · p_a`; `at` is that place.
+    /// The covariance (m², axes of `B`) that the pose error causes at the point `at` of `B`.
     ///
-    /// p_b = Exp(−ξ) · at, so J = \[ \[at\]×, −I \].
+    /// The transformed point is p_b = Exp(−ξ) · at, hence J = \[ \[at\]×, −I \].
     pub fn of_point(&self, at: &Point<B>) -> Matrix3<f64> {
         let mut j = Matrix3x6::zeros();
         j.fixed_view_mut::<3, 3>(0, 0).copy_from(&skew(&at.coords));
@@ -47,21 +47,21 @@ impl<A: Frame, B: Frame> Covariance6<A, B> {
         j * self.matrix * j.transpose()
     }
 
-    /// One standard deviation of the position, over the three axes together (m): √tr Σ_ρρ.
+    /// The standard deviation of the position over the three axes together (m): √tr Σ_ρρ.
     pub fn position_sigma(&self) -> f64 {
         self.matrix.fixed_view::<3, 3>(3, 3).trace().sqrt()
     }
 
-    /// One standard deviation of the attitude, over the three axes together (rad): √tr Σ_φφ.
+    /// The standard deviation of the attitude over the three axes together (rad): √tr Σ_φφ.
     pub fn attitude_sigma(&self) -> f64 {
         self.matrix.fixed_view::<3, 3>(0, 0).trace().sqrt()
     }
 }
 
-/// A point and the covariance of its coordinates.
+/// A point with the covariance of its coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainPoint<F> {
-    /// Where it was measured to be.
+    /// The measured position.
     pub at: Point<F>,
     /// The covariance of `at` (m²), axes of `F`.
     pub covariance: Matrix3<f64>,

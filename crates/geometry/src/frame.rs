@@ -1,4 +1,4 @@
-//! Coordinate frames as types, and points that know theirs.
+//! Coordinate frames as types, and points typed by their frame.
 
 use std::{fmt, marker::PhantomData};
 
@@ -25,10 +25,11 @@ frames! {
     Body,
     /// The world of the survey: north, east, down.
     World,
-    /// A known object: origin P1, x along P1→P3, z along (P2−P1)×(P3−P1), y = z × x, so that
-    /// P2 has y < 0 (the paper's Fig. 2 rule; built by [`triad`](crate::triad)).
+    /// A known object: origin P1, x along P1→P3, z along (P2−P1)×(P3−P1), y = z × x.
+    ///
+    /// P2 therefore has y < 0 (the rule of the paper's Fig. 2; built by [`triad`](crate::triad)).
     Object,
-    /// The whole production system: the frame of one chosen object of the site.
+    /// The site: the frame of one chosen object of the production system.
     Site,
 }
 
@@ -42,7 +43,7 @@ frames! {
 /// ```
 #[derive(Clone, Copy, PartialEq)]
 pub struct Point<F> {
-    /// The coordinates, in metres.
+    /// The coordinates (m).
     pub coords: Vector3<f64>,
     frame: PhantomData<F>,
 }
@@ -53,17 +54,17 @@ impl<F: Frame> Point<F> {
         Self { coords: Vector3::new(x, y, z), frame: PhantomData }
     }
 
-    /// The frame's origin.
+    /// The origin of the frame.
     pub const fn origin() -> Self {
         Self::new(0.0, 0.0, 0.0)
     }
 
-    /// The distance to another point of the same frame, in metres.
+    /// The distance to another point of the same frame (m).
     pub fn distance(&self, other: &Self) -> f64 {
         (self.coords - other.coords).norm()
     }
 
-    /// Whether all three coordinates are finite numbers.
+    /// Whether all three coordinates are finite.
     pub fn is_finite(&self) -> bool {
         self.coords.iter().all(|x| x.is_finite())
     }
@@ -84,7 +85,7 @@ impl<F: Frame> From<[f64; 3]> for Point<F> {
 impl<F: Frame> std::ops::Sub for Point<F> {
     type Output = Vector3<f64>;
 
-    /// The vector from `other` to `self`, in metres along the frame's axes.
+    /// The vector from `other` to `self` (m), along the axes of the frame.
     fn sub(self, other: Self) -> Vector3<f64> {
         self.coords - other.coords
     }

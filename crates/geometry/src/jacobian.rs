@@ -1,16 +1,18 @@
-//! How the logarithm of a rigid motion answers to a small motion behind it.
+//! The inverse right Jacobian of SE(3).
 
 use nalgebra::{Matrix6, Vector6};
 
 use crate::so3::skew;
 
-/// J_r(ξ)⁻¹, exact: log(Exp(ξ) Exp(η)) = ξ + J_r(ξ)⁻¹ η + O(η²), ξ = (φ, ρ), for |φ| < 2π.
+/// The inverse right Jacobian J_r(ξ)⁻¹ of SE(3), in closed form for |φ| < 2π.
 ///
-/// J_r⁻¹ = I + ad/2 + A ad² + B ad⁴, ad = \[\[φ\]×, 0; \[ρ\]×, \[φ\]×\]; with θ = |φ|, α = (θ/2) cot(θ/2) and
-/// β = (θ/2)²/sin²(θ/2): A = 2(1 − α)/θ² + (α − β)/(2θ²), B = (1 − α)/θ⁴ + (α − β)/(2θ⁴).
+/// It is defined by log(Exp(ξ) Exp(η)) = ξ + J_r(ξ)⁻¹ η + O(η²) with ξ = (φ, ρ):
 ///
-/// Source: Bullo and Murray, *Proportional derivative (PD) control on the Euclidean group*, European Control
-/// Conference 1995.
+/// J_r⁻¹ = I + ad/2 + A ad² + B ad⁴, ad = \[\[φ\]×, 0; \[ρ\]×, \[φ\]×\]; with θ = |φ|, α = (θ/2) cot(θ/2) and β =
+/// (θ/2)²/sin²(θ/2): A = 2(1 − α)/θ² + (α − β)/(2θ²), B = (1 − α)/θ⁴ + (α − β)/(2θ⁴).
+///
+/// Source: Bullo and Murray, *Proportional derivative (PD) control on the Euclidean group*, European Control Conference
+/// 1995.
 pub fn right_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
     let turn = skew(&xi.fixed_rows::<3>(0).into_owned());
     let shift = skew(&xi.fixed_rows::<3>(3).into_owned());
@@ -23,8 +25,10 @@ pub fn right_jacobian_inverse(xi: &Vector6<f64>) -> Matrix6<f64> {
     Matrix6::identity() + ad * 0.5 + square * a + square * square * b
 }
 
-/// A and B at the angle θ. With 1 − α = Σ aₖ θ²ᵏ, aₖ = |B₂ₖ|/(2k)!, and α − β = θ dα/dθ they are
-/// Σ (2 − k) aₖ θ²ᵏ⁻² and Σ (1 − k) aₖ θ²ᵏ⁻⁴: what is left of the quotients near nought, where they lose their digits.
+/// The coefficients A and B at the angle θ.
+///
+/// Near zero the quotients lose digits and their series are used. With 1 − α = Σ aₖ θ²ᵏ, aₖ = |B₂ₖ|/(2k)!, and α − β =
+/// θ dα/dθ they are Σ (2 − k) aₖ θ²ᵏ⁻² and Σ (1 − k) aₖ θ²ᵏ⁻⁴.
 fn coefficients(theta: f64) -> [f64; 2] {
     let t2 = theta * theta;
     if theta < 0.3 {

@@ -1,9 +1,9 @@
-//! Typed frames, rigid transforms, covariance, cameras, stereo rigs, triangulation.
+//! Typed coordinate frames, rigid transforms, covariances, cameras, stereo rigs and triangulation.
 //!
 //! # Conventions
 //!
-//! - Column vectors inside: `p_a = a_from_b * p_b`. Adjacent names cancel:
-//!   `object_from_body = object_from_camera * camera_from_body`. Frames are types, so a chain
+//! - Column vectors: `p_a = a_from_b * p_b`. Adjacent names cancel:
+//!   `object_from_body = object_from_camera * camera_from_body`. Frames are types, so a product
 //!   whose names do not cancel does not compile:
 //!
 //!   ```compile_fail
@@ -12,11 +12,11 @@
 //!   let object_from_world = Transform::<Object, World>::identity();
 //!   let nonsense = object_from_camera * object_from_world; // Camera and World do not cancel
 //!   ```
-//! - The paper's row vectors, `p · H`, live in [`row_vector`] and nowhere else.
-//! - Metres, radians, pixels. The centre of the first pixel is (0, 0).
+//! - The paper's row vectors, `p · H`, occur in [`row_vector`] only.
+//! - Units are metres, radians and pixels. The centre of the first pixel is (0, 0).
 //! - Perturbations: `T_true = T_estimate · Exp(ξ)`, ξ = (φ, ρ), rotation first; for
-//!   `object_from_camera` ξ lives in the camera frame ([`Covariance6`]).
-//! - Elementary functions come from `libm`: the same bits on every platform.
+//!   `object_from_camera` ξ is expressed in the camera frame ([`Covariance6`]).
+//! - Elementary functions come from `libm`: results are identical on every platform.
 
 mod closed_form;
 mod covariance;

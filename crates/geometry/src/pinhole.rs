@@ -1,20 +1,20 @@
-//! A pinhole camera with the lens distortion that calibration tools report.
+//! The pinhole camera with Brown–Conrady lens distortion.
 
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 
 use crate::{Frame, Point};
 
-/// A place in an image, in pixels; the centre of the first pixel is (0, 0), u to the right, v down.
+/// A position in an image (px); the centre of the first pixel is (0, 0), u to the right, v down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pixel {
-    /// Column.
+    /// The column.
     pub u: f64,
-    /// Row.
+    /// The row.
     pub v: f64,
 }
 
 impl Pixel {
-    /// The distance to another place, in pixels.
+    /// The distance to another pixel position (px).
     pub fn distance(&self, other: &Self) -> f64 {
         ((self.u - other.u).powi(2) + (self.v - other.v).powi(2)).sqrt()
     }
@@ -22,30 +22,29 @@ impl Pixel {
 
 /// Brown–Conrady lens distortion, `plumb_bob`: k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
 ///
-/// On normalised coordinates (x, y) = (X/Z, Y/Z), r² = x² + y²:
-/// x' = x·ρ + 2 p1 x y + p2 (r² + 2x²), y' = y·ρ + p1 (r² + 2y²) + 2 p2 x y,
-/// ρ = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶).
-/// Source: Brown, *Decentering distortion of lenses*, 1966; the order is OpenCV's.
+/// It acts on normalised coordinates (x, y) = (X/Z, Y/Z) with r² = x² + y²: x' = x·ρ + 2 p1 x y + p2 (r² + 2x²), y' =
+/// y·ρ + p1 (r² + 2y²) + 2 p2 x y, ρ = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶).
+///
+/// Source: Brown, *Decentering distortion of lenses*, 1966; the order of the coefficients is OpenCV's.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Distortion {
     coefficients: [f64; 8],
 }
 
 impl Distortion {
-    /// The coefficients in the order k1 k2 p1 p2 k3 k4 k5 k6; the absent ones are zero.
+    /// The coefficients in the order k1 k2 p1 p2 k3 k4 k5 k6; absent ones are zero.
     pub fn coefficients(&self) -> &[f64; 8] {
         &self.coefficients
     }
 
-    /// The coefficients without trailing zeros, as the shortest list that calibration files know: 0,
-    /// 4, 5 or 8 numbers.
+    /// The coefficients as the shortest list of a calibration file: 0, 4, 5 or 8 numbers.
     pub fn shortest(&self) -> &[f64] {
         let used = self.coefficients.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
         let length = [0, 4, 5, 8].into_iter().find(|&length| length >= used).unwrap_or(8);
         &self.coefficients[..length]
     }
 
-    /// ρ(r²) and dρ/d(r²).
+    /// The factor ρ(r²) and its derivative dρ/d(r²).
     fn radial(&self, r2: f64) -> (f64, f64) {
         let [k1, k2, _, _, k3, k4, k5, k6] = self.coefficients;
         let numerator = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -56,7 +55,7 @@ impl Distortion {
         (rho, (d_numerator - rho * d_denominator) / denominator)
     }
 
-    /// The distorted place of `n` and the Jacobian of the map.
+    /// The distorted position of `n`, with the Jacobian of the map.
     fn distort(&self, n: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let [_, _, p1, p2, ..] = self.coefficients;
         let (x, y) = (n.x, n.y);
@@ -76,8 +75,7 @@ impl Distortion {
         (place, jacobian)
     }
 
-    /// The radius (normalised) up to which the radial map r·ρ(r²) grows: beyond it the lens model
-    /// folds back and means nothing.
+    /// The normalised radius up to which the radial map r·ρ(r²) increases; beyond it the lens model folds back.
     fn monotone_radius(&self) -> f64 {
         const FAR: f64 = 10.0; // 84 degrees off the axis
         if *self == Self::default() {
@@ -92,7 +90,7 @@ impl Distortion {
     }
 }
 
-/// A camera: size of its image, focal lengths and principal point (px), lens distortion.
+/// A pinhole camera: image size, focal lengths and principal point (px), lens distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pinhole {
     size: [u32; 2],
@@ -104,7 +102,7 @@ pub struct Pinhole {
     monotone_radius: f64,
 }
 
-/// Why numbers describe no camera.
+/// The reason why numbers do not describe a camera.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BadCamera {
     /// Zero width or height.
@@ -113,40 +111,41 @@ pub enum BadCamera {
     /// A focal length that is zero, negative or not finite.
     #[error("{name} = {value}; a focal length is a positive number of pixels")]
     FocalLength {
-        /// `fx` or `fy`.
+        /// The parameter: `fx` or `fy`.
         name: &'static str,
-        /// The value.
+        /// Its value.
         value: f64,
     },
     /// A principal point outside the image or not finite.
     #[error("{name} = {value}; the principal point must lie in the image, 0 to {limit}")]
     PrincipalPoint {
-        /// `cx` or `cy`.
+        /// The parameter: `cx` or `cy`.
         name: &'static str,
-        /// The value.
+        /// Its value.
         value: f64,
-        /// Width or height of the image.
+        /// The width or height of the image.
         limit: u32,
     },
-    /// Distortion coefficients of an unknown model.
+    /// A number of distortion coefficients that fits no known model.
     #[error("distortion has {0} numbers; plumb_bob has 0, 4 (k1 k2 p1 p2), 5 (+ k3) or 8 (+ k4 k5 k6)")]
     DistortionLength(usize),
     /// A distortion coefficient that is not finite.
     #[error("distortion[{index}] = {value}; give finite numbers")]
     DistortionValue {
-        /// Place in the list, from 0.
+        /// Its index in the list, from 0.
         index: usize,
-        /// The value.
+        /// Its value.
         value: f64,
     },
 }
 
 impl Pinhole {
-    /// The camera of these numbers: image size, fx, fy, cx, cy (px), and 0, 4, 5 or 8 distortion
-    /// coefficients.
+    /// A camera with this image size, fx, fy, cx, cy (px) and lens distortion.
+    ///
+    /// The distortion has 0, 4, 5 or 8 coefficients.
     ///
     /// # Errors
-    /// [`BadCamera`] names the number that is wrong.
+    /// A [`BadCamera`] that names the invalid number.
     pub fn new(size: [u32; 2], focal: [f64; 2], principal: [f64; 2], distortion: &[f64]) -> Result<Self, BadCamera> {
         if size[0] == 0 || size[1] == 0 {
             return Err(BadCamera::Size(size[0], size[1]));
@@ -196,14 +195,15 @@ impl Pinhole {
         &self.distortion
     }
 
-    /// Where the camera sees a point of its own frame, or `None` when the point is behind the
-    /// camera or beyond the angle at which the lens model still grows. The place may lie outside
-    /// the image: see [`contains`](Self::contains).
+    /// The projection of a point of the camera's frame.
+    ///
+    /// `None` if the point is behind the camera or beyond the angle at which the lens model folds back. The pixel may
+    /// lie outside the image: see [`contains`](Self::contains).
     pub fn project<F: Frame>(&self, point: &Point<F>) -> Option<Pixel> {
         self.project_with_jacobian(point).map(|(pixel, _)| pixel)
     }
 
-    /// As [`project`](Self::project), with the derivative of the pixel by the point (px/m).
+    /// The projection as in [`project`](Self::project), with the derivative of the pixel by the point (px/m).
     pub fn project_with_jacobian<F: Frame>(&self, point: &Point<F>) -> Option<(Pixel, Matrix2x3<f64>)> {
         let [x, y, z] = point.coords.into();
         if !(z > 0.0) {
@@ -220,8 +220,7 @@ impl Pinhole {
         Some((pixel, focal * by_n * n_by_point))
     }
 
-    /// The undistorted direction (X/Z, Y/Z) in which the camera sees `pixel`, or `None` where the
-    /// lens model has no inverse.
+    /// The undistorted direction (X/Z, Y/Z) of `pixel`, or `None` if the lens model has no inverse there.
     ///
     /// Newton's iteration on the distortion; it ends when the step falls below 1e-15.
     pub fn normalize(&self, pixel: &Pixel) -> Option<Vector2<f64>> {
@@ -230,7 +229,7 @@ impl Pinhole {
         for _ in 0..50 {
             let (place, jacobian) = self.distortion.distort(&n);
             let step = jacobian.try_inverse()? * (target - place);
-            // Far from the axis a full step can leap over the fold of the lens model.
+            // A full step far from the axis can cross the fold of the lens model.
             let limit = 0.2 * (1.0 + n.norm());
             n += if step.norm() > limit { step * (limit / step.norm()) } else { step };
             if step.norm() < 1e-15 {

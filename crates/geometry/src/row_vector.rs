@@ -1,9 +1,9 @@
 //! The paper's convention: points are row vectors, `p_B = p_A · H_{A,B}`.
 //!
-//! The rows of the rotation part are the unit vectors of A seen in B, the translation is the last
-//! row, products read left to right. `H_{A,B}` is the transpose of the column convention's
-//! `b_from_a`. Equations (1)–(6) of Bobkov, Kudryashov and Inzartsev (2021) are written here as
-//! printed, with the misprint of (6) put right, so that the rest of Seafix can be held against them.
+//! The rows of the rotation part are the unit vectors of A seen in B, the translation is the last row, and products
+//! read from left to right. `H_{A,B}` is the transpose of the column convention's `b_from_a`. Equations (1)–(6) of
+//! Bobkov, Kudryashov and Inzartsev (2021) are implemented as printed, with the misprint of (6) corrected; they serve
+//! as a reference for tests.
 
 use std::{marker::PhantomData, ops::Mul};
 
@@ -11,7 +11,7 @@ use nalgebra::{Matrix4, RowVector4};
 
 use crate::{Body, Collinear, Frame, Object, Point, Transform, World, triad};
 
-/// `H_{A,B}`: the matrix that carries row vectors of `A` to row vectors of `B`.
+/// The matrix `H_{A,B}`: it maps row vectors of `A` to row vectors of `B`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct H<A, B> {
     /// The 4×4 matrix, translation in the last row.
@@ -31,7 +31,7 @@ impl<A: Frame, B: Frame> H<A, B> {
         Transform::from_matrix(&self.matrix.transpose()).expect("an H is made from rigid motions only")
     }
 
-    /// `p · H`.
+    /// The product `p · H`.
     pub fn apply(&self, p: &Point<A>) -> Point<B> {
         let row = RowVector4::new(p.coords.x, p.coords.y, p.coords.z, 1.0) * self.matrix;
         Point::new(row[0], row[1], row[2])
@@ -47,7 +47,7 @@ impl<A: Frame, B: Frame> From<Transform<B, A>> for H<A, B> {
 impl<A: Frame, B: Frame, C: Frame> Mul<H<B, C>> for H<A, B> {
     type Output = H<A, C>;
 
-    /// `H_{A,C} = H_{A,B} · H_{B,C}`.
+    /// The composition `H_{A,C} = H_{A,B} · H_{B,C}`.
     fn mul(self, next: H<B, C>) -> H<A, C> {
         H { matrix: self.matrix * next.matrix, frames: PhantomData }
     }
@@ -63,7 +63,7 @@ impl Frame for Auxiliary {}
 pub struct BodyAtStart;
 impl Frame for BodyAtStart {}
 
-/// The vehicle's frame where it last took a fix.
+/// The vehicle's frame at its last fix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyAtFix;
 impl Frame for BodyAtFix {}
@@ -71,7 +71,7 @@ impl Frame for BodyAtFix {}
 /// Eq. (1): `H_{ob,WCS}` from the surveyed coordinates of the base points P1, P2, P3.
 ///
 /// # Errors
-/// [`Collinear`] when the three lie on a line.
+/// [`Collinear`] if the three points are collinear.
 pub fn eq1(p1: &Point<World>, p2: &Point<World>, p3: &Point<World>) -> Result<H<Object, World>, Collinear> {
     Ok(H::from(triad(p1, p2, p3)?))
 }
@@ -85,29 +85,30 @@ pub fn eq2(
     start_to_now.inverse() * *start_to_world * object_to_world.inverse()
 }
 
-/// Eq. (3): `H_{ad,AUVi}` from the measured places of three identified points.
+/// Eq. (3): `H_{ad,AUVi}` from the measured positions of three identified points.
 ///
 /// # Errors
-/// [`Collinear`] when the three lie on a line.
+/// [`Collinear`] if the three points are collinear.
 pub fn eq3(c: &[Point<Body>; 3]) -> Result<H<Auxiliary, Body>, Collinear> {
     Ok(H::from(triad(&c[0], &c[1], &c[2])?))
 }
 
-/// Eq. (4): `H_{ad,ob}` from the model's places of the same three points.
+/// Eq. (4): `H_{ad,ob}` from the model positions of the same three points.
 ///
 /// # Errors
-/// [`Collinear`] when the three lie on a line.
+/// [`Collinear`] if the three points are collinear.
 pub fn eq4(p: &[Point<Object>; 3]) -> Result<H<Auxiliary, Object>, Collinear> {
     Ok(H::from(triad(&p[0], &p[1], &p[2])?))
 }
 
-/// Eq. (5): `H_{AUVi,ob} = (H_{ad,AUVi})⁻¹ · H_{ad,ob}`, direct referencing.
+/// Eq. (5): `H_{AUVi,ob} = (H_{ad,AUVi})⁻¹ · H_{ad,ob}`, the direct fix.
 pub fn eq5(auxiliary_to_body: &H<Auxiliary, Body>, auxiliary_to_object: &H<Auxiliary, Object>) -> H<Body, Object> {
     auxiliary_to_body.inverse() * *auxiliary_to_object
 }
 
-/// Eq. (6), misprint put right: `H_{AUVj,ob} = (H_{AUVi,AUVj})⁻¹ · H_{AUVi,ob}`, the last fix
-/// carried on by odometry, `H_{AUVi,AUVj} = H_{i,i+1} ⋯ H_{j−1,j}`.
+/// Eq. (6) with its misprint corrected: `H_{AUVj,ob} = (H_{AUVi,AUVj})⁻¹ · H_{AUVi,ob}`.
+///
+/// The last fix is propagated by odometry, `H_{AUVi,AUVj} = H_{i,i+1} ⋯ H_{j−1,j}`.
 pub fn eq6(fix_to_now: &H<BodyAtFix, Body>, fix_to_object: &H<BodyAtFix, Object>) -> H<Body, Object> {
     fix_to_now.inverse() * *fix_to_object
 }

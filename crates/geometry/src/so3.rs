@@ -1,4 +1,4 @@
-//! Rotations: exponential, logarithm, and the Jacobians between them.
+//! The rotation group SO(3): exponential, logarithm and Jacobian.
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
@@ -7,30 +7,30 @@ pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }
 
-/// The rotation by angle |φ| (rad) about φ/|φ|.
+/// The exponential: the rotation by the angle |φ| (rad) about φ/|φ|.
 pub fn exp(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     let angle = phi.norm();
     let half = 0.5 * angle;
-    // sin(half) / angle, by its series where the quotient would lose digits.
+    // The quotient sin(half) / angle; near zero its series, because the quotient loses digits.
     let scale = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { libm::sin(half) / angle };
     UnitQuaternion::new_normalize(Quaternion::from_parts(libm::cos(half), phi * scale))
 }
 
-/// The rotation vector φ of `rotation`: |φ| in [0, π] (rad), inverse of [`exp`].
+/// The logarithm: the rotation vector φ of `rotation` with |φ| in [0, π] (rad), the inverse of [`exp`].
 pub fn log(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let q = if rotation.w < 0.0 { -rotation.into_inner() } else { rotation.into_inner() };
     let sine = q.imag().norm();
     if sine < 1e-9 { q.imag() * 2.0 } else { q.imag() * (2.0 * libm::atan2(sine, q.w) / sine) }
 }
 
-/// The same of a rotation matrix, which is taken to be one.
+/// The logarithm of a rotation matrix; the matrix is assumed to be orthonormal.
 pub fn log_of_matrix(rotation: &Matrix3<f64>) -> Vector3<f64> {
-    // sin θ times the axis, and cos θ.
+    // The axis times sin θ, and cos θ.
     let r = rotation;
     let axis = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12) * 0.5;
     let (sine, cosine) = (axis.norm(), (r.trace() - 1.0) * 0.5);
     if cosine < -0.5 {
-        // Near half a turn the sine loses the axis.
+        // Near a rotation by π the sine loses the axis.
         return log(&UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*r)));
     }
     if sine < 1e-9 { axis } else { axis * (libm::atan2(sine, cosine) / sine) }

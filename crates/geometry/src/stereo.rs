@@ -1,20 +1,20 @@
-//! Two cameras side by side (or one above the other, or any way), and the point both see.
+//! Stereo rigs with arbitrary extrinsics, and triangulation by maximum likelihood.
 
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, UnitQuaternion, Vector3, Vector4};
 
 use crate::{Camera, Pinhole, Pixel, Point, RightCamera, Transform, UncertainPixels, so3::skew};
 
-/// Where the two cameras of a rig see one point.
+/// The pixels of one point in both cameras of a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StereoPixels {
-    /// In the left image.
+    /// The pixel in the left image.
     pub left: Pixel,
-    /// In the right image.
+    /// The pixel in the right image.
     pub right: Pixel,
 }
 
 impl StereoPixels {
-    /// (u left, v left, u right, v right), in the order of covariances (px).
+    /// The vector (u left, v left, u right, v right) (px), in the order of covariances.
     pub fn coordinates(&self) -> Vector4<f64> {
         Vector4::new(self.left.u, self.left.v, self.right.u, self.right.v)
     }
@@ -29,24 +29,24 @@ pub struct StereoRig {
     essential: Matrix3<f64>,
 }
 
-/// Why two cameras are no stereo rig.
+/// Two cameras with a baseline too short for a stereo rig (m).
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("the baseline is {0:.1e} m; two cameras in one place see no depth (is one calibration used for both?)")]
 pub struct BadRig(pub f64);
 
-/// Why two pixels give no point.
+/// The reason why two pixels determine no point.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Untriangulable {
-    /// A pixel lies where the lens model has no direction.
+    /// A pixel outside the domain of the lens model.
     #[error("a pixel lies beyond the lens model")]
     OutsideLens,
-    /// The two rays do not approach each other in front of both cameras.
+    /// Rays that do not approach each other in front of both cameras.
     #[error("the rays do not meet in front of the cameras (depth {0:.3} m)")]
     Behind(f64),
-    /// The rays are so nearly parallel that the depth is unknown.
+    /// Rays so nearly parallel that the depth is undetermined.
     #[error("the rays are parallel to within their noise")]
     Parallel,
-    /// The covariance of the pixels has no inverse.
+    /// A singular covariance of the pixels.
     #[error("the covariance of the pixels is singular")]
     Singular,
 }
@@ -54,20 +54,21 @@ pub enum Untriangulable {
 /// A triangulated point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangulation {
-    /// The point that explains both pixels best.
+    /// The maximum-likelihood point.
     pub point: Point<Camera>,
     /// Its covariance (m²), from the pixel noise alone.
     pub covariance: Matrix3<f64>,
-    /// What the four pixel coordinates disagree by, rᵀ Σ⁻¹ r: where their covariance Σ is right, χ² of one
-    /// degree of freedom, the distance across the epipolar line.
+    /// The squared Mahalanobis residual rᵀ Σ⁻¹ r of the four pixel coordinates.
+    ///
+    /// With a correct covariance Σ it is χ² with one degree of freedom: the distance across the epipolar line.
     pub disagreement: f64,
 }
 
 impl StereoRig {
-    /// The rig of two cameras, the second placed by `right_from_left`.
+    /// A rig of two cameras, the second one at `right_from_left`.
     ///
     /// # Errors
-    /// [`BadRig`] when the cameras are less than 1e-6 m apart.
+    /// [`BadRig`] if the cameras are less than 1e-6 m apart.
     pub fn new(left: Pinhole, right: Pinhole, right_from_left: Transform<RightCamera, Camera>) -> Result<Self, BadRig> {
         let baseline = right_from_left.translation().norm();
         if !(baseline >= 1e-6) {
@@ -77,7 +78,7 @@ impl StereoRig {
         Ok(Self { left, right, right_from_left, essential })
     }
 
-    /// The same two cameras with their parts exchanged: the right one is the left one of the result.
+    /// The rig with both cameras exchanged: its left camera is the right one of this rig.
     pub fn exchanged(&self) -> Self {
         let back = self.right_from_left.inverse();
         let right_from_left = Transform::new(back.rotation(), back.translation());
@@ -85,12 +86,12 @@ impl StereoRig {
         Self { left: self.right, right: self.left, right_from_left, essential }
     }
 
-    /// The same with the right camera turned where it stands: by the rotation vector `turn`, in its own frame (rad).
+    /// The rig with the right camera rotated in place by the rotation vector `turn` (rad, its own frame).
     pub fn with_right_turned(&self, turn: &Vector3<f64>) -> Self {
         let turn =
             Transform::<RightCamera, RightCamera>::new(UnitQuaternion::from_scaled_axis(*turn), Vector3::zeros());
         let right_from_left = turn * self.right_from_left;
-        Self::new(self.left, self.right, right_from_left).expect("the cameras are as far apart as they were")
+        Self::new(self.left, self.right, right_from_left).expect("the baseline is unchanged")
     }
 
     /// The left camera.
@@ -108,50 +109,51 @@ impl StereoRig {
         &self.right_from_left
     }
 
-    /// The distance between the cameras (m).
+    /// The baseline: the distance between the cameras (m).
     pub fn baseline(&self) -> f64 {
         self.right_from_left.translation().norm()
     }
 
-    /// E = [t̂]× R of `right_from_left`, t̂ the direction of its translation: x_rᵀ E x_l = 0 for the undistorted
-    /// directions of one point; E x_l is the epipolar line of x_l in the right image.
+    /// The essential matrix E = [t̂]× R of `right_from_left`, with t̂ the direction of its translation.
+    ///
+    /// The undistorted directions of one point satisfy x_rᵀ E x_l = 0; E x_l is the epipolar line of x_l in the right
+    /// image.
     pub fn essential(&self) -> &Matrix3<f64> {
         &self.essential
     }
 
-    /// The mean of the four focal lengths (px): what scales distances in the cameras' directions to pixels.
+    /// The mean of the four focal lengths (px): the scale from distances of directions to pixels.
     pub fn mean_focal(&self) -> f64 {
         let [l, r] = [self.left.focal(), self.right.focal()];
         0.25 * (l[0] + l[1] + r[0] + r[1])
     }
 
-    /// Whether rows of the two images correspond: the same camera twice, without distortion, one
-    /// beside the other along x.
+    /// Whether the rig is rectified: identical cameras without distortion, displaced along x only.
     pub fn is_rectified(&self) -> bool {
         let t = self.right_from_left.translation();
         t.y.abs().max(t.z.abs()) < 1e-12 * self.baseline() && self.is_parallel()
     }
 
-    /// The same for columns: one camera above the other along y.
+    /// Whether the rig is rectified vertically: identical cameras without distortion, displaced along y only.
     pub fn is_rectified_upright(&self) -> bool {
         let t = self.right_from_left.translation();
         t.x.abs().max(t.z.abs()) < 1e-12 * self.baseline() && self.is_parallel()
     }
 
-    /// The same camera twice, without distortion, looking the same way.
+    /// Whether the cameras are identical, without distortion and parallel.
     fn is_parallel(&self) -> bool {
         let turn = crate::so3::angle(&self.right_from_left.rotation());
         turn < 1e-12 && self.left == self.right && self.left.distortion().shortest().is_empty()
     }
 
-    /// Where both cameras see `point`, inside their images or not; `None` if one of them cannot.
+    /// The projections of `point` into both cameras, inside the images or not; `None` if one camera cannot see it.
     pub fn project(&self, point: &Point<Camera>) -> Option<StereoPixels> {
         let left = self.left.project(point)?;
         let right = self.right.project(&(self.right_from_left * *point))?;
         Some(StereoPixels { left, right })
     }
 
-    /// As [`project`](Self::project), with the derivative of (u left, v left, u right, v right) by the point (px/m).
+    /// The projections of `point` with their derivatives (px/m), in the order of [`StereoPixels::coordinates`].
     pub fn project_with_jacobian(&self, point: &Point<Camera>) -> Option<(StereoPixels, Matrix4x3<f64>)> {
         let (left, by_left) = self.left.project_with_jacobian(point)?;
         let (right, by_right) = self.right.project_with_jacobian(&(self.right_from_left * *point))?;
@@ -162,20 +164,21 @@ impl StereoRig {
         Some((StereoPixels { left, right }, j))
     }
 
-    /// Where both cameras see `point` in their images, at least `margin` pixels from the border.
+    /// The projections of `point`, if both lie at least `margin` pixels inside the images.
     pub fn sees(&self, point: &Point<Camera>, margin: f64) -> Option<StereoPixels> {
         self.project(point)
             .filter(|seen| self.left.contains(&seen.left, margin) && self.right.contains(&seen.right, margin))
     }
 
-    /// How far two pixels are from seeing one point: the Sampson distance (px) to the epipolar
-    /// constraint x_rᵀ E x_l = 0 on undistorted directions, scaled by the mean focal length.
-    /// `None` where a pixel lies beyond the lens model.
+    /// The Sampson distance (px) of two pixels to the epipolar constraint x_rᵀ E x_l = 0.
+    ///
+    /// It is computed on undistorted directions and scaled by the mean focal length. `None` if a pixel lies outside the
+    /// lens model.
     pub fn epipolar_distance(&self, seen: &StereoPixels) -> Option<f64> {
         self.epipolar_offset(seen).map(f64::abs)
     }
 
-    /// The same with its sign, which tells the side of the epipolar line.
+    /// The signed Sampson distance (px); the sign is the side of the epipolar line.
     pub fn epipolar_offset(&self, seen: &StereoPixels) -> Option<f64> {
         let l = self.left.normalize(&seen.left)?.push(1.0);
         let r = self.right.normalize(&seen.right)?.push(1.0);
@@ -184,19 +187,17 @@ impl StereoRig {
         Some(self.mean_focal() * r.dot(&line_r) / slope.sqrt())
     }
 
-    /// The point that both pixels see, and how well it is known when their coordinates err as
-    /// their covariance Σ says.
+    /// The maximum-likelihood point of two pixels, with its covariance (Hartley and Sturm, *Triangulation*, 1997).
     ///
-    /// Maximum likelihood: from the midpoint of the rays' closest approach, Gauss–Newton on the four
-    /// pixel residuals r weighted by Σ⁻¹; covariance (Jᵀ Σ⁻¹ J)⁻¹ at the solution. (Hartley and Sturm,
-    /// *Triangulation*, 1997.)
+    /// Gauss–Newton on the four pixel residuals r, weighted by the inverse of their covariance Σ, starts at the
+    /// midpoint of the rays' closest approach; the covariance is (Jᵀ Σ⁻¹ J)⁻¹ at the solution.
     ///
     /// # Errors
-    /// [`Untriangulable`] when the rays are parallel or meet behind a camera, or when Σ has no inverse.
+    /// [`Untriangulable`] if the rays are parallel or meet behind a camera, or if Σ is singular.
     pub fn triangulate(&self, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable> {
         let information = seen.covariance.cholesky().ok_or(Untriangulable::Singular)?.inverse();
         let mut point = self.midpoint(&seen.at)?;
-        // Where the pixels hardly disagree three steps reach rounding error; rows that are pixels apart take more.
+        // Consistent pixels reach rounding error in three steps; rows that are several pixels apart take more.
         for _ in 0..50 {
             let (normal, gradient, _) =
                 self.linearize(&point, &seen.at, &information).ok_or(Untriangulable::Behind(point.coords.z))?;
@@ -215,7 +216,7 @@ impl StereoRig {
         Ok(Triangulation { point, covariance, disagreement })
     }
 
-    /// JᵀWJ, JᵀWr and rᵀWr of the four pixel residuals r at `point`.
+    /// The terms JᵀWJ, JᵀWr and rᵀWr of the four pixel residuals r at `point`.
     fn linearize(
         &self,
         point: &Point<Camera>,
@@ -228,14 +229,14 @@ impl StereoRig {
         Some((j.transpose() * weighted, weighted.transpose() * r, r.dot(&(weight * r))))
     }
 
-    /// The midpoint of the closest approach of the two rays.
+    /// The midpoint of the closest approach of both rays.
     pub(crate) fn midpoint(&self, seen: &StereoPixels) -> Result<Point<Camera>, Untriangulable> {
         let l = self.left.normalize(&seen.left).ok_or(Untriangulable::OutsideLens)?.push(1.0);
         let r = self.right.normalize(&seen.right).ok_or(Untriangulable::OutsideLens)?.push(1.0);
         let left_from_right = self.right_from_left.inverse();
         let (a, b) = (l.normalize(), left_from_right.rotation() * r.normalize());
         let t = left_from_right.translation();
-        // Minimise |s a − (t + u b)|: across both rays n = a × b, and nothing cancels where they are nearly parallel.
+        // The minimum of |s a − (t + u b)| by n = a × b avoids cancellation for nearly parallel rays.
         let n = a.cross(&b);
         let determinant = n.norm_squared();
         if !(determinant > 1e-14) {
@@ -254,13 +255,13 @@ impl StereoRig {
 mod tests {
     use super::*;
 
-    /// The virtual camera: f = 500 px, 1024×768, the right camera `step` away.
+    /// The paper's virtual camera: f = 500 px, 1024×768, with the right camera at the offset `step`.
     fn rig(step: Vector3<f64>) -> StereoRig {
         let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[]).unwrap();
         StereoRig::new(camera, camera, Transform::new(nalgebra::UnitQuaternion::identity(), -step)).unwrap()
     }
 
-    /// The pixels of `point`, each coordinate to 0.2 px.
+    /// The pixels of `point` with a standard deviation of 0.2 px for each coordinate.
     fn seen(rig: &StereoRig, point: &Point<Camera>) -> UncertainPixels {
         UncertainPixels::independent(rig.project(point).unwrap(), 0.2)
     }
@@ -305,7 +306,7 @@ mod tests {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0));
         let mut pixels = seen(&rig, &Point::new(0.7, -0.3, 3.0));
         assert!(rig.triangulate(&pixels).unwrap().disagreement < 1e-20);
-        // 0.4 px between the rows, of standard deviation 0.2 √2: χ² = 2.
+        // 0.4 px between the rows, with a standard deviation of 0.2 √2 px: χ² = 2.
         pixels.at.right.v += 0.4;
         assert!((rig.triangulate(&pixels).unwrap().disagreement - 2.0).abs() < 1e-3);
         pixels.covariance = Matrix4::zeros();

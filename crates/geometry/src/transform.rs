@@ -1,4 +1,4 @@
-//! Rigid motions between typed frames.
+//! Rigid transforms between typed frames.
 
 use std::{fmt, marker::PhantomData, ops::Mul};
 
@@ -6,8 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Matrix4, Matrix6, Translation3, UnitQuaternio
 
 use crate::{Frame, Point, so3};
 
-/// The rigid motion that carries coordinates in frame `B` to coordinates in frame `A`:
-/// `p_a = a_from_b * p_b`.
+/// A rigid transform: it maps coordinates in frame `B` to coordinates in frame `A`, `p_a = a_from_b * p_b`.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -22,10 +21,10 @@ pub struct Transform<A, B> {
     frames: PhantomData<(A, B)>,
 }
 
-/// Why a 4×4 matrix is no rigid motion.
+/// The reason why a 4×4 matrix is not a rigid transform.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NotRigid {
-    /// An entry is NaN or infinite.
+    /// A NaN or infinite entry.
     #[error("entry ({row}, {column}) is {value}; give a finite number")]
     NotFinite {
         /// Row of the entry, from 0.
@@ -35,19 +34,19 @@ pub enum NotRigid {
         /// The entry.
         value: f64,
     },
-    /// The last row is not (0, 0, 0, 1).
+    /// A last row other than (0, 0, 0, 1).
     #[error("the last row is {0:?}; it must be [0, 0, 0, 1] (column vectors: p_a = a_from_b * p_b)")]
     LastRow([f64; 4]),
-    /// The rotation part is not orthonormal.
+    /// A rotation part that is not orthonormal.
     #[error("the rotation part deviates from orthonormal by {0:.3e}; give it to 1e-6 or better")]
     NotOrthonormal(f64),
-    /// The rotation part is a reflection.
+    /// A rotation part that is a reflection.
     #[error("the rotation part has determinant {0:.6}; a rotation has +1 (is an axis flipped?)")]
     Reflection(f64),
 }
 
 impl<A: Frame, B: Frame> Transform<A, B> {
-    /// The motion that rotates by `rotation`, then translates by `translation` (m, axes of `A`).
+    /// The transform that rotates by `rotation`, then translates by `translation` (m, axes of `A`).
     pub fn new(rotation: UnitQuaternion<f64>, translation: Vector3<f64>) -> Self {
         Self::from_isometry(Isometry3::from_parts(Translation3::from(translation), rotation))
     }
@@ -56,25 +55,25 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         Self { isometry, frames: PhantomData }
     }
 
-    /// The motion that changes nothing but the name of the frame.
+    /// The identity: only the name of the frame changes.
     pub fn identity() -> Self {
         Self::from_isometry(Isometry3::identity())
     }
 
-    /// The motion with orthonormal axes as the columns of `axes` and this origin.
+    /// The transform with orthonormal axes as the columns of `axes` and this origin.
     ///
-    /// The caller vouches that `axes` is a rotation to rounding error.
+    /// The caller guarantees that `axes` is a rotation up to rounding error.
     pub fn from_axes(axes: &Matrix3<f64>, origin: Vector3<f64>) -> Self {
         let mut rotation = UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*axes));
         rotation.renormalize();
         Self::new(rotation, origin)
     }
 
-    /// The motion of a homogeneous 4×4 matrix (columns: `p_a = M p_b`).
+    /// The transform of a homogeneous 4×4 matrix (columns: `p_a = M p_b`).
     ///
     /// # Errors
-    /// [`NotRigid`] when an entry is not finite, the last row is not (0, 0, 0, 1), or the rotation
-    /// part is off by more than 1e-6 or mirrored: data are never repaired in silence.
+    /// [`NotRigid`] if an entry is not finite, the last row is not (0, 0, 0, 1), or the rotation part deviates by more
+    /// than 1e-6 or is a reflection. Data are never corrected silently.
     pub fn from_matrix(m: &Matrix4<f64>) -> Result<Self, NotRigid> {
         for row in 0..4 {
             for column in 0..4 {
@@ -99,12 +98,12 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         Ok(Self::from_axes(&axes, m.fixed_view::<3, 1>(0, 3).into()))
     }
 
-    /// The homogeneous 4×4 matrix (columns).
+    /// The homogeneous 4×4 matrix (column convention).
     pub fn matrix(&self) -> Matrix4<f64> {
         self.isometry.to_homogeneous()
     }
 
-    /// The motion of nested rows, as files hold it.
+    /// The transform of nested rows, as files store it.
     ///
     /// # Errors
     /// As [`from_matrix`](Self::from_matrix).
@@ -112,13 +111,13 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         Self::from_matrix(&Matrix4::from_fn(|row, column| rows[row][column]))
     }
 
-    /// The homogeneous matrix as nested rows, as files hold it.
+    /// The homogeneous matrix as nested rows, as files store it.
     pub fn rows(&self) -> [[f64; 4]; 4] {
         let matrix = self.matrix();
         std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
     }
 
-    /// The rotation: axes of `B` seen in `A`.
+    /// The rotation: the axes of `B` seen in `A`.
     pub fn rotation(&self) -> UnitQuaternion<f64> {
         self.isometry.rotation
     }
@@ -128,24 +127,24 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         self.isometry.rotation.to_rotation_matrix().into_inner()
     }
 
-    /// The origin of `B` in `A`, in metres.
+    /// The origin of `B` in `A` (m).
     pub fn translation(&self) -> Vector3<f64> {
         self.isometry.translation.vector
     }
 
-    /// The motion the other way, from `A` to `B`.
+    /// The inverse transform, from `A` to `B`.
     #[must_use]
     pub fn inverse(&self) -> Transform<B, A> {
         Transform::from_isometry(self.isometry.inverse())
     }
 
-    /// Exp(ξ), the full SE(3) exponential of ξ = (φ, ρ): rotation φ (rad) and translation V(φ) ρ (m).
+    /// The SE(3) exponential Exp(ξ) of ξ = (φ, ρ): rotation φ (rad) and translation V(φ) ρ (m).
     pub fn exp(xi: &Vector6<f64>) -> Self {
         let (phi, rho) = (xi.fixed_rows::<3>(0).into_owned(), xi.fixed_rows::<3>(3).into_owned());
         Self::new(so3::exp(&phi), so3::left_jacobian(&phi) * rho)
     }
 
-    /// The ξ = (φ, ρ) with Exp(ξ) = self, |φ| ≤ π.
+    /// The SE(3) logarithm: ξ = (φ, ρ) with Exp(ξ) = self and |φ| ≤ π.
     pub fn log(&self) -> Vector6<f64> {
         let phi = so3::log(&self.rotation());
         let rho = so3::left_jacobian(&phi).try_inverse().expect("the left Jacobian is regular for angles up to pi")
@@ -156,7 +155,7 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         xi
     }
 
-    /// Ad(T): the ξ in frame `A` that moves as ξ in frame `B` does, T · Exp(ξ) = Exp(Ad(T) ξ) · T.
+    /// The adjoint Ad(T): T · Exp(ξ) = Exp(Ad(T) ξ) · T.
     pub fn adjoint(&self) -> Matrix6<f64> {
         let r = self.rotation_matrix();
         let mut adjoint = Matrix6::zeros();
@@ -166,31 +165,32 @@ impl<A: Frame, B: Frame> Transform<A, B> {
         adjoint
     }
 
-    /// `self · Exp(ξ)`: this estimate moved by a perturbation in frame `B`.
+    /// The perturbed transform `self · Exp(ξ)`, with ξ in frame `B`.
     #[must_use]
     pub fn perturbed(&self, xi: &Vector6<f64>) -> Self {
         *self * Transform::<B, B>::exp(xi)
     }
 
-    /// The ξ with `truth = self · Exp(ξ)`: how far this estimate is from `truth`, in frame `B`.
+    /// The error ξ of this estimate, in frame `B`: `truth = self · Exp(ξ)`.
     pub fn error_to(&self, truth: &Self) -> Vector6<f64> {
         (self.inverse() * *truth).log()
     }
 
-    /// The same motion between frames of other names: the border where one problem is read as another
-    /// (odometry's earlier cloud in the place of a model, an object's frame as the site's).
+    /// The same motion with other frame types, for a problem solved in the role of another.
+    ///
+    /// Examples: an earlier cloud of odometry in the role of a model; an object's frame as the frame of the site.
     pub fn relabel<C: Frame, D: Frame>(&self) -> Transform<C, D> {
         Transform::from_isometry(self.isometry)
     }
 
-    /// The same motion with its quaternion brought back to unit length after long chains.
+    /// The transform with its quaternion normalised, after long chains of products.
     #[must_use]
     pub fn renormalized(mut self) -> Self {
         self.isometry.rotation.renormalize();
         self
     }
 
-    /// Whether every number in it is finite.
+    /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.isometry.to_homogeneous().iter().all(|x| x.is_finite())
     }
@@ -199,7 +199,7 @@ impl<A: Frame, B: Frame> Transform<A, B> {
 impl<A: Frame, B: Frame, C: Frame> Mul<Transform<B, C>> for Transform<A, B> {
     type Output = Transform<A, C>;
 
-    /// `a_from_c = a_from_b * b_from_c`.
+    /// The composition `a_from_c = a_from_b * b_from_c`.
     fn mul(self, b_from_c: Transform<B, C>) -> Transform<A, C> {
         Transform::from_isometry(self.isometry * b_from_c.isometry)
     }
@@ -208,7 +208,7 @@ impl<A: Frame, B: Frame, C: Frame> Mul<Transform<B, C>> for Transform<A, B> {
 impl<A: Frame, B: Frame> Mul<Point<B>> for Transform<A, B> {
     type Output = Point<A>;
 
-    /// `p_a = a_from_b * p_b`.
+    /// The transformed point `p_a = a_from_b * p_b`.
     fn mul(self, point: Point<B>) -> Point<A> {
         Point::from(self.isometry.rotation * point.coords + self.isometry.translation.vector)
     }

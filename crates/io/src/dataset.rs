@@ -1,4 +1,4 @@
-//! `dataset.toml`, key by key.
+//! The description of a data set, `dataset.toml`.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -6,10 +6,10 @@ use seafix_component::{Fault, line_of};
 use seafix_geometry::{Body, Camera, NotRigid, Pinhole, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
-/// The versions of the format that are read. Written is the second, or the third where there are readings.
+/// The supported versions of the format. Data sets are written in the second; those with sensor readings in the third.
 pub const FORMATS: [&str; 3] = ["seafix-dataset/1", "seafix-dataset/1.1", "seafix-dataset/1.2"];
 
-/// A data set description: `dataset.toml`.
+/// A data set description, the content of `dataset.toml`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Description {
@@ -19,7 +19,7 @@ pub struct Description {
     pub name: String,
     /// The licence of its images.
     pub licence: String,
-    /// Where it comes from.
+    /// The origin of the data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<String>,
     /// The table of stereo pairs: `stamp_ns,left,right`.
@@ -27,50 +27,50 @@ pub struct Description {
     /// The site file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<String>,
-    /// The true trajectory, in TUM format.
+    /// The ground truth trajectory in TUM format.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<String>,
-    /// The prior poses, in TUM format.
+    /// The prior poses in TUM format.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<String>,
-    /// Standard deviations of all prior poses.
+    /// The standard deviations of all prior poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior_sigma: Option<PriorSigma>,
-    /// A table with the covariance of each prior pose.
+    /// The table of the prior poses' covariances.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior_covariance: Option<String>,
-    /// A table of the feature points in view: `stamp_ns,object,point`.
+    /// The table of the feature points in view: `stamp_ns,object,point`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub visibility: Option<String>,
-    /// A table of true object poses that differ from the survey.
+    /// The table of true object poses that differ from the survey.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub objects: Option<String>,
-    /// Readings of the Doppler velocity log.
+    /// The table of Doppler velocity log readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doppler: Option<String>,
-    /// Readings of the gyro.
+    /// The table of gyro readings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gyro: Option<String>,
     /// The pose of the left camera in the vehicle.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_from_camera: Option<[[f64; 4]; 4]>,
-    /// Significant bits of a pixel in images of 16 bits.
+    /// The number of significant bits of a pixel in images of 16 bits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bits: Option<u8>,
     /// The stereo rig.
     pub rig: RigNumbers,
-    /// SHA-256 of each file, by its name.
+    /// The SHA-256 of each file, by file name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub hashes: BTreeMap<String, String>,
 }
 
-/// Standard deviations of the prior: position per world axis (m), attitude per camera axis (degrees).
+/// The standard deviations of the prior poses.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorSigma {
-    /// Position, per world axis (m).
+    /// The position, per world axis (m).
     pub position: f64,
-    /// Attitude, per camera axis (degrees).
+    /// The attitude, per camera axis (degrees).
     pub attitude_deg: f64,
 }
 
@@ -80,7 +80,7 @@ pub struct PriorSigma {
 pub struct RigNumbers {
     /// The pose of the left camera in the right camera's frame, 4 × 4 by rows.
     pub right_from_left: [[f64; 4]; 4],
-    /// Whether the images are rectified; the numbers decide.
+    /// Whether the images are said to be rectified. The camera parameters decide; a contradiction is a warning.
     #[serde(default)]
     pub rectified: bool,
     /// The left camera.
@@ -103,7 +103,7 @@ pub struct CameraNumbers {
     pub cx: f64,
     /// Principal point, row (px).
     pub cy: f64,
-    /// Plumb-bob coefficients k1 k2 p1 p2 k3 …: 0, 4, 5 or 8 numbers.
+    /// The plumb-bob coefficients k1 k2 p1 p2 k3 k4 k5 k6: 0, 4, 5 or 8 numbers.
     #[serde(default)]
     pub distortion: Vec<f64>,
     /// The port in front of the camera.
@@ -111,29 +111,29 @@ pub struct CameraNumbers {
     pub port: Option<PortNumbers>,
 }
 
-/// The dome or flat port that a camera stands behind.
+/// The dome or flat port in front of a camera.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PortNumbers {
-    /// Its shape.
+    /// The shape.
     pub kind: PortKind,
-    /// Distance (m) at which the camera's numbers were found in the water; without it they are those in the air.
+    /// The distance (m) of the calibration in water; without it the camera was calibrated in air.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibrated_at: Option<f64>,
-    /// Distance (m) from the pupil to a flat port.
+    /// The distance (m) from the entrance pupil to a flat port.
     #[serde(default)]
     pub distance: f64,
-    /// Thickness of the glass (m).
+    /// The thickness of the glass (m).
     pub thickness: f64,
-    /// Inner radius of a dome (m).
+    /// The inner radius of a dome (m).
     #[serde(default)]
     pub radius: f64,
-    /// Centre of a dome in the camera frame (m).
+    /// The centre of a dome in the camera frame (m).
     #[serde(default)]
     pub offset: [f64; 3],
-    /// Refractive index of the glass.
+    /// The refractive index of the glass.
     pub glass: f64,
-    /// Refractive index of the water.
+    /// The refractive index of the water.
     pub water: f64,
 }
 
@@ -141,7 +141,7 @@ pub struct PortNumbers {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PortKind {
-    /// No window.
+    /// No port.
     None,
     /// A plane window.
     Flat,
@@ -150,10 +150,10 @@ pub enum PortKind {
 }
 
 impl PortNumbers {
-    /// The distance (m) at which the camera was calibrated in the water.
+    /// The distance (m) at which the camera was calibrated in water.
     ///
     /// # Errors
-    /// A calibration in the air, which a pinhole behind a port does not have in the water.
+    /// A calibration in air: a pinhole behind a port has no valid parameters in water from it.
     pub fn calibrated_in_water(&self) -> Result<f64, String> {
         match self.calibrated_at {
             Some(range) if range > 0.0 && range.is_finite() => Ok(range),
@@ -168,13 +168,13 @@ impl PortNumbers {
 }
 
 impl Description {
-    /// Forgets all that is not about the motion of the rig: its images and what sensors said.
+    /// Removes every file but images and sensor readings: site, truth, prior, visibility and objects.
     pub fn keep_pairs_only(&mut self) {
         (self.site, self.truth, self.prior, self.visibility, self.objects) = (None, None, None, None, None);
         (self.prior_sigma, self.prior_covariance) = (None, None);
     }
 
-    /// The stereo rig of this description, whose text is `source` in `file`.
+    /// The stereo rig of this description, read from the text `source` of `file`.
     ///
     /// # Errors
     /// The first invalid value of a camera, of a port or of the pose between the cameras.
@@ -182,17 +182,17 @@ impl Description {
         self.rig.build().map_err(|(path, message)| rig_fault(file, source, &path, &message))
     }
 
-    /// A warning where `rig` is called rectified and is not.
+    /// A warning if the description marks `rig` as rectified and its cameras contradict it.
     pub fn not_rectified(&self, rig: &StereoRig, file: &Path, source: &str) -> Option<Fault> {
         let odd = self.rig.rectified && !rig.is_rectified() && !rig.is_rectified_upright();
         odd.then(|| {
-            Fault::new("a rig that is called rectified and is not", file)
+            Fault::new("a rig marked as rectified that is not", file)
                 .on_line(line_of(source, &["rig", "rectified"]))
-                .remedy("the numbers of the two cameras decide, not the word")
+                .remedy("the camera parameters are used; correct `rectified` or the calibration")
         })
     }
 
-    /// The pose of the left camera in the vehicle; the identity where the description does not state it.
+    /// The pose of the left camera in the vehicle; the identity if the description has none.
     ///
     /// # Errors
     /// A matrix that is no rigid motion.
@@ -203,40 +203,43 @@ impl Description {
         Transform::from_rows(rows).map_err(invalid)
     }
 
-    /// Depth of the pixels in images of 16 bits, or what is wrong with it.
+    /// The bit depth of images of 16 bits.
+    ///
+    /// # Errors
+    /// A depth other than 8, 12 or 16 bits.
     pub fn depth(&self, file: &Path, source: &str) -> Result<u8, Fault> {
         match self.bits.unwrap_or(16) {
             bits @ (8 | 12 | 16) => Ok(bits),
-            other => Err(Fault::new("an unknown depth of pixels", file)
+            other => Err(Fault::new("an unsupported bit depth", file)
                 .on_line(line_of(source, &["bits"]))
                 .value(other)
-                .remedy("8, 12 and 16 bits are read")),
+                .remedy("give 8, 12 or 16")),
         }
     }
 }
 
-/// The fault of an invalid value below `rig.path`, described as `fx = -1; a focal length is …`: the value, and its remedy.
+/// The fault of an invalid value below `rig.path`. The `message` is value and remedy: `fx = -1; a focal length is …`.
 pub fn rig_fault(file: &Path, source: &str, path: &[&str], message: &str) -> Fault {
     let (value, remedy) = message.split_once("; ").unwrap_or((message, ""));
     let key = value.split([' ', '[']).next().filter(|key| CAMERA_KEYS.contains(key));
     let part = match *path {
-        ["right_from_left"] => "a pose of the right camera".to_owned(),
-        [side, "port"] => format!("a {side} port"),
-        [side, ..] => format!("a {side} camera"),
-        [] => "a rig".to_owned(),
+        ["right_from_left"] => "pose of the right camera".to_owned(),
+        [side, "port"] => format!("{side} port"),
+        [side, ..] => format!("{side} camera"),
+        [] => "rig".to_owned(),
     };
     let path: Vec<&str> = std::iter::once("rig").chain(path.iter().copied()).chain(key).collect();
-    Fault::new(format!("{part} that cannot be"), file)
+    Fault::new(format!("an invalid {part}"), file)
         .on_line(line_of(source, &path))
         .value(value)
         .remedy(if remedy.is_empty() { "correct the calibration" } else { remedy })
 }
 
-/// Those of a camera's keys whose values are checked.
+/// The camera keys whose values are checked.
 const CAMERA_KEYS: [&str; 6] = ["size", "fx", "fy", "cx", "cy", "distortion"];
 
 impl CameraNumbers {
-    /// The numbers of `camera` behind `port`.
+    /// The parameters of `camera` behind `port`.
     pub fn of(camera: &Pinhole, port: Option<PortNumbers>) -> Self {
         let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
         let distortion = camera.distortion().shortest().to_vec();
@@ -245,7 +248,7 @@ impl CameraNumbers {
 }
 
 impl RigNumbers {
-    /// The numbers of `rig` behind the ports of its left and right camera.
+    /// The parameters of `rig` behind the ports of its left and right camera.
     pub fn of(rig: &StereoRig, [left, right]: [Option<PortNumbers>; 2]) -> Self {
         Self {
             right_from_left: rig.right_from_left().rows(),
@@ -255,7 +258,7 @@ impl RigNumbers {
         }
     }
 
-    /// The rig, or the path of the key at fault below `rig` and what is wrong with it.
+    /// Builds the rig. An error is the path of the faulty key below `rig` and the message.
     fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
         let camera = |side: &'static str, c: &CameraNumbers| {
             if let Some(port) = &c.port {

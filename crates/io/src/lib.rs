@@ -1,8 +1,7 @@
-//! Readers of files from outside: images, stereo rigs and data set descriptions.
+//! Bounded readers of images, stereo rigs and data set descriptions.
 //!
-//! Every reader is bounded: it holds the sizes that a file declares against limits before it
-//! allocates anything. A file that cannot be read is one [`Fault`](seafix_component::Fault) with
-//! file, place, value and remedy.
+//! Every reader compares the sizes that a file declares with limits before it allocates memory. A file that cannot be
+//! read is one [`Fault`](seafix_component::Fault) with file, line, value and remedy.
 
 pub mod dataset;
 pub mod image;

@@ -1,4 +1,4 @@
-//! A stereo rig from a file.
+//! Stereo rigs from files.
 
 use std::path::{Path, PathBuf};
 
@@ -7,23 +7,23 @@ use seafix_geometry::{Body, Camera, StereoRig, Transform};
 
 use crate::dataset::Description;
 
-/// A stereo rig, its place in the vehicle and the depth of its images.
+/// A stereo rig with its pose in the vehicle and the bit depth of its images.
 #[derive(Debug, Clone)]
 pub struct Rig {
     /// The two cameras.
     pub stereo: StereoRig,
-    /// The pose of the left camera in the vehicle; the identity where the file does not state it.
+    /// The pose of the left camera in the vehicle; the identity if the file has none.
     pub body_from_camera: Transform<Body, Camera>,
-    /// Significant bits of a pixel in an image file of 16 bits.
+    /// The number of significant bits of a pixel in image files of 16 bits.
     pub bits: u8,
-    /// The file that it was read from.
+    /// The source file; `None` for a rig built in code.
     pub file: Option<PathBuf>,
-    /// A rig that is called rectified and is not.
+    /// A warning if the file marks the rig as rectified and the cameras contradict it.
     pub warning: Option<Fault>,
 }
 
 impl Rig {
-    /// Reads the `[rig]` table of a data set description (`seafix-dataset/1`), a file or the folder that holds it.
+    /// Reads the `[rig]` table of a data set description (`seafix-dataset/1`): the file, or its folder.
     ///
     /// # Errors
     /// A file that cannot be read, or its first invalid value.
@@ -45,7 +45,7 @@ impl Rig {
 }
 
 impl From<StereoRig> for Rig {
-    /// A rig whose left camera is the vehicle's frame, with images of up to 16 bits.
+    /// A rig without mounting: the left camera is the vehicle's frame. Images have up to 16 bits.
     fn from(stereo: StereoRig) -> Self {
         Self { stereo, body_from_camera: Transform::identity(), bits: 16, file: None, warning: None }
     }

@@ -60,6 +60,7 @@ mod frames;
 mod join;
 mod png;
 mod proto;
+pub mod quantities;
 mod read;
 mod record;
 mod recording;

@@ -1,4 +1,4 @@
-//! A fix carried along: the paper's Eq. (2) and (6).
+//! The camera's pose relative to an object, propagated by odometry: the paper's Eq. (2) and (6).
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 
@@ -7,21 +7,22 @@ use crate::{
     correlated_error::{CorrelatedSensitivities, carried},
 };
 
-/// Where the camera is relative to an object, and how well that is known.
+/// The camera's pose relative to an object, with its covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectPose {
     /// The pose.
     pub object_from_camera: Transform<Object, Camera>,
     /// Its covariance.
     pub covariance: Covariance6<Object, Camera>,
-    /// What its error shares with errors of the odometry that last.
+    /// Cross-covariance of the pose error with the correlated errors of the odometry.
     pub(crate) sensitivities: CorrelatedSensitivities,
-    /// What its error shares with those of models and surveys.
+    /// Sensitivity of the pose error to the errors of models and surveys.
     pub(crate) consider_states: ConsiderStates,
 }
 
-/// Eq. (2), the way by the world: `object_from_camera = object_from_world · world_from_camera`. What the survey errs by
-/// in placing the object errs here too.
+/// The camera's pose relative to an object, from two poses in the world: the paper's Eq. (2).
+///
+/// `object_from_camera = object_from_world · world_from_camera`. The error of the surveyed placement enters the result.
 pub fn by_world(
     world_from_object: &Transform<World, Object>,
     world_from_camera: &Transform<World, Camera>,
@@ -30,23 +31,25 @@ pub fn by_world(
 }
 
 impl ObjectPose {
-    /// A pose that errs independently of all others.
+    /// A pose whose error is independent of all other errors.
     pub fn new(object_from_camera: Transform<Object, Camera>, covariance: Covariance6<Object, Camera>) -> Self {
         let consider_states = ConsiderStates::default();
         Self { object_from_camera, covariance, sensitivities: CorrelatedSensitivities::zeros(), consider_states }
     }
 
-    /// The same, part of its covariance being due to errors that other fixes have too.
+    /// The same pose, with the part of its covariance that errors of models and surveys cause.
     #[must_use]
     pub fn with_consider_states(self, consider_states: ConsiderStates) -> Self {
         Self { consider_states, ..self }
     }
 
-    /// Eq. (6), one step of dead reckoning: `object_from_later = object_from_earlier · earlier_from_later`. (As printed
-    /// the equation multiplies by the identity; this is what its text says.)
+    /// The pose after one step of dead reckoning: the paper's Eq. (6).
     ///
-    /// The covariance is carried along and that of the step added, Σ' = A Σ Aᵀ + Σ_step, A = Ad(later_from_earlier), the
-    /// two taken as independent but for errors of the odometry that [last](crate::CorrelatedError).
+    /// `object_from_later = object_from_earlier · earlier_from_later`. (The equation is misprinted and would multiply
+    /// by the identity; this is the meaning of its text.)
+    ///
+    /// The covariance is propagated to first order: Σ' = A Σ Aᵀ + Σ_step, A = Ad(later_from_earlier). The errors of
+    /// pose and step count as independent, except for [correlated errors](crate::CorrelatedError) of the odometry.
     #[must_use]
     pub fn after(&self, step: &RelativeMotion) -> Self {
         let (covariance, sensitivities) = carried(&self.covariance.matrix, &self.sensitivities, step);
@@ -58,7 +61,7 @@ impl ObjectPose {
         }
     }
 
-    /// The same over many steps, in their order; without a step it is the same to the last bit.
+    /// The pose after several steps, in order of time; without a step it is unchanged to the last bit.
     #[must_use]
     pub fn after_all<'a>(&self, steps: impl IntoIterator<Item = &'a RelativeMotion>) -> Self {
         steps.into_iter().fold(self.clone(), |here, step| here.after(step))
@@ -71,7 +74,7 @@ mod tests {
 
     #[test]
     fn uncertain_heading_becomes_uncertain_place() {
-        // One milliradian about y, then 10 m ahead: 10 mm across.
+        // One milliradian about y and 10 m ahead give 10 mm sideways.
         let mut known = Covariance6::<Object, Camera>::isotropic(1e-9, 1e-9).matrix;
         known[(1, 1)] = 1e-6;
         let here = ObjectPose::new(Transform::identity(), Covariance6::new(known));

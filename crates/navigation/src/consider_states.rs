@@ -1,47 +1,49 @@
-//! Errors that fixes have in common.
+//! Errors that several fixes share: Schmidt–Kalman consider states.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix6, SMatrix};
 
-/// What something errs by for each standard deviation of three numbers: 6×3, a column each.
+/// The derivative of a pose error by three errors of unit variance: 6×3, one column for each error.
 pub type Sensitivity = SMatrix<f64, 6, 3>;
 
-/// Three numbers that err once and are met again by every fix.
+/// The source of three constant errors, which every fix from the same source repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Source {
-    /// The place of a model's point: the object, and which of its points.
+    /// The position of a model point: index of the object, index of the point.
     Point(usize, usize),
-    /// One half of the six numbers by which the survey errs in placing an object.
+    /// One half of the six errors of an object's surveyed placement.
     Survey(usize, Half),
 }
 
-/// A survey errs by six numbers, its columns 0 to 2 and 3 to 5.
+/// The half of a survey's six errors: components 0 to 2, or 3 to 5.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Half {
     First,
     Second,
 }
 
-/// What a pose's error has in common with the errors of models and surveys.
+/// The sensitivity of a pose error to the errors of models and surveys (Schmidt–Kalman).
 ///
-/// A fix errs by what is drawn anew with every image, its pixels, and by what the model has wrong, which is the same in
-/// every fix of that object: ξ_fix = w + Σ H_j e_j, the errors e_j of the model's points scaled to unit covariance. A pose that
-/// passes from object to object takes up the errors of two surveys in the same way. These errors are *considered*: they
-/// are not estimated, but a pose of error ξ keeps C_j = E\[ξ e_jᵀ\] beside its covariance, of a fix C_j = H_j. Two poses then
-/// have E\[ξ_a ξ_bᵀ\] = Σ C_aj C_bjᵀ in common where one of them is a fix, and the gain knows it.
+/// The error of a fix has two parts: pixel noise w, independent for each image, and the errors e_j of the model's
+/// points, the same in every fix of that object: ξ_fix = w + Σ H_j e_j, with e_j scaled to unit covariance. A pose that
+/// is transferred from one object to another acquires the errors of two surveys in the same manner. The errors e_j are
+/// *considered*: they are not estimated, but each pose keeps its cross-covariances C_j = E\[ξ e_jᵀ\] beside its
+/// covariance; for a fix, C_j = H_j. Two poses then have the cross-covariance E\[ξ_a ξ_bᵀ\] = Σ C_aj C_bjᵀ, if one of
+/// them is a fix, and the gain of the fusion accounts for it.
 ///
 /// Source: Schmidt, *Application of state-space methods to navigation problems*, 1966.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ConsiderStates(BTreeMap<Source, Sensitivity>);
 
 impl ConsiderStates {
-    /// What a fix owes to the model of `object`: for each of its points that the fix rests on, by its place in the model, H.
+    /// The consider states of a fix: for each model point used, its index in the model of `object` and its sensitivity
+    /// H.
     pub fn of_model(object: usize, points: impl IntoIterator<Item = (usize, Sensitivity)>) -> Self {
         Self(points.into_iter().map(|(point, sensitivity)| (Source::Point(object, point), sensitivity)).collect())
     }
 
-    /// What it owes to the survey of `object`, `lever` times the survey's error of this covariance.
+    /// The consider states of the survey of `object`: `lever` times an error with the covariance of the survey.
     pub(crate) fn of_survey(object: usize, lever: &Matrix6<f64>, covariance: &Matrix6<f64>) -> Self {
         let all = lever * root(covariance);
         let half = |first: usize| all.fixed_columns::<3>(first).into_owned();
@@ -51,13 +53,13 @@ impl ConsiderStates {
         ]))
     }
 
-    /// That of A ξ.
+    /// The consider states of the error A ξ.
     #[must_use]
     pub(crate) fn carried(&self, a: &Matrix6<f64>) -> Self {
         Self(self.0.iter().map(|(source, sensitivity)| (*source, a * sensitivity)).collect())
     }
 
-    /// That of the sum of two errors.
+    /// The consider states of the sum of two errors.
     #[must_use]
     pub(crate) fn plus(mut self, other: &Self) -> Self {
         for (source, sensitivity) in &other.0 {
@@ -66,14 +68,14 @@ impl ConsiderStates {
         self
     }
 
-    /// Σ C_a C_bᵀ over what both have.
+    /// The cross-covariance Σ C_a C_bᵀ over the sources that both poses share.
     pub(crate) fn common(&self, other: &Self) -> Matrix6<f64> {
         let both = self.0.iter().filter_map(|(source, a)| Some((a, other.0.get(source)?)));
         both.fold(Matrix6::zeros(), |sum, (a, b)| sum + a * b.transpose())
     }
 }
 
-/// The R with R Rᵀ = Σ, symmetric; of nought nought.
+/// A square root R of a positive semidefinite covariance: R Rᵀ = Σ.
 fn root(covariance: &Matrix6<f64>) -> Matrix6<f64> {
     if let Some(factor) = covariance.cholesky() {
         return factor.l();

@@ -1,45 +1,45 @@
-//! Errors that last from step to step.
+//! Odometry errors that are correlated over many steps.
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
 use seafix_geometry::{Camera, Covariance6, Transform};
 
 use crate::RelativeMotion;
 
-/// So many numbers can last.
+/// The maximum number of correlated errors.
 pub(crate) const CORRELATED: usize = 10;
 
-/// A step's or a pose's share in errors that last: a column each.
+/// Derivatives by, or cross-covariances with, the correlated errors: one column each.
 pub(crate) type CorrelatedSensitivities = SMatrix<f64, 6, CORRELATED>;
 
-/// What the error of a step has in common with those of the steps around it.
+/// The correlated part of an odometry step's error.
 ///
-/// Six numbers ξ a step that are independent of all others make an error that grows with the root of the way. A scale or a
-/// bias errs alike in every step, and what a pose was guessed to be until a late reading came is undone by the next. Such
-/// errors m enter as
+/// Independent errors of the steps make the position error grow with the square root of the path length. Other errors
+/// persist: a scale error or a gyro bias is the same in every step, and the error of an extrapolation that precedes a
+/// late reading is undone by the next step. Such errors m enter the error ξ of a step as
 ///
 /// ξ = J m + w, m′ = D m + …,
 ///
-/// D diagonal, w the step's own. A pose whose error is ξ₀ keeps C = E\[ξ₀ mᵀ\] beside its covariance Σ, as a filter keeps
-/// what it considers but does not estimate:
+/// with D diagonal and w independent noise of the step. A pose with error ξ₀ keeps the cross-covariance C = E\[ξ₀ mᵀ\]
+/// beside its covariance Σ, as a Schmidt–Kalman filter does for states that it considers and does not estimate:
 ///
 /// Σ′ = A Σ Aᵀ + A C Jᵀ + J Cᵀ Aᵀ + Σ_step, C′ = A C D + E\[ξ m′ᵀ\], A = Ad(later_from_earlier).
 ///
 /// Source: Schmidt, *Application of state-space methods to navigation problems*, 1966.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrelatedError {
-    /// J.
+    /// The derivative J of the step's error by m.
     pub(crate) by: CorrelatedSensitivities,
-    /// The diagonal of D.
+    /// The diagonal of the transition matrix D.
     pub(crate) keep: SVector<f64, CORRELATED>,
-    /// E\[ξ m′ᵀ\].
+    /// The cross-covariance E\[ξ m′ᵀ\].
     pub(crate) with: CorrelatedSensitivities,
-    /// E\[m mᵀ\].
+    /// The covariance E\[m mᵀ\] before the step.
     pub(crate) before: CorrelatedCovariance,
-    /// E\[m′ m′ᵀ\].
+    /// The covariance E\[m′ m′ᵀ\] after the step.
     pub(crate) after: CorrelatedCovariance,
 }
 
-/// How far errors that last are from zero: the first four independent of all others, the rest with the covariance `held`.
+/// The covariance of the correlated errors: four independent variances, then the 6×6 block `held`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CorrelatedCovariance {
     pub(crate) independent: Vector4<f64>,
@@ -47,7 +47,7 @@ pub(crate) struct CorrelatedCovariance {
 }
 
 impl CorrelatedCovariance {
-    /// The covariance of all.
+    /// The covariance as one matrix.
     pub(crate) fn matrix(&self) -> SMatrix<f64, CORRELATED, CORRELATED> {
         let mut all = SMatrix::<f64, CORRELATED, CORRELATED>::zeros();
         all.fixed_view_mut::<4, 4>(0, 0).set_diagonal(&self.independent);
@@ -56,7 +56,7 @@ impl CorrelatedCovariance {
     }
 }
 
-/// Carries Σ and C of a motion along a further step.
+/// The covariance Σ′ and cross-covariance C′ of a pose after a further step.
 pub(crate) fn carried(
     covariance: &Matrix6<f64>,
     sensitivities: &CorrelatedSensitivities,
@@ -73,7 +73,7 @@ pub(crate) fn carried(
     (covariance, scaled(&carried, keep) + with)
 }
 
-/// A.
+/// The adjoint A of `later_from_earlier`.
 fn later_from_earlier(motion: &Transform<Camera, Camera>) -> Matrix6<f64> {
     motion.inverse().adjoint()
 }
@@ -83,8 +83,10 @@ fn scaled(sensitivities: &CorrelatedSensitivities, by: &SVector<f64, CORRELATED>
 }
 
 impl RelativeMotion {
-    /// This motion and then `next`, as one motion: its J is A J + J_next D, its D the product. What is independent of all
-    /// else stays so; errors that last begin with the first step that has them.
+    /// The composition of this motion with the motion `next`.
+    ///
+    /// Its J is A J + J_next D, its D the product of both. Independent errors stay independent; correlated errors begin
+    /// with the first step that has them.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         let sensitivities = self.correlated.map_or_else(CorrelatedSensitivities::zeros, |correlated| correlated.with);

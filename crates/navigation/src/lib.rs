@@ -1,9 +1,35 @@
-//! The motion of the vehicle from image to image.
+//! Odometry, fusion with fixes, re-referencing policies and the pose graph.
 //!
-//! [`Odometry`] follows a stereo rig from pair to pair, by its images or by what other sensors say ([`Reading`]); what it finds is a [`OdometryTrajectory`]: segments of poses relative to
-//! the first camera, and what became of every pair. Where it cannot say how the rig moved it says so ([`Lost`]) instead
-//! of inventing a motion. A [`ObjectPose`] carries a fix along its steps; a [`Navigator`] goes
-//! from fix to fix and from object to object. This crate knows no truth.
+//! - An [`Odometry`] estimates the motion of a stereo rig from image pairs or from sensor readings ([`Reading`]). Its
+//!   result is an [`OdometryTrajectory`]: segments of poses relative to the first camera, and the outcome of every
+//!   pair. A pair without a reliable motion is [`Lost`]; no motion is invented.
+//! - An [`ObjectPose`] is a fix propagated by odometry.
+//! - A [`Navigator`] asks its [`Policy`] whether a fix is due, joins a new fix with the propagated pose by its
+//!   [`Fusion`], and detects displaced objects.
+//! - A [`PoseGraph`] holds key frames, odometry, fixes and loops; [`Traverse`] extends it during a dive.
+//!
+//! No function of this crate has access to ground truth.
+//!
+//! ```
+//! use seafix_component::Choice;
+//! use seafix_geometry::{Camera, Covariance6, Object, Transform};
+//! use seafix_navigation::{FUSIONS, ObjectPose, POLICIES, RelativeMotion, Situation};
+//!
+//! let pose = |x: f64| Transform::<Object, Camera>::exp(&[0.0, 0.0, 0.0, x, 0.0, 0.0].into());
+//! let fix = |x: f64| ObjectPose::new(pose(x), Covariance6::isotropic(0.01, 0.01));
+//!
+//! // Dead reckoning: one metre along x, with a standard deviation of 0.1 m for each axis.
+//! let step = Transform::<Camera, Camera>::exp(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0].into());
+//! let known = fix(0.0).after(&RelativeMotion::new(step, Covariance6::isotropic(0.01, 0.1)));
+//!
+//! // A fix is due 30 s after the last one.
+//! let policy = POLICIES.build(&Choice::named("interval").with("seconds", 30.0)).unwrap();
+//! assert!(policy.due(&Situation { seconds: 40.0, metres: 1.0, sigma: 0.1, in_view: true }));
+//!
+//! // The fused pose is more accurate than either input.
+//! let fused = FUSIONS.build(&Choice::named("fuse")).unwrap().take(&known, &fix(1.02)).unwrap();
+//! assert!(fused.covariance.position_sigma() < known.covariance.position_sigma());
+//! ```
 
 mod chain;
 mod consider_states;

@@ -1,4 +1,4 @@
-//! The camera relative to an object of a site, passed from one to the next.
+//! The camera's pose relative to one object of a site, and its transfer to another object.
 
 use seafix_geometry::{Covariance6, Object, Transform, World};
 
@@ -6,17 +6,17 @@ use crate::{ConsiderStates, ObjectPose, RelativeMotion, by_world};
 
 /// The camera's pose relative to one object of the site.
 ///
-/// A vehicle works at an object, so its pose relative to *that* object counts: the survey, which is
-/// far worse than a fix, enters only when the pose passes from one object to another.
+/// A vehicle works at an object, so its pose relative to *that* object counts. The error of the survey is far larger
+/// than that of a fix; it enters only when the pose is transferred from one object to another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Navigated {
-    /// The object, as its place in the site.
+    /// The object, as its index in the site.
     pub object: usize,
-    /// Where the camera is relative to it.
+    /// The camera's pose relative to the object.
     pub object_pose: ObjectPose,
 }
 
-/// Where an object stands, by the survey or by what was found of it since.
+/// The placement of an object in the world, surveyed or estimated since.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObjectPlacement {
     /// The pose.
@@ -26,17 +26,17 @@ pub struct ObjectPlacement {
 }
 
 impl Navigated {
-    /// The pose after the motion `step`, Eq. (6).
+    /// The pose after the motion `step`: the paper's Eq. (6).
     #[must_use]
     pub fn after(&self, step: &RelativeMotion) -> Self {
         Self { object_pose: self.object_pose.after(step), object: self.object }
     }
 
-    /// The same camera relative to `other`, by the world: Eq. (2).
+    /// The camera's pose relative to the object `other`, by way of the world: the paper's Eq. (2).
     ///
-    /// object_m_from_camera = W_m⁻¹ W_r T. With W_true = W Exp(ω) it errs by
-    /// ξ + Ad(T⁻¹) ω_r − Ad(T_m⁻¹) ω_m; the survey of the object it stays with does not matter. Both ω are
-    /// [consider_states](ConsiderStates): what one passage took up the way back gives away again.
+    /// `object_m_from_camera` = W_m⁻¹ W_r T. With W_true = W Exp(ω) its error is ξ + Ad(T⁻¹) ω_r − Ad(T_m⁻¹) ω_m. Both
+    /// survey errors ω are [consider states](ConsiderStates), so that a transfer to another object and back restores
+    /// the covariance.
     #[must_use]
     pub fn passed_to(&self, other: usize, places: &[ObjectPlacement]) -> Self {
         if other == self.object {

@@ -1,4 +1,4 @@
-//! From fix to fix: where the vehicle is, how well that is known, and why.
+//! Navigation from fix to fix: pose, covariance, and the reason of every change.
 
 use std::fmt;
 
@@ -10,16 +10,16 @@ use crate::{
     policy::{Policy, Situation},
 };
 
-/// What the navigated pose rests on.
+/// The basis of the navigated pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// On acoustics alone: no fix yet, or none that could be carried here.
+    /// The prior pose alone: there is no fix, or the last one could not be propagated to this instant.
     Prior,
-    /// A fix is due and an object should be in view, but none has been taken.
+    /// A search: a fix is due and an object should be in view, but no fix has been accepted.
     Searching,
-    /// On a fix of this instant.
+    /// A fix of this instant.
     Fixed,
-    /// On a fix carried along by odometry.
+    /// A fix propagated by odometry.
     DeadReckoning,
 }
 
@@ -34,68 +34,68 @@ impl fmt::Display for State {
     }
 }
 
-/// What a fix did.
+/// The effect of a fix.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// It was taken.
+    /// The fix was accepted.
     Taken,
-    /// It is of another object, and so poor that the pose stays relative to the one before.
+    /// The fix is of another object and too inaccurate; the pose stays relative to the previous object.
     Left,
-    /// It contradicts what is known and waits for others that say the same.
+    /// The fix contradicts the navigated pose; it waits for further fixes that agree with it.
     Doubted(Contradiction),
-    /// It and those before it agree with each other and not with what was known of the same object.
+    /// Several fixes agree with each other, but not with the known pose relative to their object; they replace it.
     Relocated,
-    /// It and those before it agree with each other, and not with another object: one of the two does not stand where the site
-    /// says, and no third has told yet which. Neither is moved.
+    /// The fix and those before it agree with each other, but not with another object. One of the two objects is
+    /// displaced, and no third object has shown which. Neither placement is changed.
     Disputed {
-        /// The two.
+        /// The two objects.
         objects: [usize; 2],
-        /// How far the second stands from its place if the first stands right (m).
+        /// The displacement (m) of the second object if the first one is where it was surveyed.
         metres: f64,
     },
-    /// An object does not stand where the site says; from now on it stands where it was found. The fix is taken.
+    /// An object is displaced: its placement in the site is replaced, and the fix is accepted.
     Displaced(Box<Displacement>),
 }
 
-/// An object that stands elsewhere than was believed.
+/// A displaced object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Displacement {
-    /// Which, as its place in the site.
+    /// The object, as its index in the site.
     pub object: usize,
-    /// From where it was believed to stand to where it stands, in its own frame.
+    /// The transform from the new to the old pose, in the object's own frame.
     pub old_from_new: Transform<Object, Object>,
-    /// Where it stands.
+    /// The new placement.
     pub place: ObjectPlacement,
 }
 
-/// A change of state, for the log.
+/// A change of the navigation state, for the log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateChange {
-    /// When (s since the navigator began).
+    /// Time of the change (s since the navigator began).
     pub seconds: f64,
-    /// The state before.
+    /// The previous state.
     pub from: State,
-    /// The state after.
+    /// The new state.
     pub to: State,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
-/// So many fixes in a row must say the same before they overrule what was known.
+/// The number of consecutive fixes that must agree before they overrule the known pose.
 const VOTES: usize = 3;
 
-/// Fixes of one object that were doubted, the latest carried along by odometry.
+/// The fixes of one object that contradicted the known pose; the latest is propagated by odometry.
 #[derive(Debug, Clone)]
 struct Doubt {
     latest: Navigated,
     votes: usize,
 }
 
-/// Two objects of which one stands elsewhere than was believed.
+/// Two objects of which one is displaced.
 #[derive(Debug, Clone)]
 struct Dispute {
     objects: [usize; 2],
-    /// Where each stands if it is the one that was moved.
+    /// The placement of each object if that object is the displaced one.
     moved: [ObjectPlacement; 2],
 }
 
@@ -104,13 +104,13 @@ impl Dispute {
         self.objects == [a, b] || self.objects == [b, a]
     }
 
-    /// Which of its two `object` is.
+    /// The position of `object` in the pair, 0 or 1.
     fn side(&self, object: usize) -> Option<usize> {
         self.objects.iter().position(|&one| one == object)
     }
 }
 
-/// Carries the last fix along, asks for the next, and joins it with what is known.
+/// A navigator: it propagates the last fix, requests the next one, and fuses it with the propagated pose.
 #[derive(Debug, Clone)]
 pub struct Navigator<'a> {
     policy: &'a dyn Policy,
@@ -119,7 +119,7 @@ pub struct Navigator<'a> {
     names: Vec<String>,
     known: Option<Navigated>,
     doubts: Vec<Option<Doubt>>,
-    /// With which other objects each has agreed.
+    /// For each object, the other objects that its fixes have agreed with.
     agreed: Vec<Vec<usize>>,
     disputes: Vec<Dispute>,
     state: State,
@@ -130,7 +130,7 @@ pub struct Navigator<'a> {
 }
 
 impl<'a> Navigator<'a> {
-    /// Begins without a fix, at a site with these objects.
+    /// A navigator without a fix, at a site with objects at `places`.
     pub fn new(places: Vec<ObjectPlacement>, policy: &'a dyn Policy, fusion: &'a dyn Fusion) -> Self {
         let n = places.len();
         Self {
@@ -150,60 +150,61 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// The same, its objects called by these names in what it says.
+    /// The same navigator, with names of the objects for its messages.
     #[must_use]
     pub fn with_names(mut self, names: Vec<String>) -> Self {
         self.names = names;
         self
     }
 
-    /// What the pose rests on.
+    /// The basis of the current pose.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Every change of state so far, with its reason.
+    /// All changes of state since the start, with their reasons.
     pub fn changes(&self) -> &[StateChange] {
         &self.changes
     }
 
-    /// The camera relative to the object it was last fixed at; `None` while there is no fix.
+    /// The camera's pose relative to the object of the last fix; `None` without a fix.
     pub fn pose(&self) -> Option<&Navigated> {
         self.known.as_ref()
     }
 
-    /// The camera relative to any object of the site, by the site model; between two objects of which one was moved, by what
-    /// was found of them.
+    /// The camera's pose relative to any object of the site, by the site model.
+    ///
+    /// Between two disputed objects the estimated placement is used instead.
     pub fn pose_at(&self, object: usize) -> Option<Navigated> {
         self.known.as_ref().map(|known| self.passed(known, object))
     }
 
-    /// Whether it is open whether an object stands where the site says.
+    /// Whether the placement of an object is disputed.
     pub fn is_disputed(&self, object: usize) -> bool {
         self.disputes.iter().any(|dispute| dispute.side(object).is_some())
     }
 
-    /// Where the objects stand, as far as is known by now.
+    /// The current placements of the objects.
     pub fn places(&self) -> &[ObjectPlacement] {
         &self.places
     }
 
-    /// Some time and the motion in it; without a motion the last fix is not carried across.
+    /// Propagates the pose by a motion over `seconds`; without a motion the last fix is dropped.
     pub fn advance(&mut self, seconds: f64, motion: Option<&RelativeMotion>) {
         self.seconds += seconds;
         let Some(motion) = motion else {
             self.known = None;
             self.doubts.fill(None);
             (self.fixed_at, self.metres) = (f64::NEG_INFINITY, f64::INFINITY);
-            self.turn(State::Prior, "the motion is unknown: the last fix is not carried across".to_owned());
+            self.turn(State::Prior, "the motion is unknown: the last fix is dropped".to_owned());
             return;
         };
         self.metres += motion.motion.translation().norm();
         if let Some(known) = &mut self.known {
             *known = known.after(motion);
-            // Whether it still searches is told when the next fix is asked for.
+            // The next call of `due` decides whether the search continues.
             if self.state != State::Searching {
-                self.turn(State::DeadReckoning, "carried along by odometry".to_owned());
+                self.turn(State::DeadReckoning, "propagated by odometry".to_owned());
             }
         }
         for doubt in self.doubts.iter_mut().flatten() {
@@ -211,30 +212,32 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// Whether a fix should be tried now; `in_view` says whether an object should be seen. It searches from then on, until a
-    /// fix is taken, none is due any more, or no object should be in view.
+    /// Whether a fix should be tried now; `in_view`: an object should be visible.
+    ///
+    /// The state is `Searching` from then on, until a fix is accepted, none is due, or no object should be in view.
     pub fn due(&mut self, in_view: bool) -> bool {
         let due = self.is_due(0.0, in_view);
         if due && in_view {
             self.turn(State::Searching, "a fix is due and an object should be in view".to_owned());
         } else if self.state == State::Searching {
-            let why = if due { "no object should be in view any more" } else { "no fix is due any more" };
+            let why = if due { "no object should be in view" } else { "no fix is due" };
             self.turn(self.carried(), why.to_owned());
         }
         due
     }
 
-    /// An instant `seconds` after the last one whose images tell no motion: nothing is carried there, and nothing forgotten.
-    /// Whether a fix would have been due.
+    /// Whether a fix would be due at an instant without a motion, `seconds` after the last one.
+    ///
+    /// The pose is neither propagated nor dropped.
     pub fn blind(&mut self, seconds: f64, in_view: bool) -> bool {
         let due = self.is_due(seconds, in_view);
         if self.state == State::Fixed || self.state == State::Searching && !(due && in_view) {
-            self.turn(self.carried(), "no motion to this instant: the last pose waits for one".to_owned());
+            self.turn(self.carried(), "no motion to this instant: the last pose is kept".to_owned());
         }
         due
     }
 
-    /// Without a fix of this instant, and without looking for one.
+    /// The state without a fix of this instant and without a search.
     fn carried(&self) -> State {
         if self.known.is_some() { State::DeadReckoning } else { State::Prior }
     }
@@ -249,15 +252,15 @@ impl<'a> Navigator<'a> {
         self.policy.due(&Situation { seconds, metres: self.metres, sigma, in_view })
     }
 
-    /// A fix of one of the objects at this instant.
+    /// Takes a fix of one of the objects at this instant.
     pub fn fix(&mut self, fix: &Navigated) -> Event {
         let object = fix.object;
         let Some(known) = self.known.clone() else {
-            self.take(fix.clone(), format!("first fix, at {}", self.names[object]));
+            self.take(fix.clone(), format!("first fix at {}", self.names[object]));
             return Event::Taken;
         };
         if self.disputes.iter().any(|dispute| dispute.is_of(object, known.object)) {
-            // Where each stands seen from the other is known, whichever was moved.
+            // The relative placement of a disputed pair is known, whichever of the two is displaced.
             return match self.agrees(&known, fix, None) {
                 Ok(()) => {
                     self.doubts[object] = None;
@@ -288,8 +291,9 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// A pose at this instant that rests on more than the fixes in a row: a key frame was found again, and the way closed
-    /// over the graph. It is taken where it is better known than what there was, and `why` said.
+    /// Takes a pose at this instant that results from a closed loop of the pose graph.
+    ///
+    /// It is accepted if its covariance is smaller than that of the known pose; `why` is the logged reason.
     pub fn settle(&mut self, pose: &Navigated, why: String) -> bool {
         let better = self.known.as_ref().is_none_or(|known| {
             let known = known.passed_to(pose.object, &self.places).object_pose;
@@ -313,17 +317,18 @@ impl<'a> Navigator<'a> {
             return Event::Doubted(contradiction);
         }
         if object == known.object {
-            let why = format!("{VOTES} fixes at {} agree with each other, not with what was known", self.names[object]);
+            let why =
+                format!("{VOTES} fixes at {} agree with each other and contradict the known pose", self.names[object]);
             self.take(fix.clone(), why);
             return Event::Relocated;
         }
-        // Where each stands if the other stands right.
+        // The placement of each object if the other one is where it was surveyed.
         let moved = [found(&self.places[object], fix, known), found(&self.places[known.object], known, fix)];
         let others = |one: usize, other: usize| self.agreed[one].iter().any(|&third| third != other);
         match (others(known.object, object), others(object, known.object)) {
             (false, true) => self.displace(known.object, moved[0], fix),
             (true, false) => self.displace(object, moved[1], fix),
-            // None other confirms just one of them: that the later was seen later says nothing.
+            // No other object confirms exactly one of them; the order of the fixes is no evidence.
             _ => {
                 let metres = self.shift(object, &moved[1]).translation().norm();
                 let objects = [known.object, object];
@@ -333,15 +338,17 @@ impl<'a> Navigator<'a> {
                     self.agreed[one].retain(|&third| third != other);
                 }
                 let names = objects.map(|one| self.names[one].as_str());
-                let why = format!("{} or {} stands {metres:.3} m from where it was surveyed", names[0], names[1]);
+                let why = format!("{} or {} stands {metres:.3} m from its surveyed position", names[0], names[1]);
                 self.take(fix.clone(), why);
                 Event::Disputed { objects, metres }
             }
         }
     }
 
-    /// Which object of an open dispute was moved, and where it stands: a fix passes between one of the two and a third, and it
-    /// agrees with the survey of that one or with its having been moved, not with both.
+    /// The displaced object of an open dispute, and its placement.
+    ///
+    /// The dispute is decided by a fix between one of the two objects and a third. It must agree with exactly one of
+    /// two hypotheses: the object is where it was surveyed, or it is displaced.
     fn verdict(&self, known: &Navigated, fix: &Navigated) -> Option<(usize, ObjectPlacement)> {
         self.disputes.iter().find_map(|dispute| {
             let side = match (dispute.side(known.object), dispute.side(fix.object)) {
@@ -359,7 +366,7 @@ impl<'a> Navigator<'a> {
         })
     }
 
-    /// Whether a fix agrees with what is known, where an object stands elsewhere than was believed.
+    /// Whether a fix agrees with the known pose, optionally with one object displaced.
     fn agrees(
         &self,
         known: &Navigated,
@@ -377,7 +384,7 @@ impl<'a> Navigator<'a> {
         self.fusion.take(&passed.object_pose, &fix.object_pose).map(drop)
     }
 
-    /// What is known, relative to another object.
+    /// The known pose relative to another object.
     fn passed(&self, known: &Navigated, object: usize) -> Navigated {
         let Some(dispute) = self.disputes.iter().find(|dispute| dispute.is_of(object, known.object)) else {
             return known.passed_to(object, &self.places);
@@ -389,12 +396,12 @@ impl<'a> Navigator<'a> {
         known.passed_to(object, &places)
     }
 
-    /// From where an object was believed to stand to `place`, in its own frame.
+    /// The transform from the new placement of an object to the known one, in its own frame.
     fn shift(&self, object: usize, place: &ObjectPlacement) -> Transform<Object, Object> {
         self.places[object].world_from_object.inverse() * place.world_from_object
     }
 
-    /// An object stands elsewhere; the fix that told is taken.
+    /// Replaces the placement of a displaced object and accepts the fix.
     fn displace(&mut self, moved: usize, place: ObjectPlacement, fix: &Navigated) -> Event {
         let old_from_new = self.shift(moved, &place);
         self.places[moved] = place;
@@ -403,7 +410,7 @@ impl<'a> Navigator<'a> {
         self.disputes.retain(|dispute| dispute.side(moved).is_none());
         let (shift, turn) = (old_from_new.translation().norm(), so3::angle(&old_from_new.rotation()).to_degrees());
         let name = &self.names[moved];
-        self.take(fix.clone(), format!("{name} stands {shift:.3} m and {turn:.2}° from where it was surveyed"));
+        self.take(fix.clone(), format!("{name} stands {shift:.3} m and {turn:.2}° from its surveyed pose"));
         Event::Displaced(Box::new(Displacement { object: moved, old_from_new, place }))
     }
 
@@ -429,8 +436,9 @@ impl<'a> Navigator<'a> {
     }
 }
 
-/// Where an object stands that is seen from the same camera as one whose place is known:
-/// W_m = W_r T_r T_m⁻¹, erring by Ad(T_m T_r⁻¹) ω_r + Ad(T_m)(ξ_r − ξ_m) in its own frame.
+/// The placement of an object seen by the same camera as an object with a known placement.
+///
+/// W_m = W_r T_r T_m⁻¹; its error in its own frame is Ad(T_m T_r⁻¹) ω_r + Ad(T_m)(ξ_r − ξ_m).
 fn found(place: &ObjectPlacement, by: &Navigated, seen: &Navigated) -> ObjectPlacement {
     let (t_r, t_m) = (by.object_pose.object_from_camera, seen.object_pose.object_from_camera);
     let across = (t_m * t_r.inverse()).adjoint();

@@ -1,4 +1,4 @@
-//! What every odometry does.
+//! The interface of all odometries.
 
 use seafix_component::{Registry, entry};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
@@ -9,7 +9,7 @@ use crate::{DvlGyro, Icp, OdometryOutcome, OdometryTrajectory, Reading, Stereo, 
 /// The two images of one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct StereoPair<'a> {
-    /// When they were taken (ns).
+    /// The time of exposure (ns).
     pub stamp_ns: u64,
     /// The left image.
     pub left: &'a Image,
@@ -17,29 +17,27 @@ pub struct StereoPair<'a> {
     pub right: &'a Image,
 }
 
-/// A stamp that is not after the one before.
+/// A stamp that is not later than the previous one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "pair {pair}: stamp {stamp_ns} ns is not after the one before, {before_ns} ns; give the pairs in order of time"
-)]
+#[error("pair {pair}: stamp {stamp_ns} ns is not later than the previous one, {before_ns} ns; sort the pairs by time")]
 pub struct NotAfter {
-    /// Which pair, from 0.
+    /// The index of the pair, from 0.
     pub pair: usize,
     /// Its stamp (ns).
     pub stamp_ns: u64,
-    /// The stamp before (ns).
+    /// The previous stamp (ns).
     pub before_ns: u64,
 }
 
-/// The stamps of a journey's pairs, each after the one before.
+/// The last stamp of a sequence, to check that stamps increase.
 #[derive(Debug, Default)]
 pub(crate) struct Stamps(Option<u64>);
 
 impl Stamps {
-    /// Takes the stamp of the next pair, `pair` its number from 0.
+    /// Takes the stamp of the pair with index `pair`.
     ///
     /// # Errors
-    /// [`NotAfter`] when it is not the next; nothing changes then.
+    /// [`NotAfter`] if the stamp does not increase; the state is then unchanged.
     pub(crate) fn take(&mut self, pair: usize, stamp_ns: u64) -> Result<(), NotAfter> {
         if let Some(before_ns) = self.0.filter(|before| *before >= stamp_ns) {
             return Err(NotAfter { pair, stamp_ns, before_ns });
@@ -49,14 +47,23 @@ impl Stamps {
     }
 }
 
-/// Computes the motion of a stereo rig from the images it took, or from what other sensors of the vehicle say.
+/// An odometry: it computes the motion of a stereo rig from its images or from readings of other sensors.
+///
+/// ```
+/// use seafix_component::Choice;
+/// use seafix_navigation::ODOMETRIES;
+///
+/// let odometry = ODOMETRIES.build(&Choice::named("stereo").with("window", 4)).unwrap();
+/// assert!(!odometry.listens(), "stereo odometry needs images only");
+/// assert!(ODOMETRIES.build(&Choice::named("dvl-gyro")).unwrap().listens());
+/// ```
 pub trait Odometry: Send + Sync + std::fmt::Debug {
-    /// Whether it goes by readings ([`OdometrySession::sense`]) and cannot do without.
+    /// Whether the odometry needs sensor readings ([`OdometrySession::sense`]).
     fn listens(&self) -> bool {
         false
     }
 
-    /// Begins with nothing seen yet, for this rig, which sits there in the vehicle. The result does not depend on who works.
+    /// A new session for a rig and its mounting in the vehicle; the result does not depend on the number of threads.
     fn begin<'a>(
         &'a self,
         rig: &'a StereoRig,
@@ -65,21 +72,21 @@ pub trait Odometry: Send + Sync + std::fmt::Debug {
     ) -> Box<dyn OdometrySession + 'a>;
 }
 
-/// An odometry at work: pairs go in, in order of time, and between them readings as they come; poses come out.
+/// An odometry at work on one sequence: pairs in order of time and readings go in, poses come out.
 pub trait OdometrySession: Send {
-    /// Takes a reading, whenever it was made; one that goes by images alone has no use for it.
+    /// Takes a sensor reading; readings may arrive late. An odometry that uses images alone ignores it.
     fn sense(&mut self, _reading: &Reading) {}
 
-    /// Takes the next pair; what became of it, as far as is known by now.
+    /// Takes the next pair and returns its preliminary outcome.
     ///
     /// # Errors
-    /// [`NotAfter`] when it is not the next; nothing changes then.
+    /// [`NotAfter`] if its stamp does not increase; the state is then unchanged.
     fn advance(&mut self, pair: &StereoPair<'_>) -> Result<OdometryOutcome, NotAfter>;
 
-    /// The last waypoint and the number of its segment: what one that navigates needs of the journey.
+    /// The last waypoint and the index of its segment: the input of a navigator.
     fn latest(&self) -> Option<(usize, Waypoint)>;
 
-    /// All that is known by now: later pairs may still improve poses and explain outcomes.
+    /// The trajectory up to now; later pairs may still refine poses and outcomes.
     fn trajectory(&self) -> OdometryTrajectory;
 }
 

@@ -1,72 +1,74 @@
-//! What an odometry found: segments of poses, and what became of every pair.
+//! The result of an odometry: segments of poses, and the outcome of every pair.
 
 use seafix_geometry::{Camera, Covariance6, Transform, World};
 
 use crate::{CorrelatedError, Device};
 
-/// All that an odometry found.
+/// The result of an odometry.
 #[derive(Debug, Clone, Default)]
 pub struct OdometryTrajectory {
-    /// Stretches without a break, in order of time; every pair that was followed is in one.
+    /// Segments without a break, in order of time; every followed pair is part of one.
     pub segments: Vec<Segment>,
-    /// What became of each pair, in their order.
+    /// The outcome of each pair, in order.
     pub outcomes: Vec<OdometryOutcome>,
-    /// Milliseconds that each stage took in all, in the order of the work.
+    /// Total time of each stage (ms), in order of execution.
     pub times: Vec<(&'static str, f64)>,
 }
 
-/// A stretch over which the motion is known.
+/// A part of the trajectory over which the motion is known.
 #[derive(Debug, Clone)]
 pub struct Segment {
-    /// Why the motion from the segment before to this one is unknown; absent for the first.
+    /// The reason of the break before this segment; `None` for the first.
     pub broken: Option<Lost>,
-    /// Its poses, in order of time.
+    /// The poses, in order of time.
     pub poses: Vec<Waypoint>,
 }
 
-/// Where the left camera was at one instant.
+/// The pose of the left camera at one instant.
 #[derive(Debug, Clone, Copy)]
 pub struct Waypoint {
-    /// When (ns).
+    /// Time (ns).
     pub stamp_ns: u64,
-    /// Its pose. The world is the left camera of the journey's first waypoint. A segment after a break begins where the
-    /// one before ended: the motion between is unknown and left out, not guessed.
+    /// The pose; the world is the left camera's frame at the first waypoint of the trajectory.
+    ///
+    /// A segment after a break begins where the previous one ended: the motion between them is unknown and omitted, not
+    /// extrapolated.
     pub world_from_camera: Transform<World, Camera>,
-    /// The motion from the waypoint before; absent for the first of a segment.
+    /// The motion from the previous waypoint; `None` for the first of a segment.
     pub local: Option<RelativeMotion>,
 }
 
 /// The motion between two successive waypoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RelativeMotion {
-    /// `earlier_from_later`, when the later pair was first seen.
+    /// The motion `earlier_from_later`, as estimated when the later pair arrived.
     pub motion: Transform<Camera, Camera>,
     /// Its covariance.
     pub covariance: Covariance6<Camera, Camera>,
-    /// What its error has in common with those of the steps around it; nothing where it is independent of them.
+    /// The part of its error that is correlated with other steps; `None` if the error is independent.
     pub correlated: Option<CorrelatedError>,
 }
 
 impl RelativeMotion {
-    /// A motion that errs independently of all others.
+    /// A motion whose error is independent of all other errors.
     pub fn new(motion: Transform<Camera, Camera>, covariance: Covariance6<Camera, Camera>) -> Self {
         Self { motion, covariance, correlated: None }
     }
 }
 
-/// What became of a pair.
+/// The outcome of one pair.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OdometryOutcome {
-    /// A segment begins with it.
+    /// The pair begins a segment.
     Began,
-    /// Its motion is known.
+    /// The motion of the pair is known.
     Followed {
-        /// Landmarks that were sought in it; none by an odometry that has none.
+        /// Number of landmarks searched for in the pair; 0 for an odometry without landmarks.
         sought: usize,
-        /// Those that were found and agree with its pose.
+        /// Number of landmarks that were found and agree with the pose.
         found: usize,
     },
-    /// It was left out.
+    /// The pair was skipped.
     Skipped(Lost),
 }
 
@@ -88,102 +90,105 @@ impl std::fmt::Display for Side {
     }
 }
 
-/// Why a motion is unknown.
+/// The reason of an unknown motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Lost {
-    /// An image that shows nothing.
-    #[error("the {0} image shows nothing: its brightness varies by {1:.2} grey levels")]
+    /// A blank image.
+    #[error("the {0} image is blank: its brightness varies by {1:.2} grey levels")]
     Blank(Side, f64),
-    /// An image at the end of its range.
-    #[error("the {0} image is saturated: {1:.0} % of it is white")]
+    /// A saturated image.
+    #[error("the {0} image is saturated: {1:.0} % of its pixels are white")]
     Saturated(Side, f64),
-    /// The same image again.
-    #[error("the {0} image is the one before again, bit for bit: the camera stands still or is frozen")]
+    /// A repeated image.
+    #[error("the {0} image repeats the previous one bit for bit: the camera stands still or is frozen")]
     Frozen(Side),
-    /// Too few points to begin or go on with.
-    #[error("{found} points measured; {needed} are needed")]
+    /// Too few measured points.
+    #[error("{found} points measured; at least {needed} are needed")]
     FewPoints {
-        /// How many there are.
+        /// Number of points.
         found: usize,
-        /// How many are needed.
+        /// Minimum number of points.
         needed: usize,
     },
-    /// Too few points in common.
-    #[error("{found} points look like points of the pair before; {needed} are needed")]
+    /// Too few matches with the previous pair.
+    #[error("{found} points match the previous pair; at least {needed} are needed")]
     FewMatches {
-        /// How many there are.
+        /// Number of matches.
         found: usize,
-        /// How many are needed.
+        /// Minimum number of matches.
         needed: usize,
     },
-    /// No motion explains enough of what is in common.
-    #[error("no motion explains more than {found} of {matches} points in common; {needed} are needed")]
+    /// No motion that explains enough matches.
+    #[error("no motion explains more than {found} of {matches} matches; at least {needed} are needed")]
     NoConsensus {
-        /// How many the best motion explains.
+        /// Number of matches that the best motion explains.
         found: usize,
-        /// Of how many.
+        /// Number of matches.
         matches: usize,
-        /// How many are needed.
+        /// Minimum number of explained matches.
         needed: usize,
     },
-    /// What stands still in the image may be a part of the vehicle: other points moved, and of it none has ever been seen to.
-    #[error("{still} points stand still in the image and {moving} agree on a motion: the vehicle's may be either")]
+    /// Static points that may belong to the vehicle: other points moved, and no static point has ever moved in the
+    /// image.
+    #[error(
+        "{still} points are static in the image and {moving} agree on a motion: the static ones may be part of the vehicle"
+    )]
     Still {
-        /// How many stand still.
+        /// Number of static points.
         still: usize,
-        /// How many of the others agree on a motion.
+        /// Number of other points that agree on a motion.
         moving: usize,
     },
-    /// The motion that explains the points is not determined well enough.
-    #[error("the motion is known to {0:.3} m only")]
+    /// A motion with a position uncertainty above the limit (m).
+    #[error("the motion is too uncertain: its position has a standard deviation of {0:.3} m")]
     Weak(f64),
-    /// A sensor that it goes by is not heard.
-    #[error("the {device} says nothing that can be used for {seconds:.3} s; at most {max} s are bridged")]
+    /// A required sensor without usable readings.
+    #[error("the {device} gave no usable reading for {seconds:.3} s; at most {max} s are bridged")]
     Silent {
-        /// Which.
+        /// The sensor.
         device: Device,
-        /// How long (s).
+        /// Time without a reading (s).
         seconds: f64,
-        /// What is bridged (s).
+        /// Maximum time that is bridged (s).
         max: f64,
     },
-    /// Too long a time between two pairs.
-    #[error("{seconds:.3} s without a pair that could be followed; at most {max} s are bridged{}", units(.seconds))]
+    /// Too long a time between two usable pairs.
+    #[error("{seconds:.3} s without a usable pair; at most {max} s are bridged{}", units(.seconds))]
     Gap {
-        /// How long (s).
+        /// Time between the pairs (s).
         seconds: f64,
-        /// What is bridged (s).
+        /// Maximum time that is bridged (s).
         max: f64,
     },
-    /// A motion faster than the vehicle can be.
+    /// A motion faster than the maximum speed.
     #[error("a motion of {speed:.2} m/s{}", unlikely(.seconds, .max))]
     Jump {
-        /// How fast (m/s).
+        /// Speed (m/s).
         speed: f64,
-        /// In what time (s).
+        /// Time between the pairs (s).
         seconds: f64,
-        /// The fastest that is believed (m/s).
+        /// Maximum speed (m/s).
         max: f64,
     },
 }
 
-/// What a gap of more than a year suggests.
+/// A hint for a gap of more than a year.
 fn units(seconds: &f64) -> &'static str {
     const YEAR: f64 = 365.25 * 86_400.0;
     if *seconds > YEAR { "; that is more than a year: are seconds and nanoseconds mixed?" } else { "" }
 }
 
-/// What a motion too fast suggests: cameras take no two pairs within a millisecond, else it is the vehicle that cannot.
+/// A hint for a motion that is too fast: a pair within a millisecond indicates wrong stamps.
 fn unlikely(seconds: &f64, max: &f64) -> String {
     const AT_ONCE: f64 = 1e-3;
     if *seconds <= AT_ONCE {
-        return format!(", as {:.6} ms passed: are the stamps right?", 1e3 * seconds);
+        return format!(", because {:.6} ms passed: are the stamps right?", 1e3 * seconds);
     }
-    format!("; the vehicle moves at most at {max} m/s")
+    format!("; the maximum speed is {max} m/s")
 }
 
 impl OdometryTrajectory {
-    /// The length of the way over all segments (m).
+    /// The path length over all segments (m).
     pub fn length(&self) -> f64 {
         let steps = self.segments.iter().flat_map(|segment| segment.poses.windows(2));
         steps
@@ -192,8 +197,9 @@ impl OdometryTrajectory {
             .fold(0.0, |path, step| path + step)
     }
 
-    /// The median share of the landmarks sought in a pair that were found and agree with its pose; `None` when no pair
-    /// was followed by landmarks. Where much of what is in view moves otherwise than the rest it is small.
+    /// The median fraction of the landmarks in a pair that were found and agree with its pose.
+    ///
+    /// It is small if much of the view moves differently from the rest. `None` if no pair was followed by landmarks.
     pub fn agreement(&self) -> Option<f64> {
         let fraction = |outcome: &OdometryOutcome| match outcome {
             OdometryOutcome::Followed { sought, found } if *sought > 0 => Some(*found as f64 / *sought as f64),

@@ -1,23 +1,23 @@
-//! What the navigation sensors of a vehicle say.
+//! Readings of a vehicle's navigation sensors.
 
 use std::fmt;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A navigation sensor whose readings an odometry may go by.
+/// A navigation sensor whose readings an odometry may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Device {
-    /// A Doppler velocity log: velocity over ground of its place in the vehicle (m/s, body frame).
+    /// A Doppler velocity log: velocity over ground at its mounting point (m/s, body frame).
     Doppler,
-    /// A gyro: rate of turn of the vehicle against the world (rad/s, body frame).
+    /// A gyro: angular rate of the vehicle relative to the world (rad/s, body frame).
     Gyro,
 }
 
 impl Device {
-    /// All of them.
+    /// All devices.
     pub const ALL: [Self; 2] = [Self::Doppler, Self::Gyro];
 
-    /// Its name in logs.
+    /// The device's name in logs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Doppler => "doppler",
@@ -25,7 +25,7 @@ impl Device {
         }
     }
 
-    /// The device of this name.
+    /// The device with a given name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|device| device.name() == name)
     }
@@ -40,15 +40,15 @@ impl fmt::Display for Device {
     }
 }
 
-/// A reading: three numbers of the body frame, and how far each may be off.
+/// A sensor reading: three components in the body frame, with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Who says it.
+    /// The sensor.
     pub device: Device,
-    /// When it was so (ns); it may be told later.
+    /// Time of the measurement (ns); the reading may arrive later.
     pub stamp_ns: u64,
-    /// What it says.
+    /// The measured value.
     pub value: Vector3<f64>,
-    /// The covariance of its noise; what the device has wrong all the time is not in it.
+    /// The covariance of its noise; constant errors of the sensor are not included.
     pub covariance: Matrix3<f64>,
 }

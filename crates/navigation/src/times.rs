@@ -1,8 +1,8 @@
-//! How long the stages took.
+//! Computing time of the stages.
 
 use std::time::Instant;
 
-/// Milliseconds of each stage.
+/// Total time of each stage (ms).
 #[derive(Debug, Default)]
 pub(crate) struct Times(pub(crate) Vec<(&'static str, f64)>);
 

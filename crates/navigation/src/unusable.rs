@@ -1,22 +1,22 @@
-//! Images that show no motion.
+//! Checks for images from which no motion can be estimated.
 
 use seafix_vision::Image;
 
 use crate::{Lost, Side};
 
-/// Brightness that varies by less (grey levels) shows nothing: it is noise and rounding.
+/// Minimum standard deviation of the brightness (grey levels); below it an image holds only noise and rounding.
 const MIN_VARIATION: f64 = 1.0;
-/// A pixel this bright is at the end of its range.
+/// Brightness of a saturated pixel (grey levels).
 const WHITE: f32 = 254.5;
-/// The largest share of such pixels.
+/// Maximum fraction of saturated pixels.
 const MAX_WHITE: f64 = 0.5;
 
-/// The last images that showed anything, as they came: what a frozen camera repeats.
+/// The last usable pair of raw images, to recognise a frozen camera.
 #[derive(Debug, Default)]
 pub(crate) struct RawImages(Option<[Image; 2]>);
 
 impl RawImages {
-    /// Why a motion cannot be seen in these images; else they are kept, for the next.
+    /// The reason why the images are unusable; usable images are kept for the next comparison.
     pub(crate) fn take(&mut self, images: [&Image; 2]) -> Option<Lost> {
         let lost = unusable(images, self.0.as_ref().map(|[left, right]| [left, right]));
         if lost.is_none() {
@@ -29,7 +29,7 @@ impl RawImages {
     }
 }
 
-/// Why a motion cannot be seen in these images, if so; `before`: the pair before.
+/// The reason why the images are unusable; `before` is the previous pair.
 fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
     for (side, image) in [Side::Left, Side::Right].into_iter().zip(images) {
         let pixels = image.pixels();
@@ -38,7 +38,7 @@ fn unusable(images: [&Image; 2], before: Option<[&Image; 2]>) -> Option<Lost> {
         for row in pixels.chunks(image.width()) {
             let (mut s, mut q) = (0.0_f32, 0.0_f32);
             for &pixel in row {
-                // About mid grey, so that squares keep their digits.
+                // Values relative to mid grey keep the squares small and precise.
                 let off = pixel - 128.0;
                 s += off;
                 q += off * off;

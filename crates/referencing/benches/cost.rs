@@ -1,8 +1,8 @@
-//! What a call costs beside Kabsch's, beside Eigen's `umeyama`, in instructions and in allocations.
+//! Cost of a solver call relative to Kabsch and to Eigen's `umeyama`: time, instructions and allocations.
 //!
 //! Thirteen points, one thread, minima of interleaved repetitions: `cargo bench -p seafix-referencing --bench cost`.
-//! Instructions are counted where `valgrind` is installed. `umeyama` is compiled with `c++ -O3` where Eigen's headers
-//! are found: in `EIGEN_INCLUDE`, or in `/usr/include/eigen3`.
+//! Instructions are counted if `valgrind` is installed. `umeyama` is compiled with `c++ -O3` if Eigen's headers are in
+//! `EIGEN_INCLUDE` or in `/usr/include/eigen3`.
 
 #![allow(clippy::print_stdout)]
 
@@ -28,7 +28,7 @@ fn main() {
     let data = Observations { points: points(&rig, 13), rig: Some(&rig) };
     let choices = choices();
     let solvers: Vec<_> = choices.iter().map(|(_, choice)| SOLVERS.build(choice).expect("in range")).collect();
-    // As its own child under valgrind: so many calls of one solver, and nothing else.
+    // The child process under valgrind: `calls` calls of one solver.
     let given: Vec<String> = std::env::args().collect();
     if let Some(place) = given.iter().position(|word| word == "--calls") {
         let [which, calls] = [1, 2].map(|i| given[place + i].parse::<usize>().expect("a number"));
@@ -37,7 +37,7 @@ fn main() {
         }
         return;
     }
-    // As many calls of each as take a quarter of a millisecond, fifty at most.
+    // The number of calls of each solver in a quarter of a millisecond, at most fifty.
     let calls: Vec<u32> = solvers
         .iter()
         .map(|solver| {
@@ -86,7 +86,7 @@ fn main() {
     }
 }
 
-/// Instructions of one call: what ten calls and `more` of them besides differ by.
+/// The instructions of one call: the difference between ten calls and ten plus `more`, divided by `more`.
 fn instructions(which: usize, more: usize) -> Option<f64> {
     let count = |calls: usize| -> Option<f64> {
         let output = Command::new("valgrind")
@@ -101,7 +101,7 @@ fn instructions(which: usize, more: usize) -> Option<f64> {
     Some((count(10 + more)? - count(10)?) / more as f64)
 }
 
-/// The compiled peer.
+/// The compiled reference program.
 fn umeyama() -> Option<PathBuf> {
     let include = std::env::var("EIGEN_INCLUDE").unwrap_or_else(|_| "/usr/include/eigen3".to_owned());
     if !Path::new(&include).join("Eigen/Dense").exists() {

@@ -1,4 +1,4 @@
-//! How long each solver takes, by the registry: a new one is timed the day it is listed.
+//! Run time of each registered solver.
 //!
 //! Thirteen points, one thread: `cargo bench -p seafix-referencing --bench solvers`.
 

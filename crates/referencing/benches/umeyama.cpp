@@ -1,4 +1,4 @@
-// Eigen's umeyama on 3×13 points: nanoseconds a call, the least of many repetitions.
+// Eigen's umeyama on 3×13 points: nanoseconds per call, minimum of many repetitions.
 #include <Eigen/Dense>
 #include <Eigen/Geometry>
 #include <chrono>
@@ -13,7 +13,7 @@ int main() {
     for (int round = 0; round < 400; ++round) {
         const auto start = std::chrono::steady_clock::now();
         for (int i = 0; i < 100; ++i) {
-            seen(0, 0) += 1e-12;  // nothing is hoisted out of the loop
+            seen(0, 0) += 1e-12;  // prevents hoisting out of the loop
             sum += Eigen::umeyama(seen, model, false)(0, 3);
         }
         const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;

@@ -1,4 +1,4 @@
-//! Stage 1: which cloud points the prior allows for each model point.
+//! Stage 1: the cloud points that the prior allows for each model point.
 
 use std::{cell::RefCell, collections::VecDeque};
 
@@ -13,18 +13,20 @@ use crate::{
     lanes::{LANES, ones_of, packed},
 };
 
-/// How the shell about the predicted place of a model point is drawn when the prior is Gaussian.
+/// The gate about the predicted position of a model point under a Gaussian prior.
 ///
-/// In TOML `gate = { chi-square = 0.99 }` or `gate = { box = 0.25 }`.
+/// It is written in TOML as `gate = { chi-square = 0.99 }` or `gate = { box = 0.25 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gate {
-    /// The paper's shell: a box of this half-size (m) along the camera's axes, the same for every
-    /// point ("by the known navigation error", Sec. 2.2); its faces belong to it.
+    /// The paper's shell: a box of this half-size (m) along the camera's axes.
+    ///
+    /// The size is equal for every point ("by the known navigation error", Sec. 2.2); the faces belong to the box.
     Box(f64),
-    /// The ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence) with S = J Σ_prior Jᵀ + Σ_triangulation +
-    /// σ_model² I, J the derivative of the predicted place by the pose: the true
-    /// cloud point lies in it with this confidence (Bar-Shalom and Fortmann, *Tracking and Data
+    /// The χ² ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ²₃(confidence).
+    ///
+    /// S = J Σ_prior Jᵀ + Σ_triangulation + σ_model² I, with J the derivative of the predicted position by the pose.
+    /// The true cloud point lies in the ellipsoid with this confidence (Bar-Shalom and Fortmann, *Tracking and Data
     /// Association*, 1988, Sec. 5.2).
     ChiSquare(f64),
 }
@@ -36,12 +38,13 @@ impl Default for Gate {
 }
 
 impl Gate {
-    /// What is wrong with the setting, if something is.
+    /// Checks the range of the gate.
     ///
     /// # Errors
+    ///
     /// A half-size that is not positive and finite, or a confidence outside (0, 1).
     pub fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         let checked = match *self {
             Self::Box(half) => in_range(half > 0.0 && half.is_finite(), "box", half, "a positive half-size in metres"),
             Self::ChiSquare(confidence) => {
@@ -53,23 +56,24 @@ impl Gate {
     }
 }
 
-/// For each model point, the cloud points that may be it: indices, ascending, without repetition.
+/// The candidates of each model point: indices of cloud points, ascending, without repetition.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Candidates {
-    /// One list a model point; empty where nothing may be it.
+    /// One list per model point; empty if there is no candidate.
     pub lists: Vec<Vec<usize>>,
 }
 
 impl Candidates {
-    /// Every cloud point for every model point: the search without shells.
+    /// Every cloud point for every model point: a search without gates.
     pub fn all(model: usize, cloud: usize) -> Self {
         Self { lists: vec![(0..cloud).collect(); model] }
     }
 
-    /// The lists of these pairs (model, cloud), in any order.
+    /// The lists of these pairs (model, cloud), given in any order.
     ///
     /// # Panics
-    /// When a model index is not below `model`.
+    ///
+    /// If a model index is not below `model`.
     pub fn from_pairs(model: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
         let mut lists = vec![Vec::new(); model];
         for (i, j) in pairs {
@@ -82,12 +86,12 @@ impl Candidates {
         Self { lists }
     }
 
-    /// How many pairs there are.
+    /// The number of candidate pairs.
     pub fn pairs(&self) -> usize {
         self.lists.iter().map(Vec::len).sum()
     }
 
-    /// How many model points have a candidate.
+    /// The number of model points with a candidate.
     pub fn with_candidates(&self) -> usize {
         self.lists.iter().filter(|list| !list.is_empty()).count()
     }
@@ -95,10 +99,9 @@ impl Candidates {
 
 /// Stage 1: the candidates of each model point.
 ///
-/// A cloud point c is a candidate of the model point whose predicted place in the camera is p when
-/// |c − p| ≤ s along each camera axis ([`PriorBound::Box`], closed), or when `gate` lets it through
-/// ([`PriorBound::Gaussian`]). Without a prior every cloud point is. Points that `in_view` denies get
-/// no candidates.
+/// A cloud point c is a candidate of the model point with predicted position p if |c − p| ≤ s along each camera axis
+/// ([`PriorBound::Box`], closed), or if it lies in the `gate` ([`PriorBound::Gaussian`]). Without a prior every cloud
+/// point is a candidate. Model points that the mask `in_view` excludes have no candidates.
 pub fn candidates(
     model: &[ModelPoint],
     cloud: &[MeasuredPoint],
@@ -123,20 +126,20 @@ pub fn candidates(
     Candidates { lists: lists.collect() }
 }
 
-/// Where the points of a cloud are, coordinate by coordinate, in whole words: every model point looks at all of them.
+/// The coordinates of a cloud, one column per axis, padded to full words: every model point scans all of them.
 struct Places([Vec<f64>; 3]);
 
 impl Places {
     fn of(cloud: &[MeasuredPoint]) -> Self {
         Self([0, 1, 2].map(|axis| {
             let mut column: Vec<f64> = cloud.iter().map(|point| point.position.at.coords[axis]).collect();
-            // What fills up the last word is in no box.
+            // The padding lies in no box.
             column.resize(cloud.len().next_multiple_of(LANES), f64::NAN);
             column
         }))
     }
 
-    /// The points in a box about a place; its faces belong to it.
+    /// The points in a box about a centre; its faces belong to it.
     fn within(&self, centre: &Point<Camera>, half: f64) -> Vec<usize> {
         let [x, y, z] = self.0.each_ref().map(|column| column.as_chunks::<LANES>().0);
         let words = x.iter().zip(y).zip(z).enumerate();
@@ -146,7 +149,7 @@ impl Places {
     }
 }
 
-/// Which of 64 places are in a box about one, a bit each.
+/// The bits of 64 points: set for those in a box about a centre.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn inside([x, y, z]: [&[f64; LANES]; 3], c: [f64; 3], half: f64) -> u64 {
     let mut inside = [0u8; LANES];
@@ -157,13 +160,13 @@ fn inside([x, y, z]: [&[f64; LANES]; 3], c: [f64; 3], half: f64) -> u64 {
     packed(&inside)
 }
 
-/// The region about one predicted place in which cloud points are candidates.
+/// The gate about one predicted position.
 enum PointGate {
     Box { centre: Point<Camera>, half: f64 },
     Ellipsoid(Ellipsoid),
 }
 
-/// The places c with (c − centre)ᵀ (covariance + Σ_c)⁻¹ (c − centre) ≤ limit.
+/// The ellipsoid (c − centre)ᵀ (covariance + Σ_c)⁻¹ (c − centre) ≤ limit.
 struct Ellipsoid {
     centre: Point<Camera>,
     covariance: Matrix3<f64>,
@@ -190,16 +193,16 @@ fn point_gate(point: &ModelPoint, prior: &Prior, gate: &Gate) -> PointGate {
 impl Ellipsoid {
     fn admits(&self, measured: &MeasuredPoint) -> bool {
         let step = measured.position.at - self.centre;
-        // A direction known exactly (S singular) still admits what lies exactly there.
+        // An axis without uncertainty (S singular) still admits a point exactly at the prediction.
         let s = self.covariance + measured.position.covariance;
         let floor = Matrix3::identity() * (1e-18 + 1e-12 * s.trace());
         (s + floor).cholesky().is_some_and(|s| step.dot(&s.solve(&step)) <= self.limit)
     }
 }
 
-/// The quantile of χ² with these degrees of freedom.
+/// The quantile of χ² with `dof` degrees of freedom.
 ///
-/// It is found by bisection, and asked for a handful of arguments over and over: each thread remembers the last ones.
+/// Bisection computes it, and few arguments recur: each thread caches the last ones.
 pub(crate) fn chi_square(dof: usize, confidence: f64) -> f64 {
     const REMEMBERED: usize = 64;
     thread_local! {
@@ -209,7 +212,7 @@ pub(crate) fn chi_square(dof: usize, confidence: f64) -> f64 {
     if let Some((_, _, known)) = KNOWN.with_borrow(|known| known.iter().find(same).copied()) {
         return known;
     }
-    let quantile = ChiSquared::new(dof as f64).expect("the degrees of freedom are positive").inverse_cdf(confidence);
+    let quantile = ChiSquared::new(dof as f64).expect("degrees of freedom are positive").inverse_cdf(confidence);
     KNOWN.with_borrow_mut(|known| {
         known.truncate(REMEMBERED - 1);
         known.push_front((dof, confidence, quantile));
@@ -281,7 +284,7 @@ mod tests {
         let limit = chi_square(3, 0.99);
         assert!((limit - 11.345).abs() < 1e-3);
         assert_eq!(along(0, base + 0.02f64.powi(2), limit), [vec![0]]);
-        assert_eq!(along(2, base, limit), [vec![0]], "depth does not feel the attitude");
+        assert_eq!(along(2, base, limit), [vec![0]], "attitude does not affect depth");
         let faithful = candidates(&model, &cloud(&[[0.2, 0.0, 2.0]], 0.04), Some(&prior), &Gate::Box(0.2), None);
         assert_eq!(faithful.lists, [vec![0]]);
     }
@@ -334,8 +337,8 @@ mod tests {
         assert_eq!(message, "gate: chi-square = 1; give a confidence between 0 and 1");
     }
 
-    /// The reference values are those of `scipy.stats.chi2.ppf(confidence, freedom)`; χ²₂ is the exponential distribution with the
-    /// quantile −2 ln(1 − p). The arguments alternate, so that a cached value of other arguments shows.
+    /// The reference values are those of `scipy.stats.chi2.ppf(confidence, dof)`; χ²₂ is the exponential distribution
+    /// with quantile −2 ln(1 − p). The arguments alternate to expose a cached value of other arguments.
     #[test]
     fn quantiles_of_chi_square_are_those_of_the_table() {
         let table = [
@@ -373,7 +376,8 @@ mod tests {
         assert_eq!(Candidates::all(2, 3).lists, [vec![0, 1, 2], vec![0, 1, 2]]);
     }
 
-    /// Without any noise the gate's standard deviation is 1 nm; along an exact axis beside an uncertain one it is 1e-6 of the uncertainty.
+    /// Without noise the gate's standard deviation is 1 nm; along an exact axis beside an uncertain one it is 1e-6 of
+    /// the uncertainty.
     #[test]
     fn a_place_that_is_known_exactly_admits_what_lies_there() {
         let bound = PriorBound::Gaussian(Covariance6::isotropic(0.0, 0.0));
@@ -382,7 +386,7 @@ mod tests {
         let found = candidates(&one_point([0.0, 0.0, 2.0]), &cloud(&places, 0.0), Some(&prior), &Gate::default(), None);
         // √11.345 nm = 3.37 nm.
         assert_eq!(found.lists, [vec![0, 1]]);
-        // The x axis has σ = 1 m, the other axes none: the semi-axes are 3.37 m and 3.37 µm.
+        // The x axis has σ = 1 m, the other axes zero: the semi-axes are 3.37 m and 3.37 µm.
         let mut wide = Covariance6::<seafix_geometry::Object, Camera>::isotropic(0.0, 0.0);
         wide.matrix[(3, 3)] = 1.0;
         let prior = Prior { object_from_camera: Transform::identity(), bound: PriorBound::Gaussian(wide) };

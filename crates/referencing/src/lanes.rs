@@ -1,12 +1,12 @@
-//! Sixty-four answers at a time.
+//! Bit masks of 64 answers.
 
-/// As many as a word has bits.
+/// Number of bits of a word.
 pub(crate) const LANES: usize = 64;
 
 /// The bytes, each 0 or 1, as bits.
 #[inline(always)]
 pub(crate) fn packed(bytes: &[u8; LANES]) -> u64 {
-    // Byte i of eight is moved to bit 56 + i by the one of its factor's bits that fits; nothing else lands there.
+    // The multiplication moves byte i of eight to bit 56 + i; no other product reaches these bits.
     const GATHER: u64 = 0x0102_0408_1020_4080;
     let mut word = 0;
     for (eight, bytes) in bytes.as_chunks::<8>().0.iter().enumerate() {
@@ -15,7 +15,7 @@ pub(crate) fn packed(bytes: &[u8; LANES]) -> u64 {
     word
 }
 
-/// The numbers of the bits that are set, ascending; the first bit has the number `begin`.
+/// The indices of the set bits, ascending; the first bit has the index `begin`.
 #[inline]
 pub(crate) fn ones_of(begin: usize, word: u64) -> impl Iterator<Item = usize> {
     let mut rest = word;

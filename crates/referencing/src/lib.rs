@@ -1,11 +1,56 @@
-//! The heart: which points of the cloud are the feature points of a known object, and where is the
-//! camera relative to it.
+//! Pose of a stereo camera relative to a known object, from identified feature points.
 //!
-//! The order is the paper's. A [`Site`] tells what there is; a [`Target`] of it is looked for;
-//! [`candidates`] are the cloud points that the prior allows for each model point (Stage 1); a
-//! [`Search`] finds the largest structurally coherent set among them (Stage 2); a [`Solver`]
-//! computes the rigid motion; [`compute_fix()`] puts them in a row and tests the answer before it
-//! believes it. This crate knows no image and no truth.
+//! The steps follow the paper. A [`Site`] describes the known objects, and each search looks for one [`Target`]. Stage
+//! 1, [`candidates()`], selects the cloud points that the prior allows for each model point. Stage 2, a [`Search`],
+//! finds the largest structurally coherent set among them. A [`Solver`] computes the rigid motion. [`compute_fix()`]
+//! runs search and solver, tests the result, and returns a fix or the reason for its rejection. This crate uses neither
+//! images nor ground truth.
+//!
+//! ```
+//! use rand::SeedableRng;
+//! use rand_chacha::ChaCha8Rng;
+//! use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
+//! use seafix_referencing::{
+//!     Acceptance, Gate, Kabsch, MaximumClique, ModelPoint, Outcome, Problem, Tolerance, candidates, compute_fix,
+//! };
+//!
+//! // The feature points of an object, and their positions in the camera frame with a standard deviation of 5 mm.
+//! let model: Vec<ModelPoint> = [
+//!     [0.0, 0.0, 0.0],
+//!     [1.3, 0.0, 0.0],
+//!     [0.3, -0.9, 0.0],
+//!     [0.8, 0.6, 0.5],
+//!     [-0.4, 0.7, 0.9],
+//!     [0.1, -0.3, 1.2],
+//!     [1.1, -0.5, 0.8],
+//! ]
+//! .iter()
+//! .enumerate()
+//! .map(|(k, at)| ModelPoint::exact(format!("P{k}"), Point::from(*at)))
+//! .collect();
+//! let truth = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.5, 0.1, 0.2, -3.0].into());
+//! let measure = |point: &ModelPoint| UncertainPoint::isotropic(truth.inverse() * point.at, 0.005);
+//! let cloud: Vec<MeasuredPoint> =
+//!     model.iter().map(|point| MeasuredPoint { position: measure(point), pixels: None }).collect();
+//!
+//! // Stage 1; without a prior every cloud point is a candidate of every model point.
+//! let candidates = candidates(&model, &cloud, None, &Gate::default(), None);
+//!
+//! // Stage 2, the rigid motion, and the acceptance tests.
+//! let problem = Problem {
+//!     model: &model,
+//!     cloud: &cloud,
+//!     candidates: &candidates,
+//!     tolerance: Tolerance::Sigmas(4.0),
+//!     prior: None,
+//! };
+//! let (search, solver, acceptance) = (MaximumClique::default(), Kabsch::default(), Acceptance::default());
+//! let mut rng = ChaCha8Rng::seed_from_u64(0);
+//! let attempt = compute_fix(&problem, &search, &solver, &acceptance, None, &mut rng);
+//! let Outcome::Fix(fix) = attempt.outcome else { panic!("{}", attempt.outcome) };
+//! assert_eq!(fix.pairs.len(), 7);
+//! assert!(truth.error_to(&fix.object_from_camera).norm() < 1e-6);
+//! ```
 
 mod a_contrario;
 mod accept;

@@ -1,4 +1,4 @@
-//! The parts that a cloud falls into.
+//! The parts of a cloud, separated by gaps longer than the object.
 
 use std::cmp::Ordering;
 
@@ -6,28 +6,29 @@ use nalgebra::Vector3;
 
 use crate::{Correspondence, Problem, search::NEEDED, site::diameter};
 
-/// Groups of candidates between which no set of the object can lie, each with the clutter about it.
+/// Groups of candidates that no set of the object can span, each with its clutter density.
 ///
-/// Two points that may both be the object's are no farther apart than the object is long, and what the tolerance allows: of points
-/// that no chain of such steps joins, one is the object's at most. So a wrong match of a distant ground, measured anywhere up to
-/// the horizon, is a part of its own, and a bed that lies farther from the object than the object is long another. Each part is
-/// taken to be filled evenly for itself, half of the object's length beyond its outermost points, where the cloud reaches so far:
-/// one box about everything would make the clutter appear as thin as the farthest point is far.
+/// Single-linkage clustering (Sneath, *The application of computers to taxonomy*, 1957). Two points of the object are
+/// no farther apart than its length plus the tolerance, so that at most one of two points in different clusters is the
+/// object's. A wrong match of distant ground, measured anywhere up to the horizon, becomes a part of its own, and so
+/// does a seabed farther from the object than the object's length.
 ///
-/// (Single linkage: Sneath, *The application of computers to taxonomy*, 1957.)
+/// Each part is assumed to be filled evenly, up to half of the object's length beyond its outermost points but not
+/// beyond the cloud. A single box about all points would dilute the clutter density with the distance of the farthest
+/// point.
 #[derive(Debug, Clone)]
 pub(crate) struct Parts {
-    /// Of each cloud point; `None` of what is no candidate.
+    /// The part of each cloud point; `None` for a point that is no candidate.
     part_of: Vec<Option<usize>>,
     parts: Vec<Part>,
     full: Part,
-    /// How long the object is (m).
+    /// Length of the object (m).
     object: f64,
-    /// The greatest tolerance of a candidate (m): no side is shorter.
+    /// Maximum tolerance of a candidate (m), the minimum side of a box.
     min: f64,
 }
 
-/// Points, and the box about them.
+/// Points and their bounding box.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     count: usize,
@@ -49,14 +50,14 @@ impl Part {
         if self.count == 0 { Vector3::zeros() } else { self.high - self.low }
     }
 
-    /// Fewer points first, of equally many those farther along the axes.
+    /// Ascending number of points; equal numbers by descending position along the axes.
     fn order(&self, other: &Self) -> Ordering {
         let axes = self.low.iter().zip(&other.low).map(|(own, others)| others.total_cmp(own));
         axes.fold(self.count.cmp(&other.count), Ordering::then)
     }
 }
 
-/// A candidate: its number, where it is, and how far it may stretch a distance (m).
+/// A candidate: index, position, and its part of the tolerance of a distance (m).
 type Candidate = (usize, Vector3<f64>, f64);
 
 impl Parts {
@@ -77,7 +78,7 @@ impl Parts {
         Self::joined(finite.collect(), problem.cloud.len(), diameter(problem.model), min)
     }
 
-    /// What is joined by steps of no more than the object's length.
+    /// The clusters of points joined by steps of at most the object's length.
     fn joined(mut left: Vec<Candidate>, count: usize, object: f64, min: f64) -> Self {
         let mut full = Part::empty();
         left.iter().for_each(|(_, at, _)| full.add(at));
@@ -97,7 +98,7 @@ impl Parts {
                     }
                     apart
                 });
-                // The farthest of them goes on: it reaches most of what is left.
+                // The farthest neighbour is next: it reaches most of the remaining points.
                 let off = |i: &usize| (joined[*i].1 - at).norm_squared();
                 if let Some(farthest) = (known..joined.len()).max_by(|i, k| off(i).total_cmp(&off(k))) {
                     let last = joined.len() - 1;
@@ -123,37 +124,38 @@ impl Parts {
         lengths.iter().map(|side| libm::log(side.max(self.min))).sum()
     }
 
-    /// By how much the part of a point is denser than the cloud as a whole (nats), no less than nought.
+    /// The excess density of a point's part over the complete cloud (nats), at least zero.
     pub(crate) fn ln_excess(&self, point: usize) -> f64 {
         let density = |count: usize, lengths: &Vector3<f64>| libm::log(count as f64) - self.ln_of(lengths);
         let even = density(self.full.count, &self.full.lengths());
         self.part(point).map_or(0.0, |part| (density(part.count, &self.lengths(part)) - even).max(0.0))
     }
 
-    /// The sides (m) of a box that would be as dense as the part of a point, were all points in it, and has its proportions; that of
-    /// the cloud where this is denser.
+    /// The sides (m) of a box that all points would fill with the density of one point's part.
+    ///
+    /// The box has the proportions of the part; it is the box of the cloud if the cloud is denser.
     pub(crate) fn as_dense(&self, point: usize) -> Vector3<f64> {
         let full = self.full.lengths();
         let Some(part) = self.part(point).filter(|_| self.ln_excess(point) > 0.0) else { return full };
         self.lengths(part) * libm::cbrt(self.full.count as f64 / part.count as f64)
     }
 
-    /// ln of the volume (m³) of the box about all.
+    /// ln of the volume (m³) of the box about all points.
     pub(crate) fn ln_full(&self) -> f64 {
         self.ln_of(&self.full.lengths())
     }
 
-    /// ln of the volume (m³) of the boxes of all parts that hold a pose, no more than that of the one about all.
+    /// ln of the volume (m³) of all parts that can hold a pose, limited to the box about all points.
     pub(crate) fn ln_volume(&self) -> f64 {
         let full = self.ln_full();
         let hold = self.parts.iter().filter(|part| part.count >= NEEDED);
         let mut fractions: Vec<f64> = hold.map(|part| libm::exp(self.ln_of(&self.lengths(part)) - full)).collect();
-        // In an order of their own, so that the sum does not depend on that of the points.
+        // Sorted: the sum does not depend on the order of the points.
         fractions.sort_unstable_by(f64::total_cmp);
         full + libm::log(fractions.iter().sum::<f64>().clamp(f64::MIN_POSITIVE, 1.0))
     }
 
-    /// A point of the part that has the most.
+    /// A point of the part with the most points.
     pub(crate) fn in_largest(&self) -> Option<usize> {
         let largest = (0..self.parts.len()).max_by(|&i, &k| self.parts[i].order(&self.parts[k]))?;
         self.part_of.iter().position(|part| *part == Some(largest))
@@ -172,7 +174,7 @@ mod tests {
 
     use super::*;
 
-    /// An object of a metre, and errors of a centimetre.
+    /// Parts for an object of 1 m and tolerances of 1 cm.
     fn parts(points: &[Vector3<f64>]) -> Parts {
         let finite = points.iter().enumerate().filter(|(_, at)| at.iter().all(|x| x.is_finite()));
         Parts::joined(finite.map(|(number, at)| (number, *at, 0.01)).collect(), points.len(), 1.0, 0.02)
@@ -196,10 +198,10 @@ mod tests {
         }
     }
 
-    /// Seen to fail with one box about all.
+    /// Fails with one box about all points.
     #[test]
     fn what_no_step_reaches_is_another_part() {
-        // 1.02 m are a step, 1.03 are none.
+        // 1.02 m are a step, 1.03 m are none.
         let at = |x: f64| Vector3::new(x, 0.0, 0.0);
         let chain = parts(&[at(2.04), at(0.0), at(5.0), at(1.02), at(3.07), at(f64::NAN)]);
         let together: Vec<bool> = (0..6).map(|point| chain.together(point, 0)).collect();
@@ -210,13 +212,13 @@ mod tests {
             let alone = parts(&points);
             points.extend((1..=4).map(|k| Vector3::new(-2.0, 3.0, 1.0) * 10f64.powi(20 * k)));
             let found = parts(&points);
-            // As dense as before, but for the margin of half a metre, and the far ones no denser than the cloud.
+            // As dense as before, up to the margin of half a metre; the far points are no denser than the cloud.
             let times = found.as_dense(7).component_div(&(alone.as_dense(7) * libm::cbrt(44.0 / 40.0)));
             assert!(times.iter().all(|times| (1.0..3.0).contains(times)), "seed {seed}: {times:?}");
             let volume = found.ln_volume() - alone.ln_volume();
             assert!((0.0..3.0).contains(&volume), "seed {seed}: e^{volume} of the volume");
             assert!((0..40).all(|point| found.together(point, 7)) && !found.together(41, 42));
-            assert!(found.ln_excess(7) > 100.0, "a cloud as wide as the farthest is thin");
+            assert!(found.ln_excess(7) > 100.0, "the farthest point dilutes the density of the cloud");
         }
     }
 

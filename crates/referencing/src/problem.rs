@@ -1,4 +1,4 @@
-//! What a search is given.
+//! The input of a search.
 
 use nalgebra::Vector3;
 use seafix_component::in_range;
@@ -7,82 +7,83 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Candidates, ModelPoint};
 
-/// The rough pose known before the fix, and how far it may be off.
+/// The prior: the camera's pose before the fix, with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// The rough pose.
+    /// The prior pose.
     pub object_from_camera: Transform<Object, Camera>,
-    /// How far it may be off.
+    /// The uncertainty of the prior pose.
     pub bound: PriorBound,
 }
 
-/// How far a prior may be off.
+/// The uncertainty of a prior: Gaussian, or a uniform box.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "there is one prior a search, and it is passed by reference")]
 pub enum PriorBound {
     /// Gaussian: the covariance of ξ in `T_true = T_prior · Exp(ξ)`.
     Gaussian(Covariance6<Object, Camera>),
-    /// Each visible model point lies within this distance (m) of its prediction along each camera
-    /// axis: the paper's shell.
+    /// Uniform: each visible model point lies within this distance (m) of its prediction.
+    ///
+    /// The distance holds along each camera axis (the paper's shell).
     Box(f64),
 }
 
-/// When two pairs (model point, cloud point) are coherent: their distances in model and cloud agree.
+/// The tolerance of structural coherence: the largest difference of two distances in model and cloud.
 ///
-/// In TOML `tolerance = { sigmas = 3.0 }` or `tolerance = { fixed = 0.05 }`.
+/// It is written in TOML as `tolerance = { sigmas = 3.0 }` or `tolerance = { fixed = 0.05 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tolerance {
-    /// The paper's Δ (m), one for all pairs.
+    /// The paper's Δ (m), equal for all pairs.
     Fixed(f64),
-    /// Δ_ij = k·√(nᵀ(Σ_i + Σ_j)n + σ_i² + σ_j²): k standard deviations of this very distance, n its
-    /// direction in the cloud, σ the model's own.
+    /// Δ_ij = k·√(nᵀ(Σ_i + Σ_j)n + σ_i² + σ_j²): k standard deviations of the distance, with its direction n in the
+    /// cloud and the model's σ.
     Sigmas(f64),
 }
 
 impl Tolerance {
-    /// What is wrong with the setting, if something is.
+    /// Checks the range of the tolerance.
     ///
     /// # Errors
-    /// A number that is not positive and finite.
+    ///
+    /// A number that is not positive and finite, with the valid range.
     pub fn check(&self) -> Result<(), String> {
         let (name, value, range) = match *self {
             Self::Fixed(delta) => ("fixed", delta, "a positive number of metres"),
             Self::Sigmas(k) => ("sigmas", k, "a positive number of standard deviations"),
         };
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         let positive = value > 0.0 && value.is_finite();
         in_range(positive, name, value, range).map_err(|message| format!("tolerance: {message}"))
     }
 }
 
-/// A model point and the cloud point believed to be it.
+/// A correspondence: a model point and a cloud point identified with it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Correspondence {
-    /// Index of the model point.
+    /// The index of the model point.
     pub model: usize,
-    /// Index of the cloud point.
+    /// The index of the cloud point.
     pub cloud: usize,
 }
 
-/// One search: a model, a cloud, and which cloud points may be which model points.
+/// The input of one search: model, cloud, candidates, tolerance and prior.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
     /// The feature points of the target.
     pub model: &'a [ModelPoint],
-    /// The points that were measured.
+    /// The measured points.
     pub cloud: &'a [MeasuredPoint],
-    /// For each model point, the cloud points that may be it.
+    /// The candidates: for each model point, the cloud points that may correspond to it.
     pub candidates: &'a Candidates,
-    /// When two distances agree.
+    /// The tolerance of the distances.
     pub tolerance: Tolerance,
-    /// The rough pose, where one is known: it bounds the pose as a whole, not only the candidates.
+    /// The prior, if one is known; it bounds the complete pose as well as the candidates.
     pub prior: Option<&'a Prior>,
 }
 
 impl Problem<'_> {
-    /// The largest difference of the distances of `a` and `b` in model and cloud that still counts
-    /// as agreement (m).
+    /// The tolerance (m) of the distances of two pairs in model and cloud.
     pub fn delta(&self, a: Correspondence, b: Correspondence) -> f64 {
         match self.tolerance {
             Tolerance::Fixed(delta) => delta,
@@ -97,31 +98,31 @@ impl Problem<'_> {
         }
     }
 
-    /// The share of Δ that is due to one pair (m): that of two is no more than the sum of both, by √(x² + y²) ≤ x + y.
+    /// The contribution (m) of one pair to Δ; Δ of two pairs is at most the sum of both, by √(x² + y²) ≤ x + y.
     pub(crate) fn fraction_of_delta(&self, pair: Correspondence) -> f64 {
         match self.tolerance {
             Tolerance::Fixed(delta) => 0.5 * delta,
             Tolerance::Sigmas(k) => {
-                // No direction has more variance than the Frobenius norm, whatever the matrix.
+                // The Frobenius norm bounds the variance in every direction.
                 let measured = self.cloud[pair.cloud].position.covariance.norm().sqrt();
                 k * (measured + self.model[pair.model].sigma)
             }
         }
     }
 
-    /// Whether `a` and `b` are structurally coherent: two different model points, two different
-    /// cloud points, and | |P_a P_b| − |C_a C_b| | ≤ Δ (closed).
+    /// Structural coherence of `a` and `b`: different model points, different cloud points, and a difference of their
+    /// distances in model and cloud of at most Δ (closed).
     pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {
         a.model != b.model && a.cloud != b.cloud && self.agrees(a, b, self.measured(a.cloud, b.cloud))
     }
 
-    /// The same of different model points and different cloud points that are known to be so far apart (m).
+    /// The distance test of structural coherence, for different points with a known measured distance (m).
     pub(crate) fn agrees(&self, a: Correspondence, b: Correspondence, measured: f64) -> bool {
         let model = self.model[a.model].at.distance(&self.model[b.model].at);
         (model - measured).abs() <= self.delta(a, b)
     }
 
-    /// How far two cloud points are apart (m).
+    /// The distance between two cloud points (m).
     pub(crate) fn measured(&self, a: usize, b: usize) -> f64 {
         self.cloud[a].position.at.distance(&self.cloud[b].position.at)
     }

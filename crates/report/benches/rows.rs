@@ -1,11 +1,12 @@
-//! Time and memory of a report over its rows: `cargo bench -p seafix-report --bench rows -- 1000000`.
+//! Time and memory of a report over the number of rows: `cargo bench -p seafix-report --bench rows -- 1000000`.
 //!
-//! Two logs with half of the rows each, every row logged: more than a run of Seafix logs, which keeps a sample of so many.
+//! The run has two logs with half of the rows each, every row logged. Real runs of this size log a sample of their
+//! rows.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a measurement says what it measures")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints its results and may panic")]
 
 #[path = "../tests/it/made_up.rs"]
-#[expect(dead_code, reason = "tests want the rest")]
+#[expect(dead_code, reason = "tests use the rest")]
 mod made_up;
 #[path = "../tests/it/rows.rs"]
 mod rows;
@@ -21,15 +22,15 @@ fn main() {
     let out = folder.path().join("report");
     let start = Instant::now();
     report(folder.path(), &out, Forms::ALL).unwrap();
-    println!("report of {count} rows: {:.1} s, at most {} so far", start.elapsed().as_secs_f64(), memory());
+    println!("report of {count} rows: {:.1} s, peak memory {}", start.elapsed().as_secs_f64(), memory());
     let start = Instant::now();
     let verified = verify(folder.path(), &out).unwrap();
     assert!(verified.holds(), "{verified:?}");
     let seconds = start.elapsed().as_secs_f64();
-    println!("verification of {} numbers: {seconds:.1} s, at most {} so far", verified.numbers, memory());
+    println!("verification of {} numbers: {seconds:.1} s, peak memory {}", verified.numbers, memory());
 }
 
-/// The most memory the process had, as Linux says.
+/// The peak memory of the process, from `/proc` of Linux.
 fn memory() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let max = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));

@@ -1,4 +1,4 @@
-//! Several runs side by side, where that says something.
+//! Comparison of several runs on the same data.
 
 use std::path::{Path, PathBuf};
 
@@ -13,24 +13,25 @@ use crate::{
     write::write,
 };
 
-/// What a comparison found.
+/// The result of a comparison of runs.
 #[derive(Debug)]
 pub struct Compared {
-    /// The results of all runs and their differences, for a terminal.
+    /// The results of all runs and their differences, as text for a terminal.
     pub table: String,
-    /// The page, where one was wanted.
+    /// The path of the page, if an output folder was given.
     pub page: Option<PathBuf>,
-    /// Whether a difference is significant.
+    /// Whether any difference is significant.
     pub differ: bool,
 }
 
-/// Compares runs of the same data: the same source, seeds, cameras, site, targets and limits.
+/// Compares runs on the same data: equal source, seeds, cameras, site, targets and alert limits.
+///
+/// `force` compares runs on different data, with a notice. The page is written to `out`, if given. The table has at
+/// most `width` columns, if given.
 ///
 /// # Errors
-/// [`ReportError::Incomparable`] with what differs, unless `force`; [`ReportError`] when a log cannot be read or the page
-/// cannot be written.
-///
-/// The table takes at most `width` columns, where that is given.
+/// [`ReportError::Incomparable`] with the differences, unless `force`; [`ReportError`] when a log cannot be read or the
+/// page cannot be written.
 pub fn compare(
     folders: &[PathBuf],
     force: bool,
@@ -49,7 +50,7 @@ pub fn compare(
             return Err(ReportError::Incomparable { first: folders[0].clone(), other: folder.clone(), differences });
         }
         let differences = differences.join(", ");
-        forced += &format!("{} and {} saw different data: {differences}.\n", printed(&names[0]), printed(name));
+        forced += &format!("{} and {} have different data: {differences}.\n", printed(&names[0]), printed(name));
     }
     let keys = content::distinct(runs.iter().flat_map(|run| run.header().axes.iter().map(|axis| axis.key.clone())));
     for (run, name) in runs.iter_mut().zip(&names) {
@@ -86,7 +87,7 @@ pub fn compare(
     })
 }
 
-/// The names of the folders; the whole path where two have the same.
+/// The names of the folders, or their paths if two names are equal.
 fn names(folders: &[PathBuf]) -> Vec<String> {
     let name =
         |folder: &PathBuf| folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
@@ -95,7 +96,9 @@ fn names(folders: &[PathBuf]) -> Vec<String> {
     if unique { short } else { folders.iter().map(|folder| folder.display().to_string()).collect() }
 }
 
-/// Makes a trial one of several runs: the run is an axis, and every run has all axes.
+/// Gives a trial of a joined run the axes of all runs.
+///
+/// The first axis is the name of its own run.
 fn joined(trial: &mut Trial, name: &str, keys: &[String]) {
     let of = |key: &String| {
         let value = trial.header.axes.iter().find(|axis| axis.key == *key).map(|axis| axis.value.clone());
@@ -107,7 +110,7 @@ fn joined(trial: &mut Trial, name: &str, keys: &[String]) {
     trial.header.axes = axes;
 }
 
-/// What makes two runs incomparable, a line each.
+/// The differences that make two runs incomparable, one line each.
 fn differences(first: &Run, other: &Run) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |what: &str, own: Vec<String>, its: Vec<String>| {
@@ -141,7 +144,7 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
     });
     both("targets", |trial| {
         let target = |target: &seafix_log::TargetModel| {
-            format!("{} with {} points, wrong beyond {} m", target.id, target.points.len(), target.alert_limit)
+            format!("{} with {} points, alert limit {} m", target.id, target.points.len(), target.alert_limit)
         };
         trial.header.targets.iter().map(target).collect()
     });
@@ -149,13 +152,13 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
     found
 }
 
-/// As much of a line as tells what it is about.
+/// A line cut to at most 60 characters.
 fn clipped(line: &str) -> String {
     const MAX: usize = 60;
     if line.chars().count() <= MAX { line.to_owned() } else { line.chars().take(MAX - 1).chain(['…']).collect() }
 }
 
-/// That runs gave the same results bit for bit, where they did: such a comparison says nothing of methods.
+/// The notices of runs with bitwise identical results, whose comparison is meaningless.
 fn same(run: &Run, names: &[String]) -> String {
     let of = |name: &String| -> Vec<&[u8]> {
         let own = run.trials.iter().filter(|trial| trial.header.axes[0].value == *name);
@@ -163,11 +166,11 @@ fn same(run: &Run, names: &[String]) -> String {
     };
     let alike = names.iter().skip(1).filter(|name| of(name) == of(&names[0]));
     alike
-        .map(|name| format!("{} and {} have the same results, bit for bit.\n", printed(&names[0]), printed(name)))
+        .map(|name| format!("{} and {} have bitwise identical results.\n", printed(&names[0]), printed(name)))
         .collect()
 }
 
-/// What is compared of runs that are not of one length, in a line.
+/// The notice on the compared attempts of runs with different lengths; empty for runs of one length.
 fn lengths(run: &Run, names: &[String], comparisons: &[Comparison]) -> String {
     let of = |name: &String| {
         let own = run.trials.iter().filter(|trial| trial.header.axes[0].value == *name);
@@ -178,31 +181,31 @@ fn lengths(run: &Run, names: &[String], comparisons: &[Comparison]) -> String {
         return String::new();
     }
     let long =
-        names.iter().zip(&lengths).map(|(name, frames)| format!("{} has {frames} frames a trial", printed(name)));
+        names.iter().zip(&lengths).map(|(name, frames)| format!("{} has {frames} frames per trial", printed(name)));
     let of = |index: usize| &run.trials[index].header.axes[0].value;
     let n = || comparisons.iter().filter(|c| of(c.first) != of(c.second)).map(|comparison| comparison.n);
     let what = match (n().min(), n().max()) {
         (Some(min), Some(max)) if min < max => {
-            format!("compared are the attempts at the same frame and target that both made, {min} to {max} of them")
+            format!("each comparison uses the {min} to {max} attempts at the same frame and target in both")
         }
-        (Some(n), _) => format!("compared are the {n} attempts at the same frame and target that both made"),
-        _ => "no two of their trials saw the same, so nothing of the one is compared with the other".to_owned(),
+        (Some(n), _) => format!("the comparison uses the {n} attempts at the same frame and target in both"),
+        _ => "no two of their trials have the same frames, so no comparison is made".to_owned(),
     };
     format!("{}: {what}.\n", long.collect::<Vec<_>>().join(", "))
 }
 
-/// A name as a terminal may show it.
+/// A name with control characters replaced by blanks.
 fn printed(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// The comparisons, a line each.
+/// The comparisons, one line each.
 fn lines(comparisons: &[Comparison]) -> String {
     if comparisons.is_empty() {
-        return "No two trials saw the same frames, so nothing is compared.\n".to_owned();
+        return "No two trials have the same frames, so no comparison is made.\n".to_owned();
     }
     let mut text = String::from(
-        "First − second on the same attempts, m2, failures as infinitely far off; p adjusted after Holm.\n",
+        "Median TRE difference, first − second, on the same attempts; failures count as infinite errors; p Holm-adjusted.\n",
     );
     for c in comparisons {
         let real = |value: f64| if c.over_conditions { value.exp() } else { value * 1e3 };

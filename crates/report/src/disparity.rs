@@ -1,4 +1,4 @@
-//! The noise of the disparity σ_d, measured where truth tells what it should have been.
+//! The disparity noise σ_d, measured against ground truth.
 
 use nalgebra::Point3;
 use seafix_geometry::{Camera, Pinhole, Point, RightCamera, StereoRig, Transform};
@@ -6,15 +6,14 @@ use seafix_log::{CameraRecord, FrameRecord, RigRecord, TargetModel, TrialHeader}
 
 use crate::place::matrix;
 
-/// A pair whose pixels are further than this from the true projections (px) is not the point it is
-/// taken for.
+/// Maximum distance (px) of both pixels of a correct pair from the true projections.
 const CORRECT: f64 = 2.0;
 
-/// Measured minus true disparity (px) of every correctly identified point of `frame`; nothing where the
-/// images are not rectified or truth is unknown.
+/// Measured minus true disparity (px) of every correctly identified point of `frame`.
 ///
-/// The errors are truncated: pairs further than 2 px from truth are left out. So are targets made of several
-/// objects, whose coordinates carry the errors of the survey.
+/// The result is empty without rectified images or ground truth. The errors are truncated, because pairs more than 2 px
+/// from the true projection are excluded. Targets with several objects are excluded too: their coordinates include
+/// survey errors.
 pub(crate) fn errors(header: &TrialHeader, frame: &FrameRecord) -> Vec<f64> {
     let (Some(truth), true) = (&frame.truth, header.rig.rectified) else { return Vec::new() };
     let Some(rig) = rig(&header.rig) else { return Vec::new() };
@@ -43,7 +42,7 @@ pub(crate) fn errors(header: &TrialHeader, frame: &FrameRecord) -> Vec<f64> {
     errors
 }
 
-/// Whether the points of `model` belong to several objects, as `OBJECT/POINT`, so that a survey has joined them.
+/// Whether the points of `model`, named `OBJECT/POINT`, belong to several objects joined by a survey.
 fn surveyed(model: &TargetModel) -> bool {
     let mut objects = model.points.iter().map(|point| point.id.rsplit_once('/').map(|(object, _)| object));
     let first = objects.next();

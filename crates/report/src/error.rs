@@ -1,71 +1,71 @@
-//! What can go wrong with a report.
+//! The errors of reports.
 
 use std::path::PathBuf;
 
 use seafix_log::LogError;
 
-/// Why there is no report.
+/// The reason why a report, a summary or a comparison cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The folder holds no log.
-    #[error("{} holds no *.mcap: {}", .0.display(), if .0.join("manifest.json").exists() { "its run has not ended; `seafix run --resume` goes on with it, `seafix recover` saves what is there" } else { "it is not the folder of a run" })]
+    /// The folder has no log.
+    #[error("cannot report {}: no *.mcap file; {}", .0.display(), if .0.join("manifest.json").exists() { "its run has not ended: resume it with `seafix run --resume`, or save its finished part with `seafix recover`" } else { "give the folder of a run" })]
     NoLogs(PathBuf),
-    /// A run of a later program.
-    #[error("{}: a manifest of format {found}, this program knows {known}; report the run with the program that made it", .path.display())]
+    /// The manifest has a later format.
+    #[error("cannot report the run of {}: format {found}, but this version reads {known}; use the version that wrote the run", .path.display())]
     Newer {
         /// The manifest.
         path: PathBuf,
-        /// What it says it is.
+        /// The format of the manifest.
         found: String,
-        /// What is known.
+        /// The format that this version reads.
         known: &'static str,
     },
-    /// The folder is somebody else's.
-    #[error("{} holds `{other}` and no report: nothing was written; name a new folder, or remove what is there", .folder.display())]
+    /// The output folder has other files and no report.
+    #[error("cannot write a report to {}: it holds `{other}` and no report; choose a new folder, or empty this one", .folder.display())]
     Foreign {
-        /// The folder.
+        /// The output folder.
         folder: PathBuf,
-        /// The first thing in it.
+        /// The name of the first file or folder in it.
         other: String,
     },
-    /// A log of a finished run is gone.
-    #[error("{} names the log {log}, which is not there: a report would leave its trial out without a word; put it back, or run the experiment again", .path.display())]
+    /// A log of a finished run is missing.
+    #[error("cannot report the run of {}: its log {log} is missing, and the report would lack a trial; restore the log, or run the experiment again", .path.display())]
     Gone {
         /// The manifest.
         path: PathBuf,
-        /// The log.
+        /// The name of the missing log.
         log: String,
     },
-    /// Logs of different experiments.
-    #[error("{} varies other keys than {}: they belong to different runs; keep them in folders of their own", .other.display(), .first.display())]
+    /// The logs belong to different experiments.
+    #[error("cannot report {} together with {}: they vary different keys; keep the logs of each run in its own folder", .other.display(), .first.display())]
     Mixed {
         /// The first log.
         first: PathBuf,
-        /// One that differs.
+        /// The first log with other axes.
         other: PathBuf,
     },
     /// A log cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The file system refused.
-    #[error("cannot {doing} {}: {source}; is {}, and may this user {doing} there?", .path.display(),
-        if *doing == "read" { "the name right" } else { "there room" })]
+    /// A file or folder cannot be read or written.
+    #[error("cannot {doing} {}: {source}; check {} and the permissions", .path.display(),
+        if *doing == "read" { "the name" } else { "the free space" })]
     Io {
         /// `read` or `write`.
         doing: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// Runs that say nothing about each other.
-    #[error("{} and {} are not comparable: {}; compare runs of the same data, or say --force", .first.display(), .other.display(), .differences.join(", "))]
+    /// The runs have different data.
+    #[error("cannot compare {} and {}: {}; choose runs of the same data, or add --force", .first.display(), .other.display(), .differences.join(", "))]
     Incomparable {
         /// The first run.
         first: PathBuf,
-        /// One that differs.
+        /// The first run with other data.
         other: PathBuf,
-        /// What differs, a line each.
+        /// The differences, one line each.
         differences: Vec<String>,
     },
 }

@@ -1,37 +1,41 @@
-//! The teeth of the saw: what happens between a fix and the next.
+//! Fix intervals: the growth of the pose error between fixes.
 
 use seafix_log::{NavigationRecord, TruthRecord};
 
 use crate::{navigation_quantity::Counted, place::matrix};
 
-/// A navigated frame, as far as it says how the error grows.
+/// The pose error of a navigated frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Step {
     pub(crate) stamp_ns: u64,
-    /// Whether its pose rests on a fix of its own instant.
+    /// Whether the pose is a fix of the same frame.
     pub(crate) fixed: bool,
-    /// Where the left camera really is in the world (m).
+    /// The true position of the left camera in the world (m).
     pub(crate) camera: [f64; 3],
-    /// From where the camera really is to where the pose has it, in the frame of the pose's object (m).
+    /// The position error vector of the camera in the frame of the pose's object (m): estimate less truth.
     pub(crate) off: [f64; 3],
-    /// The object that the pose is relative to, by any number of its own.
+    /// An index that identifies the object to which the pose is relative.
     pub(crate) object: u32,
 }
 
-/// From a fix to the last frame before the next one, before the pose is lost or the dive ends.
+/// The time from a fix to the last frame before the next fix.
+///
+/// It also ends before the pose is lost, and at the end of the dive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct FixInterval {
-    /// The greatest error in it less the one at its fix (m).
+    /// The largest position error of the interval less the error at its fix (m).
     pub(crate) amplitude: f64,
-    /// How far the error moved from its fix to its end, as a vector (m).
+    /// The length of the change of the error vector over the interval (m).
     pub(crate) drift: f64,
-    /// How far the camera really went (m).
+    /// The true path length of the camera (m).
     pub(crate) path_length: f64,
-    /// How long it took (s).
+    /// The duration (s).
     pub(crate) seconds: f64,
 }
 
-/// Where a pose has the camera, less where it is, in the frame of its object; `None` without truth or pose.
+/// The position error vector of the camera in the frame of the pose's object (m).
+///
+/// The result is `None` without ground truth or pose.
 pub(crate) fn off(truth: Option<&TruthRecord>, record: &NavigationRecord) -> Option<[f64; 3]> {
     let (truth, pose) = (truth?, record.pose.as_ref()?);
     let (_, world_from_object) = truth.world_from_object.iter().find(|(id, _)| *id == pose.object)?;
@@ -39,7 +43,7 @@ pub(crate) fn off(truth: Option<&TruthRecord>, record: &NavigationRecord) -> Opt
     Some(std::array::from_fn(|k| pose.object_from_camera[k][3] - real[(k, 3)]))
 }
 
-/// The step of a frame; `None` where it has no pose or no truth.
+/// The pose error of a frame; `None` without a pose or ground truth.
 pub(crate) fn step(stamp_ns: u64, truth: Option<&TruthRecord>, record: &NavigationRecord, object: u32) -> Option<Step> {
     let off = off(truth, record)?;
     let camera = truth?.world_from_camera;
@@ -47,10 +51,12 @@ pub(crate) fn step(stamp_ns: u64, truth: Option<&TruthRecord>, record: &Navigati
     Some(Step { stamp_ns, fixed: Counted::Fix.holds(record), camera, off, object })
 }
 
-/// The teeth of the navigated frames in order of time; a fix that is followed by another, or by none, has none.
+/// The fix intervals of the navigated frames, in order of time.
+///
+/// A fix followed directly by another fix has none.
 pub(crate) fn fix_intervals<'a>(steps: impl Iterator<Item = Option<&'a Step>>) -> Vec<FixInterval> {
     let mut fix_intervals = Vec::new();
-    // The fix, the frame before, and the tooth so far.
+    // The open interval: its fix, the previous frame, and the values so far.
     let mut open: Option<(&Step, &Step, FixInterval)> = None;
     for step in steps {
         open = match (open, step) {
@@ -74,7 +80,9 @@ pub(crate) fn fix_intervals<'a>(steps: impl Iterator<Item = Option<&'a Step>>) -
     fix_intervals
 }
 
-/// What the error drifts over the sum of all ways, or of all times; `None` where that is nothing.
+/// The sum of all drifts divided by the sum of `over`, path length or time.
+///
+/// The result is `None` if the latter is zero.
 pub(crate) fn drift(fix_intervals: &[FixInterval], over: fn(&FixInterval) -> f64) -> Option<f64> {
     let all: f64 = fix_intervals.iter().map(over).sum();
     (all > 0.0).then(|| fix_intervals.iter().map(|fix_interval| fix_interval.drift).sum::<f64>() / all)
@@ -97,9 +105,10 @@ mod tests {
         Some(Step { stamp_ns, fixed, camera: [x, 0.0, 0.0], off: [0.0, off, 0.0], object: 0 })
     }
 
-    /// Two teeth, of 3 s and 6 m and of 1 s and 1 m; what follows a lost pose belongs to none, nor does a fix by itself.
+    /// Two intervals, one of 3 s and 6 m, one of 1 s and 1 m. Frames after a lost pose belong to no interval, and a
+    /// lone fix has none.
     ///
-    /// Seen to fail where a fix ends no tooth.
+    /// Seen to fail where a fix does not end an interval.
     #[test]
     fn a_saw_has_the_fix_intervals_between_its_fixes() {
         let steps = [

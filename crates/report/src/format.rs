@@ -1,6 +1,6 @@
-//! Numbers and names as people read them.
+//! The printed form of numbers and names.
 
-/// The value of an axis as it can stand alone: a number with what it is.
+/// The value of an axis; a number is preceded by the name of the axis.
 pub(crate) fn condition(axis: &seafix_log::Axis) -> String {
     match axis.value.parse::<f64>() {
         Ok(_) => placed(&axis.key, &axis.value),
@@ -8,7 +8,7 @@ pub(crate) fn condition(axis: &seafix_log::Axis) -> String {
     }
 }
 
-/// A value of an axis with what it is, and its unit where that is known.
+/// A value of an axis with the name of the axis, and its unit if that is known.
 pub(crate) fn placed(key: &str, value: &str) -> String {
     match unit(key) {
         Some(unit) => format!("{} {value} {unit}", short(key)),
@@ -16,14 +16,14 @@ pub(crate) fn placed(key: &str, value: &str) -> String {
     }
 }
 
-/// The last part of a dotted key: `source.distance` is the distance, `pipeline.tolerance.fixed` the tolerance.
+/// The short name of a dotted key: `distance` for `source.distance`, `tolerance` for `pipeline.tolerance.fixed`.
 pub(crate) fn short(key: &str) -> &str {
     let kind = [".fixed", ".sigmas"].into_iter().find_map(|kind| key.strip_suffix(kind));
     let key = kind.filter(|key| key.ends_with("tolerance")).unwrap_or(key);
     key.rsplit('.').next().unwrap_or(key)
 }
 
-/// The unit of an axis that has a known one.
+/// The unit of an axis; `None` if it has no known unit.
 pub(crate) fn unit(key: &str) -> Option<&'static str> {
     match short(key) {
         "tolerance" => key.ends_with(".fixed").then_some("m"),
@@ -37,7 +37,9 @@ pub(crate) fn unit(key: &str) -> Option<&'static str> {
     }
 }
 
-/// Whether a larger value of an axis makes the same task harder: of what surrounds the vehicle, not of how the method is set.
+/// Whether a larger value of an axis makes the task harder.
+///
+/// Such axes describe the environment, not the settings of the method.
 pub(crate) fn harder(key: &str) -> bool {
     let name = short(key);
     let words =
@@ -45,7 +47,7 @@ pub(crate) fn harder(key: &str) -> bool {
     words.contains(&name) || matches!(unit(key), Some("px"))
 }
 
-/// A key with its unit, as the head of a column.
+/// The head of a column: the short name of a key with its unit.
 pub(crate) fn headed(key: &str) -> String {
     match unit(key) {
         Some(unit) => format!("{} ({unit})", short(key)),
@@ -53,7 +55,7 @@ pub(crate) fn headed(key: &str) -> String {
     }
 }
 
-/// A number with this many decimals; a dash where there is none, ∞ beyond all bounds.
+/// A number with `decimals` decimals; a dash for `None` and NaN, ∞ for infinity.
 pub(crate) fn number(value: Option<f64>, decimals: usize) -> String {
     match value {
         None => "–".to_owned(),
@@ -62,19 +64,19 @@ pub(crate) fn number(value: Option<f64>, decimals: usize) -> String {
         Some(value) if value == f64::NEG_INFINITY => "−∞".to_owned(),
         Some(value) => {
             let text = format!("{value:.decimals$}");
-            // What rounds to nothing has no sign.
+            // A number that rounds to zero has no sign.
             let zero = text.trim_start_matches('-').chars().all(|c| matches!(c, '0' | '.'));
             if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
         }
     }
 }
 
-/// A probability: four decimals, and what they would round away as a power of ten.
+/// A probability with four decimals, or with an exponent below 0.001.
 pub(crate) fn probability(value: f64) -> String {
     if value > 0.0 && value < 1e-3 { format!("{value:.1e}").replace('-', "−") } else { number(Some(value), 4) }
 }
 
-/// As many decimals as the smallest of `values` needs for two digits, the same for a whole column.
+/// The number of decimals of a column: enough for two digits of the smallest positive value.
 pub(crate) fn decimals(values: impl IntoIterator<Item = f64>) -> usize {
     let min = values.into_iter().filter(|x| x.is_finite() && *x > 0.0).fold(f64::INFINITY, f64::min);
     match min {
@@ -85,13 +87,13 @@ pub(crate) fn decimals(values: impl IntoIterator<Item = f64>) -> usize {
     }
 }
 
-/// A number of a setting, without needless zeros.
+/// A number without trailing zeros.
 pub(crate) fn trimmed(value: f64) -> String {
     let text = format!("{value:.6}");
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
-/// A word for a count.
+/// A count with its noun in singular or plural.
 pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }

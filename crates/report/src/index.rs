@@ -1,4 +1,4 @@
-//! The findings of several runs, on one page.
+//! The page with the findings of several runs.
 
 use std::{
     fs,
@@ -7,11 +7,13 @@ use std::{
 
 use crate::{ReportError, RunSummary, content, print, run::Run, write::write};
 
-/// The name of the page.
+/// The file name of the page.
 const NAME: &str = "README.md";
 
-/// Writes `README.md` into `folder`: the version of the program, then the findings of every report, in the order given. The
-/// reports are in `folder` already, in folders of their own.
+/// Writes the page `README.md` with the findings of all reports into `folder`.
+///
+/// It states the version of the program and lists the findings in the given order. The reports must be in subfolders of
+/// `folder` already.
 ///
 /// # Errors
 /// [`ReportError`] when the file cannot be written.
@@ -19,21 +21,21 @@ pub fn index<'a>(findings: impl IntoIterator<Item = &'a str>, folder: &Path) -> 
     write(folder, NAME, text(findings).as_bytes())
 }
 
-/// Whether `README.md` in `folder` has these findings and the version of the program.
+/// Whether `README.md` in `folder` has exactly these findings and the version of the program.
 pub fn index_holds<'a>(findings: impl IntoIterator<Item = &'a str>, folder: &Path) -> bool {
     fs::read(folder.join(NAME)).unwrap_or_default() == text(findings).as_bytes()
 }
 
 fn text<'a>(findings: impl IntoIterator<Item = &'a str>) -> String {
     let head = format!(
-        "# What we found\n\nMade by seafix {}. Every sentence below its question is made from logs, and stands in the report beside it as well, \
-         where each number carries the log, the topic and the time range that it comes from.\n",
+        "# What we found\n\nMade by seafix {}. Every sentence below a question is generated from logs and appears in the linked report as well, \
+         where each number has a key with its log, topic and time range.\n",
         env!("CARGO_PKG_VERSION")
     );
     findings.into_iter().fold(head, |text, section| text + section)
 }
 
-/// The section of one run: its question, the main figure of the report in `folder`, and the sentences with its numbers.
+/// The section of one run: question, main figure, findings and links to the report in `folder`.
 pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String {
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let escaped = print::escape_markdown(&name);
@@ -45,18 +47,13 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String 
     for finding in content::findings(run, summary) {
         text += &format!("- {}\n", print::markdown(&finding));
     }
-    let links = [
-        ("Report", "report.html"),
-        ("PDF", "report.pdf"),
-        ("tables", "tables"),
-        ("table of the terminal", "summary.txt"),
-    ];
+    let links = [("Report", "report.html"), ("PDF", "report.pdf"), ("tables", "tables"), ("summary", "summary.txt")];
     let links = links.iter().filter(|(_, file)| there(file));
     let links: Vec<String> = links.map(|(what, file)| format!("[{what}]({name}/{file})")).collect();
     text + &format!("\n{}\n", links.join(", "))
 }
 
-/// What a report may show first.
+/// The candidates for the main figure, in order of preference.
 const MAIN: [&str; 5] = [
     "main.svg",
     "figures/error-over-noise.svg",

@@ -1,15 +1,17 @@
-//! How far a fix errs at a distance from the points that it rests on.
+//! The error of a fix at lever arms from the centroid of its points.
 
 use nalgebra::{Matrix4, Vector3};
 use seafix_log::{TargetRecord, TrialHeader, TruthRecord};
 
 use crate::place::matrix;
 
-/// Lengths of the lever arms (m).
+/// The lengths of the lever arms (m).
 pub(crate) const ARMS: [f64; 3] = [1.0, 2.0, 5.0];
 
-/// The motion E that takes an object from where it really is to where the fix has it, in its own frame, and the centroid of the
-/// points that the fix used; `None` where one of pose, truth and points is not logged.
+/// The error motion E of a fix in the object's frame, and the centroid of its points.
+///
+/// The centroid is that of the points that the fix used. E maps true to estimated positions. `None` if the log lacks
+/// the pose, the ground truth or the points.
 pub(crate) fn misplaced(
     header: &TrialHeader,
     truth: Option<&TruthRecord>,
@@ -27,7 +29,7 @@ pub(crate) fn misplaced(
     (!used.is_empty()).then_some((estimate * camera_from_object, centroid))
 }
 
-/// How far the fix has that centroid from its place (m); NaN where not known.
+/// The error of a fix at the centroid of its points (m); NaN where unknown.
 pub(crate) fn displacement(header: &TrialHeader, truth: Option<&TruthRecord>, target: &TargetRecord) -> f64 {
     misplaced(header, truth, target)
         .map_or(f64::NAN, |(e, centroid)| (e.transform_point(&centroid.into()).coords - centroid).norm())

@@ -1,11 +1,11 @@
-//! Reports made from logs alone.
+//! Reports on experiments, generated from their logs alone.
 //!
-//! [`summary`] gives the results of a run as a table for the terminal. [`report`] writes them as a paper: one
-//! self-contained HTML page without scripts, LaTeX source, a PDF, figures as SVG and PDF, every plotted number as CSV
-//! and JSON, and an entry for a bibliography. All read nothing but the `*.mcap` of the run, and give the same bytes for
-//! the same logs. Every number carries a key that says where it comes from; [`verify`] computes each again.
+//! [`summary`] gives the results of a run as a table for the terminal. [`report`] writes a paper: one self-contained
+//! HTML page without scripts, LaTeX source, a PDF, figures as SVG and PDF, every plotted number as CSV and JSON, and a
+//! BibTeX entry. Both read only the `*.mcap` files of the run and give the same bytes for the same logs. Every number
+//! has a key that identifies its source in the logs; [`verify`] computes each number again from its key.
 //!
-//! What a report says (`content`) is data (`document`), which printers (`print`) know nothing about.
+//! The content of a report (module `content`) is a data structure (`document`) that printers (`print`) render.
 
 mod compare;
 mod content;
@@ -46,10 +46,10 @@ use field::Field;
 use number::{Key, Number};
 use run::Run;
 
-/// Reads the logs in `run_dir` and gives the results, a row a trial.
+/// Summarises the logs in `run_dir`, one row for every trial.
 ///
 /// # Errors
-/// [`ReportError`] when there is no log, or one cannot be read.
+/// [`ReportError`] when the folder has no log, or a log cannot be read.
 pub fn summary(run_dir: &Path) -> Result<RunSummary, ReportError> {
     Ok(RunSummary::of(&Run::read(run_dir)?))
 }

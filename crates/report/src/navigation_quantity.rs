@@ -1,22 +1,22 @@
-//! The quantities of a navigated frame, under the names that the columns of the results have.
+//! The quantities of a navigated frame, named like the columns of the results.
 
 use seafix_log::NavigationRecord;
 
 macro_rules! quantities {
     ($($quantity:ident $name:literal $take:ident;)*) => {
-        /// One quantity of what a navigator knew after a frame.
+        /// A quantity of the navigated pose after a frame.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub(crate) enum NavigationQuantity { $($quantity),* }
 
         impl NavigationQuantity {
             pub(crate) const ALL: &[Self] = &[$(Self::$quantity),*];
 
-            /// Its name.
+            /// The name in keys, equal to the column of the results.
             pub(crate) fn name(self) -> &'static str {
                 match self { $(Self::$quantity => $name),* }
             }
 
-            /// Its value in the logged record; `None` where nothing is known.
+            /// The value in a logged record; `None` where it is unknown.
             pub(crate) fn of(self, record: &NavigationRecord) -> Option<f64> {
                 match self { $(Self::$quantity => record.errors.$take),* }
             }
@@ -33,23 +33,23 @@ quantities! {
     AloneAttitude "odometry_only_attitude_error" odometry_only_attitude_error;
 }
 
-/// Frames that are counted.
+/// A counted group of frames of a trial with a navigator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Counted {
-    /// All of a trial that navigates.
+    /// All frames.
     NavigationQuantity,
-    /// With a pose.
+    /// The frames with a pose.
     Navigated,
-    /// At which a fix was tried.
+    /// The frames at which the policy asked for a fix.
     Tried,
-    /// On a fix of their own instant.
+    /// The frames whose pose is a fix of the same frame.
     Fix,
-    /// To which the odometry knew no motion, the first pair left out.
+    /// The frames without an odometry step from the frame before; the first frame does not count.
     Lost,
 }
 
 impl NavigationQuantity {
-    /// The quantity that is called `name`.
+    /// The quantity with this name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|quantity| quantity.name() == name)
     }
@@ -58,7 +58,7 @@ impl NavigationQuantity {
 impl Counted {
     pub(crate) const ALL: [Self; 5] = [Self::NavigationQuantity, Self::Navigated, Self::Tried, Self::Fix, Self::Lost];
 
-    /// Its name in keys.
+    /// The name in keys.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::NavigationQuantity => "sailed",
@@ -69,7 +69,7 @@ impl Counted {
         }
     }
 
-    /// Whether a frame is one of them.
+    /// Whether a frame belongs to the group.
     pub(crate) fn holds(self, record: &NavigationRecord) -> bool {
         match self {
             Self::NavigationQuantity => true,

@@ -1,40 +1,40 @@
-//! Numbers that know where they come from.
+//! Numbers with keys that identify their source in the logs.
 
 use std::{fmt, sync::Arc};
 
 use crate::{format, run::Trial};
 
-/// Where in the logs a number comes from: enough to compute it again.
+/// The key of a number: enough to compute it again from the logs.
 ///
-/// Written as `median tre_rms of found in mm; /metrics/evaluation; 0..2000000000 ns; 001.mcap`.
+/// Its text has the form `median tre_rms of found in mm; /metrics/evaluation; 0..2000000000 ns; 001.mcap`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Key {
-    /// What was computed: a statistic, a quantity, the attempts it is over, the unit.
+    /// The statistic, the quantity, the group of attempts and the unit.
     pub(crate) what: String,
-    /// The topic.
+    /// The topic of the messages.
     pub(crate) topic: String,
-    /// The first and the last stamp that it may come from (ns).
+    /// The first and the last stamp of the messages (ns).
     pub(crate) span: [u64; 2],
-    /// The logs, the one concerned first.
+    /// The names of the logs; comparisons list first and second alternately.
     pub(crate) logs: Vec<String>,
 }
 
-/// A number as it is printed, with its key.
+/// A printed number with its key.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Number {
     pub(crate) text: String,
-    /// What was rounded; `None` where nothing is known.
+    /// The value before rounding; `None` where it is unknown.
     pub(crate) value: Option<f64>,
     pub(crate) key: Arc<Key>,
 }
 
 impl Key {
-    /// Of one whole log.
+    /// The key of `what` over one complete log.
     pub(crate) fn of(trial: &Trial, topic: &str, what: impl Into<String>) -> Self {
         Self { what: what.into(), topic: topic.to_owned(), span: trial.span(), logs: vec![trial.file()] }
     }
 
-    /// Reads what [`fmt::Display`] wrote.
+    /// Parses the text that [`fmt::Display`] writes.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split("; ");
         let (what, topic, span, logs) = (parts.next()?, parts.next()?, parts.next()?, parts.next()?);
@@ -57,7 +57,7 @@ impl fmt::Display for Key {
     }
 }
 
-/// What separates is written as `%` and its number, so that no name can pretend to be another part.
+/// `text` with separators and control characters percent-encoded, so that a name cannot end its part of a key.
 fn escape(text: &str) -> String {
     let mut written = String::new();
     for c in text.chars() {
@@ -91,22 +91,22 @@ fn unescape(text: &str) -> String {
 }
 
 impl Number {
-    /// A value with this many decimals; a dash where there is none.
+    /// A value with `decimals` decimals; a dash for `None`.
     pub(crate) fn new(value: Option<f64>, decimals: usize, key: Key) -> Self {
         Self { text: format::number(value, decimals), value, key: Arc::new(key) }
     }
 
-    /// A whole number.
+    /// A count.
     pub(crate) fn count(value: usize, key: Key) -> Self {
         Self::new(Some(value as f64), 0, key)
     }
 
-    /// A probability, however small.
+    /// A probability, with an exponent if it is small.
     pub(crate) fn probability(value: f64, key: Key) -> Self {
         Self { text: format::probability(value), value: Some(value), key: Arc::new(key) }
     }
 
-    /// Another value in the way that `text` is printed.
+    /// The text of `value` in the format of `text`.
     pub(crate) fn like(text: &str, value: Option<f64>) -> String {
         match value {
             Some(value) if text.contains('e') => format::probability(value),

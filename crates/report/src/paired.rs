@@ -1,4 +1,4 @@
-//! Which of two trials errs less, on the same frames.
+//! Paired comparisons of trials on the same frames.
 
 use std::collections::BTreeMap;
 
@@ -12,65 +12,77 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// Of the resamples: any number, but the same for everyone.
+/// The seed of the bootstrap, fixed so that results are reproducible.
 pub(crate) const SEED: u64 = 20_211_038;
-/// Claims in a family are wrong with at most this chance.
+/// The family-wise significance level.
 pub(crate) const ALPHA: f64 = 0.05;
-/// Two that are not significantly different are called equivalent where the 90 % interval of the median difference of m2 is
-/// within this margin (m); set beforehand.
+/// The margin of equivalence of the median TRE difference (m), set before the experiments.
+///
+/// Trials without a significant difference are equivalent if the 90 % interval is within the margin.
 pub(crate) const MARGIN: f64 = 1e-3;
-/// The same of a ratio of medians over conditions.
+/// The margin of equivalence of the ratio of median TREs over conditions, set before the experiments.
 pub(crate) const MARGIN_RATIO: f64 = 1.1;
-/// Of fewer independent differences the median is outside all of them with a probability of more than a tenth: 2 · 2⁻⁴.
+/// Minimum number of independent differences for a test of equivalence.
+///
+/// Below five, the median is outside the range of all differences with a probability above 10 %: 2 · 2⁻⁴.
 const MIN_BLOCKS: usize = 5;
-/// So many in a group are all compared with each other; of more each with the first alone.
+/// Maximum size of a group that is compared in all pairs.
+///
+/// Members of a larger group are compared with the first only.
 pub(crate) const ALL_PAIRS: usize = 8;
-/// More comparisons than these nobody reads; then only groups of four or less are compared in all pairs.
+/// Maximum number of comparisons in a readable table.
+///
+/// Beyond it only groups of up to four are compared in all pairs.
 const READABLE: usize = 40;
-/// From so many conditions on they are the units, one value each, not the frames.
+/// Minimum number of conditions that are used as units of comparison, with one value each, instead of frames.
 const CONDITIONS: usize = 10;
 
-/// Two trials, or two methods over many conditions, compared by m2, failures as infinitely far off.
+/// A comparison of two trials, or of two methods over many conditions, by the TRE.
+///
+/// Failures count as infinite errors.
 #[derive(Debug, Clone)]
 pub(crate) struct Comparison {
-    /// What both have in common; empty over conditions.
+    /// The common condition of both trials; empty over conditions.
     pub(crate) condition: String,
     pub(crate) names: [String; 2],
-    /// Indices of the trials.
+    /// The index of the first trial.
     pub(crate) first: usize,
     pub(crate) second: usize,
-    /// The logs of all pairs, first and second in turn.
+    /// The indices of the logs of all pairs, first and second alternating.
     pub(crate) logs: Vec<usize>,
-    /// Whether the units are conditions: then differences are logarithms of ratios.
+    /// Whether the units are conditions; differences are logarithms of ratios then.
     pub(crate) over_conditions: bool,
-    /// Whether the two saw other frames, of the same numbers, made with the same random numbers: what differs is a condition.
+    /// Whether the trials differ in a condition and their frames are generated from the same random numbers.
     pub(crate) between_conditions: bool,
     pub(crate) n: usize,
-    /// Median of first − second (m), or of ln(first / second), and its 95 % interval.
+    /// The median of first − second (m), or of ln(first / second).
     pub(crate) difference: f64,
     pub(crate) interval: (f64, f64),
     pub(crate) p: f64,
     pub(crate) holm: f64,
     pub(crate) effect: f64,
-    /// Fixes found by the one alone, and by the other alone.
+    /// The number of pairs with a fix of the first trial only, and of the second only.
     pub(crate) alone: [usize; 2],
     pub(crate) mcnemar: f64,
-    /// Where it is not significant: within how much of none at all the 90 % interval is (m, or the logarithm of a ratio). Two
-    /// one-sided tests at 5 % show equivalence within any margin beyond this.
+    /// The largest absolute end of the 90 % interval (m, or logarithm of a ratio).
+    ///
+    /// Only a difference that is not significant has it. Two one-sided tests at 5 % show equivalence within any larger
+    /// margin.
     pub(crate) margin: Option<f64>,
-    /// The errors of both, until everything is said of them.
+    /// The errors of both, kept until the margin is computed.
     errors: Vec<(f64, f64)>,
 }
 
 impl Comparison {
-    /// Whether the two are shown to be equivalent within the margin; `None` where they differ. Medians do not see that one finds
-    /// more than the other: where McNemar's test does, they are not.
+    /// Whether equivalence within the margin is shown; `None` for a significant difference.
+    ///
+    /// Medians are blind to different numbers of fixes, so McNemar's test must not be significant either.
     pub(crate) fn equivalent(&self) -> Option<bool> {
         let max = if self.over_conditions { MARGIN_RATIO.ln() } else { MARGIN };
         self.margin.map(|margin| margin <= max && self.mcnemar >= ALPHA)
     }
 
-    /// The trial that errs less, if that is sure: by the test and by the interval.
+    /// The trial with the smaller error, if both the test and the interval show a significant difference.
     pub(crate) fn better(&self) -> Option<usize> {
         let (low, high) = self.interval;
         match self.holm < ALPHA {
@@ -81,7 +93,7 @@ impl Comparison {
     }
 }
 
-/// The trials that saw the same frames, by what those are.
+/// The groups of trials on the same frames.
 pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
     let mut groups: Vec<(String, Vec<usize>)> = Vec::new();
     for (index, trial) in run.trials.iter().enumerate() {
@@ -94,8 +106,9 @@ pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
     groups.into_iter().map(|(_, members)| members).collect()
 }
 
-/// What a trial was given: the same text, the same frames. Of several runs one may have stopped sooner; how many frames it was to
-/// have is then no matter, what they saw is looked at by [`same_views`].
+/// A text that identifies the data of a trial: equal texts, equal frames.
+///
+/// Joined runs may have different lengths, so the number of frames is ignored; [`same_views`] compares their views.
 fn data(trial: &Trial, joined: bool) -> String {
     let header = &trial.header;
     let mut source = header.configuration.parse::<toml::Table>().ok().and_then(|table| table.get("source").cloned());
@@ -106,21 +119,22 @@ fn data(trial: &Trial, joined: bool) -> String {
     format!("{}\n{source}\n{:?}\n{:?}\n{}", header.source, header.seeds, header.rig, header.site)
 }
 
-/// Whether two trials were at the same place at every frame that both have, as far as truth is logged: a dive of another length may
-/// take another way.
+/// Whether two trials have the same true position at every common frame.
+///
+/// Frames without ground truth are ignored. A dive of another length may take another route.
 fn same_views(first: &Trial, second: &Trial) -> bool {
     let places = |trial: &Trial| trial.frames.iter().map(|frame| (frame.number, frame.truth)).collect::<Vec<_>>();
     let theirs: BTreeMap<u64, Option<[f64; 3]>> = places(second).into_iter().collect();
     places(first).iter().all(|(number, truth)| theirs.get(number).is_none_or(|other| other == truth))
 }
 
-/// What tells the trials of a group apart, one name a member, and what they share.
+/// The common condition of a group of trials, and a distinguishing name for each member.
 pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
     let axes = |index: usize| &run.trials[index].header.axes;
     let constant = |place: usize| members.iter().all(|&m| axes(m)[place].value == axes(members[0])[place].value);
     let (mut shared, mut differing) = (Vec::new(), Vec::new());
     for (place, axis) in axes(members[0]).iter().enumerate() {
-        // A method that all share names no condition.
+        // Common values form the condition, differing values the names.
         match constant(place) {
             true => shared.push(format!("{} {}", format::short(&axis.key), axis.value)),
             false => differing.push(place),
@@ -133,7 +147,7 @@ pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
     (shared.join(", "), members.iter().map(name).collect())
 }
 
-/// Every comparison the run allows, as one family.
+/// All comparisons that the run allows, Holm-adjusted as one family.
 pub(crate) fn comparisons(run: &Run, summary: &RunSummary) -> Vec<Comparison> {
     let groups: Vec<Vec<usize>> = groups(run).into_iter().filter(|group| group.len() > 1).collect();
     let mut family = match groups.len() {
@@ -152,13 +166,13 @@ pub(crate) fn comparisons(run: &Run, summary: &RunSummary) -> Vec<Comparison> {
     family
 }
 
-/// How many members groups of these sizes may have for all pairs of them to be compared.
+/// Maximum size of a group that is compared in all pairs, given the sizes of all groups.
 fn max_in_all_pairs(sizes: impl Iterator<Item = usize>) -> usize {
     let pairs: usize = sizes.map(|n| if n <= ALL_PAIRS { n * n.saturating_sub(1) / 2 } else { n - 1 }).sum();
     if pairs <= READABLE { ALL_PAIRS } else { 4 }
 }
 
-/// Pairs of places: all of up to `max`, each with the first of more.
+/// All pairs of `n` indices, or those with the first index if `n` is larger than `max`.
 fn pairs(n: usize, max: usize) -> Vec<(usize, usize)> {
     let all = n <= max;
     (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, _)| all || *a == 0).collect()
@@ -177,7 +191,7 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
         };
         let mut chosen = pairs(members.len(), max);
         if run.joined {
-            // Of several runs, what differs in nothing but the run; where nothing does, all.
+            // Joined runs: pairs that differ only in the run, or all pairs if there are none.
             let n = members.len();
             let across = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).filter(|(a, b)| same(*a, *b));
             let across: Vec<(usize, usize)> = across.collect();
@@ -196,8 +210,10 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
     found
 }
 
-/// Conditions of one seed, where no two trials saw the same frames: frame k of each is drawn from the same random numbers, so
-/// that attempts pair off by frame and target. Trials of other seeds, or with other targets, are left alone.
+/// The comparisons between conditions of one seed, for runs in which no two trials have the same frames.
+///
+/// Frame k of every trial is generated from the same random numbers, so attempts are paired by frame and target. Trials
+/// with different seeds or targets are not compared.
 fn between(run: &Run) -> Vec<Comparison> {
     let alike = |trial: &Trial| {
         let targets: Vec<String> = trial.header.targets.iter().map(|target| target.id.clone()).collect();
@@ -223,7 +239,9 @@ fn between(run: &Run) -> Vec<Comparison> {
     found
 }
 
-/// The errors m2 of both on the attempts that both made, in order of time; infinity where there is no right fix.
+/// The TREs (m) of both on their common attempts, in order of time.
+///
+/// The TRE of a rejected attempt or a wrong fix is infinite.
 pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
     fn keyed(trial: &Trial) -> Vec<(u64, &str, f64)> {
         let attempts = trial.attempts();
@@ -232,10 +250,12 @@ pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
     matched(keyed(first), keyed(second))
 }
 
-/// The values of both under the keys that both have, in the order of the keys; of several under one key the last.
+/// The values of both under their common keys, in the order of the keys.
+///
+/// The last value of a repeated key counts.
 fn matched<K: Ord>(first: Vec<(u64, K, f64)>, second: Vec<(u64, K, f64)>) -> Vec<(f64, f64)> {
     let ordered = |mut keyed: Vec<(u64, K, f64)>| {
-        // Logs are in order as a rule; to sort takes memory even then.
+        // Logs are usually in order, and sorting takes memory even then.
         if !keyed.is_sorted_by(|a, b| (a.0, &a.1) <= (b.0, &b.1)) {
             keyed.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
         }
@@ -260,7 +280,7 @@ fn matched<K: Ord>(first: Vec<(u64, K, f64)>, second: Vec<(u64, K, f64)>) -> Vec
     pairs
 }
 
-/// One value a condition: the median of m2 over all attempts.
+/// The comparisons of methods over conditions, with the median TRE over all attempts of each condition.
 fn over_conditions(run: &Run, summary: &RunSummary, groups: &[Vec<usize>]) -> Vec<Comparison> {
     let named: Vec<(Vec<usize>, Vec<String>)> =
         groups.iter().map(|group| (group.clone(), names(run, group).1)).collect();
@@ -306,7 +326,7 @@ fn of(condition: String, names: [String; 2], logs: Vec<usize>, over: bool, error
     }
 }
 
-/// What pairs of errors say.
+/// The statistics of paired errors.
 #[derive(Debug)]
 pub(crate) struct Statistics {
     pub(crate) difference: f64,
@@ -317,7 +337,7 @@ pub(crate) struct Statistics {
 }
 
 impl Statistics {
-    /// Of pairs in the order of time, or of conditions, which have none.
+    /// The statistics of pairs in order of time, or of conditions, which have no order.
     pub(crate) fn of(errors: &[(f64, f64)], conditions: bool) -> Self {
         let mut differences = differences(errors);
         let interval = bootstrap(differences.len(), conditions).median(&differences, 0.95);
@@ -336,8 +356,11 @@ impl Statistics {
 }
 
 impl Statistics {
-    /// Within how much of none at all the 90 % interval of the median difference is: where two one-sided tests at 5 % each find
-    /// that it is smaller than some margin, the margin is at least this. Infinite of too few.
+    /// The largest absolute end of the 90 % interval of the median difference.
+    ///
+    /// The result is infinite for too few pairs.
+    ///
+    /// It is the smallest margin within which two one-sided tests at 5 % show equivalence.
     pub(crate) fn margin(errors: &[(f64, f64)], conditions: bool) -> f64 {
         let differences = differences(errors);
         let bootstrap = bootstrap(differences.len(), conditions);
@@ -345,19 +368,19 @@ impl Statistics {
             return f64::INFINITY;
         }
         let (low, high) = bootstrap.median(&differences, 0.90);
-        // Between the two infinities a median is no number: nothing is shown.
+        // The median between both infinities is NaN, and equivalence is not shown.
         if low.is_nan() || high.is_nan() { f64::INFINITY } else { low.abs().max(high.abs()) }
     }
 }
 
-/// First less second, in their order. Where both fail neither errs less.
+/// The differences first − second, in order, of pairs that do not both fail.
 fn differences(errors: &[(f64, f64)]) -> Vec<f64> {
     let finite = errors.iter().filter(|(a, b)| a.is_finite() || b.is_finite());
     let differences: Vec<f64> = finite.map(|(a, b)| a - b).collect();
     if differences.is_empty() { vec![0.0] } else { differences }
 }
 
-/// Conditions have no order of time, so that each stands by itself.
+/// The bootstrap; conditions have no order of time, so their blocks have length one.
 fn bootstrap(n: usize, conditions: bool) -> Bootstrap {
     let bootstrap = Bootstrap::of(n, SEED);
     if conditions { Bootstrap { block: 1, ..bootstrap } } else { bootstrap }
@@ -367,9 +390,9 @@ fn bootstrap(n: usize, conditions: bool) -> Bootstrap {
 mod tests {
     use super::*;
 
-    /// One pair without a difference, or four, show nothing; many do.
+    /// Up to four equal pairs show no equivalence; many do.
     ///
-    /// Seen to fail where the interval of one pair, which has no width, is believed.
+    /// Seen to fail where the interval of a single pair, which has zero width, is accepted.
     #[test]
     fn few_pairs_show_no_equivalence() {
         let alike = |n: usize| vec![(0.01, 0.01); n];
@@ -379,9 +402,11 @@ mod tests {
         assert_eq!(Statistics::margin(&alike(60), false), 0.0);
     }
 
-    /// A method that fails half of the time, as another does at other times, is not shown to be as good; a small difference is.
+    /// Two methods that fail at different times are not shown to be equivalent.
     ///
-    /// Seen to fail where the median between two infinities is passed over.
+    /// Two methods with small differences are.
+    ///
+    /// Seen to fail where the NaN median between both infinities is ignored.
     #[test]
     fn what_is_within_the_margin_is_shown_by_the_interval() {
         let near: Vec<(f64, f64)> = (0..60).map(|i| (0.01, 0.01 + 1e-4 * f64::from(i % 7 - 3))).collect();
@@ -403,9 +428,9 @@ mod tests {
         assert_eq!((many, pairs(6, many).len(), pairs(4, many).len()), (4, 5, 6));
     }
 
-    /// Where both fail neither errs less: what one finds and the other does not is a difference, however many both miss.
+    /// Pairs that both fail are ignored; a fix of only one trial is a difference.
     ///
-    /// Seen to fail where two failures differ by zero.
+    /// Seen to fail where two failures count as a difference of zero.
     #[test]
     fn two_failures_state_nothing() {
         let none = f64::INFINITY;
@@ -416,9 +441,11 @@ mod tests {
         assert_eq!(Statistics::of(&[(none, none)], false).difference, 0.0);
     }
 
-    /// Only what both have, by key, in the order of the keys, however they came; of several under one key the last counts.
+    /// Only common keys are paired, in the order of the keys for any input order.
     ///
-    /// Seen to fail when the first of them does, and when keys are compared by their numbers alone.
+    /// The last value of a repeated key counts.
+    ///
+    /// Seen to fail where the first value counts, and where keys are compared by frame number only.
     #[test]
     fn values_are_paired_by_key() {
         let first = vec![(2, "b", 5.0), (0, "a", 1.0), (2, "a", 3.0), (2, "a", 4.0), (7, "a", 6.0)];

@@ -1,21 +1,26 @@
-//! Where a fix puts the camera in the world.
+//! Camera positions in the world from fixes and the survey.
 
 use nalgebra::Matrix4;
 use seafix_log::{NavigatedRecord, TargetRecord, TrialHeader};
 
-/// The left camera's place in the world by this fix and the surveyed place of its target (m); NaN where one of the two
-/// is missing.
+/// The position of the left camera in the world (m) by a fix and the survey.
+///
+/// It is NaN without either.
 pub(crate) fn estimate(header: &TrialHeader, target: &TargetRecord) -> [f64; 3] {
     let camera = target.object_from_camera.as_ref();
     camera.map_or([f64::NAN; 3], |camera| in_world(header, &target.object, camera))
 }
 
-/// The same of a pose that a navigator carried.
+/// The position of the left camera in the world (m) by a navigated pose and the survey.
+///
+/// It is NaN without either.
 pub(crate) fn carried(header: &TrialHeader, pose: Option<&NavigatedRecord>) -> [f64; 3] {
     pose.map_or([f64::NAN; 3], |pose| in_world(header, &pose.object, &pose.object_from_camera))
 }
 
-/// Where a camera with this pose relative to an object is in the world, by the survey.
+/// The position in the world (m) of a camera, from its pose relative to a surveyed object.
+///
+/// It is NaN without a survey.
 fn in_world(header: &TrialHeader, object: &str, object_from_camera: &[[f64; 4]; 4]) -> [f64; 3] {
     let site_from_object =
         header.targets.iter().find(|model| model.id == object).and_then(|model| model.site_from_object);
@@ -28,12 +33,12 @@ fn in_world(header: &TrialHeader, object: &str, object_from_camera: &[[f64; 4]; 
     }
 }
 
-/// A matrix of its rows.
+/// The matrix with these rows.
 pub(crate) fn matrix(rows: &[[f64; 4]; 4]) -> Matrix4<f64> {
     Matrix4::from_fn(|row, column| rows[row][column])
 }
 
-/// Gives fixes of logs that are older than limits of their own those of their targets.
+/// Sets the alert limit of a fix from its target, for older logs.
 pub(crate) fn limit(header: &TrialHeader, target: &mut TargetRecord) {
     if target.evaluation.alert_limit.is_none() && target.evaluation.position_error.is_some() {
         let model = header.targets.iter().find(|model| model.id == target.object);

@@ -1,22 +1,22 @@
-//! The quantities of a point of interest in view, under the names that the columns of the results have.
+//! The quantities of a point of interest in view, named like the columns of the results.
 
 use seafix_log::PointOfInterest;
 
-/// One quantity of a point of interest in view.
+/// A quantity of a point of interest in view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PoiQuantity {
-    /// How far the point truly is from the left camera (m).
+    /// The true distance from the left camera (m).
     Range,
-    /// How far from its true place the vehicle had it (m).
+    /// The position error (m).
     Error,
-    /// Normalised error squared, three degrees of freedom.
+    /// The NEES, with three degrees of freedom.
     Nees,
 }
 
 impl PoiQuantity {
     pub(crate) const ALL: [Self; 3] = [Self::Range, Self::Error, Self::Nees];
 
-    /// Its name.
+    /// The name in keys, equal to the column of the results.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Range => "poi_range",
@@ -25,12 +25,12 @@ impl PoiQuantity {
         }
     }
 
-    /// The quantity that is called `name`.
+    /// The quantity with this name.
     pub(crate) fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|quantity| quantity.name() == name)
     }
 
-    /// Its value in the logged record; `None` where nothing is known.
+    /// The value in a logged record; `None` where it is unknown.
     pub(crate) fn of(self, point: &PointOfInterest) -> Option<f64> {
         match self {
             Self::Range => Some(point.range()),
@@ -40,7 +40,7 @@ impl PoiQuantity {
     }
 }
 
-/// What a point is called, with its object.
+/// The name of a point with its object, `OBJECT/POINT`.
 pub(crate) fn name(point: &PointOfInterest) -> String {
     format!("{}/{}", point.object, point.point)
 }

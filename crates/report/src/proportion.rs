@@ -1,24 +1,26 @@
-//! How sure a share of the attempts is.
+//! Confidence intervals of rates.
 
 use seafix_evaluation::{Bootstrap, clopper_pearson, clustered, of_blocks};
 use seafix_log::TrialHeader;
 
 use crate::paired::SEED;
 
-/// Bounds of the errors of recall (mm): four a factor of two.
+/// The error bounds of recall (mm), four for every factor of two.
 const BOUNDS: [f64; 25] = [
     0.78125, 0.9290, 1.1049, 1.3139, 1.5625, 1.8581, 2.2097, 2.6278, 3.125, 3.7163, 4.4194, 5.2556, 6.25, 7.4325,
     8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
 ];
 
-/// Whether the frames of a trial follow each other on one way. They do not where every frame brings an object of its own,
-/// so that the header can name none, nor where every frame draws one of many layouts: then each is a draw by itself.
+/// Whether the frames of a trial follow each other on one trajectory, so that neighbours are correlated.
+///
+/// Frames are independent draws if every frame has another object (the header has no target then) or another layout.
 pub(crate) fn is_trajectory(header: &TrialHeader) -> bool {
     !header.targets.is_empty() && !header.configuration.contains("name = \"virtual-layouts\"")
 }
 
-/// The 95 % interval of the share of events among the attempts, in order of time: of a trajectory, whose neighbours hang
-/// together, that of the effective number of attempts, of independent draws the exact one of Clopper and Pearson.
+/// The 95 % Clopper–Pearson interval of the fraction of events among the attempts, in order of time.
+///
+/// Independent draws have the exact interval; a trajectory has that for the effective number of attempts.
 pub(crate) fn interval(trajectory: bool, events: &[bool]) -> (f64, f64) {
     if trajectory && !events.is_empty() {
         return clustered(events, Bootstrap::of(events.len(), SEED).block, 0.95);
@@ -26,22 +28,22 @@ pub(crate) fn interval(trajectory: bool, events: &[bool]) -> (f64, f64) {
     clopper_pearson(events.iter().filter(|event| **event).count(), events.len(), 0.95)
 }
 
-/// The 95 % interval of `k` of `n` where only some attempts of a trajectory are known one by one and the others are counted:
-/// how they hang together is not known, and every block is one trial.
+/// The 95 % interval of `k` of `n`, for a log that has only counts of some attempts.
+///
+/// Their correlation is unknown, so every block of a trajectory counts as one attempt.
 pub(crate) fn interval_of_counts(trajectory: bool, k: usize, n: usize) -> (f64, f64) {
     let block = if trajectory { Bootstrap::of(n, SEED).block } else { 1 };
     of_blocks(k, n, block, 0.95)
 }
 
-/// The bounds of recall, in mm as they are printed and in m as they are compared.
+/// The error bounds of recall, in mm for printing and in m for comparison.
 pub(crate) fn bounds() -> impl Iterator<Item = (f64, f64)> {
     BOUNDS.into_iter().map(|bound| (bound, bound / 1e3))
 }
 
-/// The intervals of the shares of errors (m) up to each of the [`bounds`].
+/// The intervals of the fractions of errors (m) up to each of the [`bounds`].
 ///
-/// The share cannot fall with the bound. An end that does is moved outwards: what is not sure of a greater bound is not surer
-/// of a smaller one.
+/// Recall never falls as the bound grows, so neither may an end of its interval: an end that falls is moved outwards.
 pub(crate) fn band(trajectory: bool, errors: &[f64]) -> Vec<(f64, f64)> {
     let below = |bound: f64| errors.iter().map(|error| *error <= bound).collect::<Vec<bool>>();
     let mut band: Vec<(f64, f64)> = bounds().map(|(_, bound)| interval(trajectory, &below(bound))).collect();
@@ -54,10 +56,10 @@ pub(crate) fn band(trajectory: bool, errors: &[f64]) -> Vec<(f64, f64)> {
     band
 }
 
-/// What a caption calls the intervals of these trials.
+/// The name of the intervals of these trials in captions.
 pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> &'static str {
     if headers.any(is_trajectory) {
-        "95 % intervals (of the effective number of attempts)"
+        "95 % intervals (for the effective number of attempts)"
     } else {
         "exact 95 % intervals"
     }
@@ -67,7 +69,7 @@ pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> 
 mod tests {
     use super::*;
 
-    /// Seen to fail where each bound has an interval of its own: from 63 of 64 to all its lower end falls.
+    /// Seen to fail where each bound keeps its own interval: the lower end falls from 63 of 64 errors to 64.
     #[test]
     fn a_band_never_falls() {
         let errors: Vec<f64> = (0..64_u32).map(|i| 0.395e-3 * f64::from(i * 27 % 64 + 1)).collect();

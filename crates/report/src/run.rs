@@ -1,4 +1,4 @@
-//! A run, as its logs have it.
+//! A run, read from its logs.
 
 use std::{
     collections::HashMap,
@@ -22,55 +22,56 @@ use crate::{
     points_of_interest::{self, PoiQuantity},
 };
 
-/// All trials of a run, in the order of their names.
+/// The trials of a run, sorted by file name.
 #[derive(Debug)]
 pub(crate) struct Run {
     pub(crate) trials: Vec<Trial>,
-    /// Whether the trials come from several runs, the first axis saying which.
+    /// Whether the trials come from several runs; their first axis is the run then.
     pub(crate) joined: bool,
 }
 
-/// One trial without what is large: no images, no clouds.
+/// One trial without its images and clouds.
 #[derive(Debug)]
 pub(crate) struct Trial {
     pub(crate) path: PathBuf,
-    /// What the log is called: its file, with its run before it where there are several.
+    /// The printed name of the log: its file name, preceded by its run if there are several.
     pub(crate) label: String,
     pub(crate) header: TrialHeader,
     pub(crate) frames: Vec<Frame>,
-    /// What all frames add up to, logged or not; `None` where the log does not say.
+    /// The totals over all frames, logged or not; `None` if the log has none.
     pub(crate) totals: Option<Totals>,
-    /// What the log lacks, where it was saved of one that was not whole.
+    /// The lost part of a log that was recovered from an incomplete one.
     pub(crate) lacks: Option<String>,
-    /// Whether images were looked at, or no frame at all; without images the points came as they are.
+    /// Whether the trial uses images; without images its source provides the points. True without any frame.
     pub(crate) images: bool,
-    /// Whether the log has its images.
+    /// Whether the log contains the images.
     pub(crate) pictures: bool,
-    /// The errors of the disparities of correctly identified points, where truth tells: their squares' sum (px²) and
-    /// how many there are.
+    /// The sum of the squared disparity errors of correctly identified points (px²), and their number.
     pub(crate) disparity: (f64, usize),
-    /// What searches and solvers the rows name.
+    /// The names of search and solver in the first row.
     pub(crate) named: [String; 2],
-    /// The stages that it shares with other trials in some frame.
+    /// The stages shared with other trials in any frame.
     pub(crate) shared: SharedStages,
-    /// SHA-256 of all results but the times.
+    /// The SHA-256 of all results except times.
     pub(crate) digest: Vec<u8>,
     rows: Vec<AttemptRow>,
     poi: Vec<Inspected>,
     words: Vec<String>,
 }
 
-/// One frame of a trial.
+/// A frame of a trial.
 #[derive(Debug)]
 pub(crate) struct Frame {
     pub(crate) number: u64,
     pub(crate) stamp_ns: u64,
-    /// Where the left camera really was in the world (m).
+    /// The true position of the left camera in the world (m).
     pub(crate) truth: Option<[f64; 3]>,
-    /// Times of the stages that serve all targets, in the order of [`crate::StageTimeSummary`] (ms); NaN where none.
+    /// The times (ms) of the stages common to all targets; NaN without one.
+    ///
+    /// Their order is that of [`crate::StageTimeSummary`].
     pub(crate) times: [f64; 7],
     rows: (u32, u32),
-    /// What the navigator knew, where the trial navigates.
+    /// The navigated pose, for a trial with a navigator.
     pub(crate) navigated: Option<Box<NavigatedFrame>>,
     poi: (u32, u32),
 }
@@ -82,29 +83,30 @@ pub(crate) struct Inspected {
     values: [f64; PoiQuantity::ALL.len()],
 }
 
-/// What a navigator knew after a frame.
+/// The state of the navigator after a frame.
 #[derive(Debug)]
 pub(crate) struct NavigatedFrame {
-    /// Where the navigated pose and the survey put the left camera in the world, and where the first fix carried by odometry
-    /// alone does (m); NaN where unknown.
+    /// The positions of the left camera in the world (m), navigated and by odometry only.
+    ///
+    /// Odometry starts at the first fix. Both use the survey; unknown positions are NaN.
     pub(crate) places: [[f64; 3]; 2],
-    /// What was told of objects that stand elsewhere than surveyed.
+    /// The events that report objects away from their surveyed pose.
     pub(crate) displaced: Vec<String>,
-    /// What it says of the growth of the error; `None` without a pose or truth.
+    /// The pose error for fix intervals; `None` without a pose or ground truth.
     pub(crate) step: Option<Step>,
     counted: [bool; Counted::ALL.len()],
     values: [f64; NavigationQuantity::ALL.len()],
 }
 
-/// One attempt at one target.
+/// An attempt at one target.
 #[derive(Debug)]
 pub(crate) struct AttemptRow {
     pub(crate) outcome: Outcome,
     pub(crate) wrong: Option<bool>,
     pub(crate) points: u32,
-    /// Where the left camera is in the world by this fix and the survey (m); NaN where unknown.
+    /// The position of the left camera in the world (m) by fix and survey; NaN where unknown.
     pub(crate) estimate: [f64; 3],
-    /// How far the fix has the centroid of the points that it used from its place (m); NaN where unknown.
+    /// The error of the fix at the centroid of its used points (m); NaN where unknown.
     displacement: f64,
     object: u32,
     reason: u32,
@@ -130,10 +132,10 @@ impl Run {
             return Err(ReportError::NoLogs(folder.to_owned()));
         }
         known_manifest(folder)?;
-        // What is wrong with the first of them is told first.
+        // The error of the first faulty log is the one that is reported.
         let trials: Vec<_> = paths.into_par_iter().map(Trial::read).collect();
         let trials: Vec<Trial> = trials.into_iter().collect::<Result<_, _>>()?;
-        // Tables have one set of columns, so all logs must be of one experiment.
+        // Tables have one set of columns, so all logs must belong to one experiment.
         let keys = |trial: &Trial| trial.header.axes.iter().map(|axis| axis.key.clone()).collect::<Vec<_>>();
         if let Some(other) = trials.iter().find(|trial| keys(trial) != keys(&trials[0])) {
             return Err(ReportError::Mixed { first: trials[0].path.clone(), other: other.path.clone() });
@@ -141,7 +143,7 @@ impl Run {
         Ok(Self { trials, joined: false })
     }
 
-    /// The header of the first trial: what all trials share is read there.
+    /// The header of the first trial, for values that all trials share.
     pub(crate) fn header(&self) -> &TrialHeader {
         &self.trials[0].header
     }
@@ -175,7 +177,7 @@ impl Trial {
             results(&mut digest, &frame);
         })?;
         trial.digest = digest.finalize().to_vec();
-        // A detector is named where there were images, logged or not.
+        // A header names a detector if the trial uses images, logged or not.
         trial.images = trial.frames.is_empty() || trial.header.components.iter().any(|c| c.stage == "detector");
         trial.pictures = reader.has_images();
         trial.totals = reader.totals().cloned();
@@ -186,7 +188,7 @@ impl Trial {
         Ok(trial)
     }
 
-    /// Takes in a frame; `places` are those of the words that are known.
+    /// Adds a frame; `places` maps known words to their indices.
     fn take(&mut self, frame: &FrameRecord, places: &mut HashMap<String, u32>) {
         for error in disparity::errors(&self.header, frame) {
             self.disparity.0 += error * error;
@@ -252,7 +254,7 @@ impl Trial {
         });
     }
 
-    /// The place of `word` among those known.
+    /// The index of `word`, which is added if it is new.
     fn word(&mut self, word: &str, places: &mut HashMap<String, u32>) -> u32 {
         if let Some(place) = places.get(word) {
             return *place;
@@ -263,15 +265,15 @@ impl Trial {
         place
     }
 
-    /// The name of the log.
+    /// The printed name of the log.
     pub(crate) fn file(&self) -> String {
         self.label.clone()
     }
 
-    /// That the log is not whole, where it is not.
+    /// A sentence on the lost part of a recovered log; `None` for a complete log.
     pub(crate) fn lacking(&self) -> Option<String> {
         let lost = self.lacks.as_ref()?;
-        Some(format!("{} was saved of a log that was not whole; lost: {lost}", self.file()))
+        Some(format!("{}: recovered from an incomplete log; lost: {lost}", self.file()))
     }
 
     /// The first and the last stamp of the log (ns).
@@ -279,17 +281,17 @@ impl Trial {
         [self.frames.first(), self.frames.last()].map(|frame| frame.map_or(0, |frame| frame.stamp_ns))
     }
 
-    /// How many frames it has, logged or not.
+    /// The number of frames, logged or not.
     pub(crate) fn count(&self) -> usize {
         self.totals.as_ref().map_or(self.frames.len(), |totals| totals.frames as usize)
     }
 
-    /// Of so many frames one is logged whatever came of it.
+    /// The decimation factor k: frames whose number is a multiple of k are logged for any outcome.
     pub(crate) fn every(&self) -> u64 {
         self.totals.as_ref().map_or(1, |totals| totals.every.max(1))
     }
 
-    /// The frames that were logged whatever came of them: all, or a fair sample of many.
+    /// The frames that are logged for any outcome: all frames, or an unbiased sample of a decimated log.
     pub(crate) fn sample(&self) -> impl Iterator<Item = &Frame> {
         let every = self.every();
         self.frames.iter().filter(move |frame| frame.number.is_multiple_of(every))
@@ -305,7 +307,7 @@ impl Trial {
         self.sample().flat_map(|frame| self.attempts_of(frame).map(move |row| (frame, row)))
     }
 
-    /// What an attempt's target is called.
+    /// The name of an attempt's target.
     pub(crate) fn object(&self, row: &AttemptRow) -> &str {
         self.words.get(row.object as usize).map_or("", String::as_str)
     }
@@ -315,12 +317,12 @@ impl Trial {
         self.sample().flat_map(|frame| &self.poi[frame.poi.0 as usize..frame.poi.1 as usize])
     }
 
-    /// What a point of interest is called, with its object.
+    /// The name of a point of interest, with its object.
     pub(crate) fn point(&self, point: &Inspected) -> &str {
         self.words.get(point.name as usize).map_or("", String::as_str)
     }
 
-    /// Why an attempt was refused: the word for it, or its outcome.
+    /// The reason why an attempt was rejected, or its outcome if the log has no reason.
     pub(crate) fn reason(&self, row: &AttemptRow) -> &str {
         match self.words.get(row.reason as usize).map_or("", String::as_str) {
             "" => row.outcome.name(),
@@ -328,7 +330,7 @@ impl Trial {
         }
     }
 
-    /// What the trial's search and solver are called.
+    /// The names of the trial's search and solver.
     pub(crate) fn method(&self) -> [String; 2] {
         let of_stage = |stage: &str| self.header.components.iter().find(|c| c.stage == stage).map(|c| c.name.clone());
         [
@@ -339,60 +341,61 @@ impl Trial {
 }
 
 impl NavigatedFrame {
-    /// The value of a quantity; `None` where nothing is known.
+    /// The value of a quantity; `None` where it is unknown.
     pub(crate) fn get(&self, quantity: NavigationQuantity) -> Option<f64> {
         Some(self.values[quantity as usize]).filter(|value| !value.is_nan())
     }
 
-    /// Whether its frame is one of these.
+    /// Whether the frame belongs to a counted group.
     pub(crate) fn is(&self, counted: Counted) -> bool {
         self.counted[counted as usize]
     }
 }
 
 impl Inspected {
-    /// The value of a quantity; `None` where nothing is known.
+    /// The value of a quantity; `None` where it is unknown.
     pub(crate) fn get(&self, quantity: PoiQuantity) -> Option<f64> {
         Some(self.values[quantity as usize]).filter(|value| !value.is_nan())
     }
 }
 
 impl AttemptRow {
-    /// The value of one of its quantities; `None` where nothing is known.
+    /// The value of a quantity; `None` where it is unknown.
     pub(crate) fn get(&self, field: Field) -> Option<f64> {
         Some(self.values[field as usize]).filter(|value| !value.is_nan())
     }
 
-    /// A fix that is not known to be wrong.
+    /// Whether the attempt is a fix that is not known to be wrong.
     pub(crate) fn found(&self) -> bool {
         self.outcome == Outcome::Fix && self.wrong != Some(true)
     }
 
-    /// A fix beyond the alert limit.
+    /// Whether the attempt is a wrong fix, with a TRE beyond the alert limit.
     pub(crate) fn wrong(&self) -> bool {
         self.outcome == Outcome::Fix && self.wrong == Some(true)
     }
 
-    /// The region of the Stanford diagram that a fix is in, where its error and its limit are known.
+    /// The region of a fix in the Stanford diagram; `None` without its error or its alert limit.
     pub(crate) fn region(&self) -> Option<Region> {
         let (error, limit) = (self.get(Field::Position)?, self.get(Field::Limit)?);
         (self.outcome == Outcome::Fix).then(|| Region::of(error, self.get(Field::Level), limit))
     }
 
-    /// Its error at a lever arm of this length (m); `None` where it is not known.
+    /// The error at a lever arm of length `arm` (m); `None` where it is unknown.
     pub(crate) fn at_arm(&self, arm: f64) -> Option<f64> {
         let angle = self.get(Field::Attitude)?;
         (!self.displacement.is_nan()).then(|| lever_arm_error(self.displacement, angle, arm))
     }
 
-    /// What a comparison takes for its error: infinity where there is none, or a wrong one.
+    /// The error for comparisons: infinite for a rejected attempt or a wrong fix.
     pub(crate) fn error_or_failure(&self, field: Field) -> f64 {
         if self.found() { self.get(field).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
     }
 }
 
-/// That the run's manifest, if it has one, is of a format that is known, a later minor version only adding, and that a finished
-/// run has all its logs.
+/// Checks the manifest of a run, if it has one.
+///
+/// Its major format must be known, and a finished run must have all its logs.
 fn known_manifest(folder: &Path) -> Result<(), ReportError> {
     const KNOWN: &str = "seafix-manifest/2";
     let path = folder.join("manifest.json");
@@ -416,7 +419,7 @@ fn values(target: &TargetRecord) -> [f64; Field::ALL.len()] {
     std::array::from_fn(|index| Field::ALL[index].of(target).unwrap_or(f64::NAN))
 }
 
-/// Everything that came of the attempts of `frame`, bit by bit; times alone are left out.
+/// Adds all results of the attempts of `frame`, except times, to the digest.
 fn results(digest: &mut Sha256, frame: &FrameRecord) {
     digest.update(frame.frame.to_le_bytes());
     digest.update(frame.stamp_ns.to_le_bytes());

@@ -1,4 +1,4 @@
-//! The results, a row a trial.
+//! The summary of a run: one row of results for every trial.
 
 use std::collections::BTreeMap;
 
@@ -11,100 +11,103 @@ use crate::{
     run::{AttemptRow, Run, Trial},
 };
 
-/// The results of a run.
-///
-/// `{}` prints them as a table for a terminal.
+/// The results of a run; [`Display`](std::fmt::Display) prints a table for a terminal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
-    /// The run's name.
+    /// The name of the run.
     pub run: String,
-    /// The question it asks.
+    /// The question of the experiment.
     pub question: String,
-    /// One row a trial, in the order of their names.
+    /// The results of the trials, sorted by trial name.
     pub rows: Vec<Row>,
-    /// Logs that were saved of ones that were not whole, and what they lack.
+    /// The sentences on logs that were recovered from incomplete ones.
     pub lacking: Vec<String>,
 }
 
-/// The results of one trial. Found, refused and wrong add up to attempted.
+/// The results of one trial; `found`, `refused` and `wrong` add up to `attempted`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// The trial's name.
+    /// The name of the trial.
     pub trial: String,
-    /// Its values on the axes of the experiment.
+    /// The values of the trial on the axes of the experiment.
     pub axes: Vec<Axis>,
-    /// Name of the search.
+    /// The name of the search.
     pub search: String,
-    /// Name of the solver.
+    /// The name of the solver.
     pub solver: String,
-    /// Frames of the trial.
+    /// The number of frames.
     pub frames: usize,
-    /// Frames with a fix of at least one target.
+    /// The number of frames with a fix on at least one target.
     pub fix_frames: usize,
-    /// Frames with a wrong fix of at least one target.
+    /// The number of frames with a wrong fix on at least one target.
     pub wrong_frames: usize,
-    /// Attempts: one a frame and target that the prior puts in view.
+    /// The number of attempts, one for every frame and target that the prior puts in view.
     pub attempted: usize,
-    /// Fixes that are not known to be wrong.
+    /// The number of fixes that are not known to be wrong.
     pub found: usize,
-    /// Attempts that gave no fix.
+    /// The number of rejected attempts, those without a fix.
     pub refused: usize,
-    /// Fixes beyond the alert limit.
+    /// The number of wrong fixes, those with a TRE beyond the alert limit.
     pub wrong: usize,
-    /// Fixes that no truth could judge; they count as found.
+    /// The number of fixes without ground truth; they count in `found`.
     pub unjudged: usize,
-    /// Why attempts were refused, and how often.
+    /// The number of rejected attempts for each reason.
     pub reasons: BTreeMap<String, usize>,
-    /// m1 of the fixes found: RMS of C·H − P over the identified points (m).
+    /// The fit RMS (m) of the fixes that are not wrong.
+    ///
+    /// It is the RMS of C·H − P over the identified points.
     pub fit: Option<Distribution>,
-    /// m1 over the identified points that the solver did not use (m).
+    /// The fit RMS (m) over points that the solver did not use, of the fixes that are not wrong.
     pub fit_unused: Option<Distribution>,
-    /// m2 of the fixes found: RMS error of the transferred model points (m).
+    /// The target registration error (TRE, m) of the fixes that are not wrong.
+    ///
+    /// It is the RMS error over all model points of the target.
     pub tre: Option<Distribution>,
-    /// Median of m2 over all attempts, refused and wrong ones as infinitely far off (m).
+    /// The median TRE over all attempts (m), with rejected attempts and wrong fixes counted as infinite.
     pub tre_of_all: Option<f64>,
-    /// m3 of the fixes found, position of the left camera (m).
+    /// The position error of the left camera (m), of the fixes that are not wrong.
     pub position_error: Option<Distribution>,
-    /// m3 of the fixes found, attitude (rad).
+    /// The attitude error (rad), of the fixes that are not wrong.
     pub attitude_error: Option<Distribution>,
-    /// Mean of the normalised error squared of the fixes found; 6 for an honest covariance.
+    /// The mean NEES of the fixes that are not wrong; 6 for a consistent covariance.
     pub nees_mean: Option<f64>,
-    /// How many fixes that mean is over.
+    /// The number of fixes in the mean NEES.
     pub nees_count: usize,
-    /// Identified points of the fixes found.
+    /// The number of identified points of the fixes that are not wrong.
     pub identified: Option<Distribution>,
-    /// How many fixes are in each region of the Stanford diagram, in the order of [`Region::ALL`]; `None` where the log does
-    /// not say of all frames, or truth is unknown.
+    /// The number of fixes in each region of the Stanford diagram, in the order of [`Region::ALL`].
+    ///
+    /// `None` without ground truth, or for a decimated log without these totals.
     pub regions: Option<[usize; Region::ALL.len()]>,
-    /// Root mean squares over all fixes that truth could judge, wrong ones included, beside their bounds.
+    /// The RMS errors and Cramér–Rao bounds over all fixes with ground truth, wrong ones included.
     pub limits: Option<Limits>,
-    /// Measured standard deviation of the disparity of correctly identified points (px).
+    /// The measured standard deviation of the disparity of correctly identified points (px).
     pub disparity_sigma: Option<f64>,
-    /// Median times of the stages.
+    /// The median times of the stages.
     pub times: StageTimeSummary,
-    /// The stages that other trials share: their times are those of one computation for all.
+    /// The stages shared with other trials, whose times are those of one common computation.
     pub shared: SharedStages,
-    /// The 95 % quantile of the time from the images to the answer (ms).
+    /// The 95 % quantile of the time from the images to the outcome (ms).
     pub total_p95: Option<f64>,
 }
 
-/// Root mean square errors and the Cramér–Rao bound on them, over all fixes of a trial, logged or not.
+/// The RMS errors and their Cramér–Rao bounds over all fixes of a trial, logged or not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
-    /// How many fixes.
+    /// The number of fixes.
     pub count: u64,
-    /// Of m2 (m), and its bound.
+    /// The RMS TRE and its bound (m).
     pub tre: [f64; 2],
-    /// Of the position (m), and its bound.
+    /// The RMS position error and its bound (m).
     pub position: [f64; 2],
-    /// Mean of the normalised error squared.
+    /// The mean NEES.
     pub nees: f64,
-    /// Share of the fixes whose normalised error squared is below the 95 % quantile of χ²₆.
+    /// The fraction of the fixes whose NEES is below the 95 % quantile of χ²₆.
     pub coverage: f64,
 }
 
 impl Limits {
-    /// Those of totals that have a bound for every fix.
+    /// The values of totals in which every fix has a bound; `None` for others.
     fn of(totals: &Totals) -> Option<Self> {
         (totals.bounded > 0 && totals.bounded == totals.judged).then(|| {
             let rms = |squares: f64| (squares / totals.judged as f64).sqrt();
@@ -120,10 +123,10 @@ impl Limits {
     }
 }
 
-/// How a quantity spreads.
+/// The quantiles of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distribution {
-    /// How many values there are.
+    /// The number of values.
     pub count: usize,
     /// The 5 % quantile.
     pub p5: f64,
@@ -134,7 +137,7 @@ pub struct Distribution {
 }
 
 impl Distribution {
-    /// The spread of `values`; `None` without any.
+    /// The quantiles of `values`; `None` without values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.into_iter().collect();
         if values.is_empty() {
@@ -146,35 +149,37 @@ impl Distribution {
     }
 }
 
-/// Median times (ms): of the first seven a frame, of the others an attempt; `None` where a stage did not run.
+/// The median times of the stages (ms); `None` for a stage that did not run.
+///
+/// Times of the first seven stages are per frame, the others per attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StageTimeSummary {
-    /// Detection, both images.
+    /// The detection of key points in both images (ms).
     pub detect_ms: Option<f64>,
-    /// Location of the exact corners, both images.
+    /// The sub-pixel location of key points in both images (ms).
     pub locate_ms: Option<f64>,
-    /// Description, both images.
+    /// The description of key points in both images (ms).
     pub describe_ms: Option<f64>,
-    /// Matching.
+    /// The stereo matching (ms).
     pub match_ms: Option<f64>,
-    /// Alignment between the views.
+    /// The refinement of matches between the views (ms).
     pub refine_ms: Option<f64>,
-    /// Triangulation.
+    /// The triangulation (ms).
     pub triangulate_ms: Option<f64>,
-    /// Odometry.
+    /// The odometry (ms).
     pub odometry_ms: Option<f64>,
-    /// Choosing candidates.
+    /// The selection of candidates (ms).
     pub candidates_ms: Option<f64>,
-    /// Search.
+    /// The search (ms).
     pub search_ms: Option<f64>,
-    /// Solve.
+    /// The solver (ms).
     pub solve_ms: Option<f64>,
-    /// From the images to the answer.
+    /// The time from the images to the outcome (ms).
     pub total_ms: Option<f64>,
 }
 
 impl StageTimeSummary {
-    /// The stages and their times, in the order of the method.
+    /// The names and times of the stages, in the order of the pipeline.
     pub fn stages(&self) -> [(&'static str, Option<f64>); 11] {
         [
             ("detect", self.detect_ms),
@@ -204,8 +209,7 @@ impl RunSummary {
         }
     }
 
-    /// A sentence on the durations of stages that trials share; `None` where every duration is a trial's own, or none was
-    /// logged.
+    /// A sentence on stages shared by several trials; `None` without shared stages.
     pub(crate) fn shared_times(&self) -> Option<String> {
         let any = |is_shared: fn(&SharedStages) -> bool| self.rows.iter().any(|row| is_shared(&row.shared));
         let stages = [
@@ -217,13 +221,13 @@ impl RunSummary {
             stages.into_iter().filter(|(_, is_shared)| *is_shared).map(|(stage, _)| stage).collect();
         (!shared.is_empty()).then(|| {
             format!(
-                "Shared stages: {}. Each was computed once for all trials with the same settings, and its time stands in each of them; --separate measures every trial alone.",
+                "Shared stages: {}. Each was computed once for all trials with the same settings, and each of these trials has its time; --separate measures every trial alone.",
                 shared.join("; ")
             )
         })
     }
 
-    /// What a figure calls a trial: what varies, or the method where nothing does.
+    /// The name of a trial in figures: its varying values, or its method if nothing varies.
     pub(crate) fn name(run: &Run, trial: &Trial) -> String {
         let members: Vec<usize> = (0..run.trials.len()).collect();
         let place = run.trials.iter().position(|other| std::ptr::eq(other, trial)).unwrap_or(0);
@@ -297,7 +301,7 @@ impl Row {
         row.nees_count = nees.len();
         row.nees_mean = (!nees.is_empty()).then(|| nees.iter().sum::<f64>() / nees.len() as f64);
         if row.tre.is_some() && row.unjudged == 0 {
-            // The lower middle order statistic: between a number and infinity there is no mean.
+            // The lower median, because the mean of a number and infinity would be infinite.
             let mut all_tre: Vec<f64> = trial.attempts().map(|(_, row)| row.error_or_failure(Field::Tre)).collect();
             all_tre.sort_by(f64::total_cmp);
             row.tre_of_all = all_tre.get((all_tre.len().max(1) - 1) / 2).copied();
@@ -308,7 +312,7 @@ impl Row {
         row
     }
 
-    /// Takes the counts of all frames in place of those of the sample.
+    /// Replaces the counts of the sample by those of all frames.
     fn count(&mut self, totals: &Totals) {
         let full = |count: u64| count as usize;
         (self.frames, self.attempted) = (full(totals.frames), full(totals.attempted));
@@ -318,18 +322,18 @@ impl Row {
         self.reasons = totals.reasons.iter().map(|(reason, &count)| (reason.clone(), full(count))).collect();
     }
 
-    /// Search and solver, as tables name the method.
+    /// The name of the method in tables: search and solver.
     pub fn method(&self) -> String {
         format!("{} + {}", self.search, self.solver)
     }
 
-    /// The axes that the method does not say already.
+    /// The axes other than search and solver, which the method names already.
     pub(crate) fn conditions(&self) -> impl Iterator<Item = &Axis> {
         self.axes.iter().filter(|axis| !matches!(crate::format::short(&axis.key), "search" | "solver"))
     }
 }
 
-/// As the totals count them, or the frames where all are logged.
+/// The counts of the regions from the totals, or from the frames of a complete log.
 fn regions(trial: &Trial) -> Option<[usize; Region::ALL.len()]> {
     if let Some(counts) = trial.totals.as_ref().and_then(|totals| totals.regions) {
         return Some(counts.map(|count| count as usize));

@@ -1,4 +1,4 @@
-//! The results as a table for a terminal, as wide as they are, or with `{:80}` in as many columns.
+//! The summary as a table for a terminal: `{}` prints it unbroken, `{:80}` in at most 80 columns.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ impl fmt::Display for RunSummary {
             .map(|row| row.conditions().map(|axis| format::headed(&axis.key)).collect())
             .unwrap_or_default();
 
-        // Where what tells trials apart would take most of a line it is said once, and numbered.
+        // If the names of trials take most of a line, they are listed once and numbered.
         let names: Vec<Vec<String>> = self.rows.iter().map(|row| leading(row).collect()).collect();
         let heads = ["method".to_owned()].into_iter().chain(conditions.iter().cloned());
         let heads: Vec<String> = heads.collect();
@@ -31,11 +31,11 @@ impl fmt::Display for RunSummary {
             _ => (heads, names),
         };
         let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
-        // Runs without durations say nothing of them.
+        // Runs without durations have no column of times.
         let timed = self.rows.iter().any(|row| row.times.total_ms.is_some());
         let mut results = Table::new(
             &heads,
-            ["frames", "n", "found", "refused", "wrong", "fit mm", "TRE mm", "position mm", "attitude deg"]
+            ["frames", "n", "fixes", "rejected", "wrong", "fit RMS mm", "TRE mm", "position mm", "attitude deg"]
                 .into_iter()
                 .chain(timed.then_some("ms")),
         );
@@ -52,7 +52,7 @@ impl fmt::Display for RunSummary {
             column(|row| row.attitude_error, 1f64.to_degrees()),
         ];
         for (index, row) in self.rows.iter().enumerate() {
-            // A frame that attempted nothing stays in the count of frames; without truth nobody knows what is wrong.
+            // Frames without an attempt count as frames; without ground truth the number of wrong fixes is unknown.
             let frames = format!("{}/{}", row.fix_frames, row.frames);
             let wrong =
                 if row.found > 0 && row.unjudged == row.found { "–".to_owned() } else { row.wrong.to_string() };
@@ -74,7 +74,7 @@ impl fmt::Display for RunSummary {
         let max = f.width();
         let said = |text: &str| wrapped(text, max, 0);
         let note = said(
-            "frames fixed of all, targets attempted (n); m1 residual C·H − P, the TRE transferred model points, m3 camera position and attitude; medians of the fixes found.",
+            "frames: with a fix/all; n: attempts; medians over the fixes of fit RMS (the paper’s measure), target registration error (TRE), camera position error and attitude error.",
         );
         writeln!(f, "{note}")?;
 
@@ -82,7 +82,7 @@ impl fmt::Display for RunSummary {
             writeln!(f)?;
             self.limits(&heads, &names).write(f)?;
             let note = said(
-                "Root mean squares over all n fixes and their ratio to the Cramér–Rao bound; NEES is 6, and 0.95 of it below the 95 % quantile, where a covariance is honest.",
+                "RMS errors over all n fixes and their ratio to the Cramér–Rao bound. A consistent covariance has a mean NEES of 6 and 0.95 of the fixes below the 95 % quantile.",
             );
             writeln!(f, "{note}")?;
         }
@@ -101,13 +101,13 @@ impl fmt::Display for RunSummary {
         writeln!(f)?;
         times.write(f)?;
         let shared = self.shared_times().map(|shared| format!(" {shared}")).unwrap_or_default();
-        let note = format!("Median milliseconds; the first seven stages a frame, the others a target.{shared}");
+        let note = format!("Median times in ms: per frame up to odometry, per attempt from candidates on.{shared}");
         write!(f, "{}", wrapped(&note, f.width(), 0))
     }
 }
 
 impl RunSummary {
-    /// Errors beside their bound.
+    /// The table of RMS errors and Cramér–Rao bounds.
     fn limits(&self, heads: &[&str], names: &[Vec<String>]) -> Table {
         let leading = heads;
         let heads =
@@ -132,13 +132,14 @@ fn leading(row: &Row) -> impl Iterator<Item = String> {
     [row.method()].into_iter().chain(row.conditions().map(|axis| axis.value.clone()))
 }
 
-/// A text that moves no cursor.
+/// A text with control characters replaced by blanks, so that it moves no cursor.
 fn plain(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// Breaks a line at blanks so that it takes no more than `max` columns, the later lines moved in by `indent`; a longer word is
-/// cut.
+/// A text broken at blanks into lines of at most `max` columns.
+///
+/// Later lines are indented; words longer than a line are cut.
 pub(crate) fn wrapped(text: &str, max: Option<usize>, indent: usize) -> String {
     let Some(max) = max.map(|max| max.max(indent + 8)) else { return text.to_owned() };
     let mut lines = vec![String::new()];
@@ -164,10 +165,10 @@ pub(crate) fn wrapped(text: &str, max: Option<usize>, indent: usize) -> String {
     lines.join("\n")
 }
 
-/// Columns of text.
+/// A table of text in columns.
 struct Table {
     rows: Vec<Vec<String>>,
-    /// How many columns at the left say which row it is.
+    /// The number of leading columns that identify a row.
     leading: usize,
 }
 
@@ -178,7 +179,7 @@ impl Table {
         table
     }
 
-    /// Names come from files: what could move the cursor becomes a blank.
+    /// Adds a row; control characters of names from files become blanks.
     fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().map(|cell| plain(&cell)).collect());
     }
@@ -188,13 +189,15 @@ impl Table {
         (0..self.rows[0].len()).map(width).collect()
     }
 
-    /// How many columns of a terminal it takes.
+    /// The width in columns of a terminal.
     fn width(&self) -> usize {
         let widths = self.widths();
         widths.iter().sum::<usize>() + 2 * (widths.len() - 1)
     }
 
-    /// The first column to the left, the others to the right; where they do not fit the rest stands below, led by the same names.
+    /// Prints the first column left-aligned and the others right-aligned.
+    ///
+    /// Columns that do not fit the width follow below, with the leading columns repeated.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widths = self.widths();
         let lead = widths[..self.leading].iter().map(|width| width + 2).sum::<usize>();
@@ -240,7 +243,7 @@ mod tests {
         }
     }
 
-    /// Seen to fail where all columns stand side by side.
+    /// Seen to fail where the table is not split by width.
     #[test]
     fn a_table_is_no_wider_than_it_may_be() {
         let mut table = Table::new(&["method"], ["one", "two", "three", "four"]);

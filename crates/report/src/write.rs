@@ -14,66 +14,70 @@ use crate::{
     run::Run,
 };
 
-/// Which forms of the paper are written; figures and tables always are.
+/// The selected forms of a report; figures and tables are always written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Forms {
-    /// `report.html`.
+    /// The page `report.html`.
     pub html: bool,
-    /// `report.tex`.
+    /// The LaTeX source `report.tex`.
     pub latex: bool,
-    /// `report.pdf`.
+    /// The PDF `report.pdf`.
     pub pdf: bool,
-    /// What a repository keeps: a page with small pictures, the main figure, the tables as CSV.
+    /// A small report for a repository.
+    ///
+    /// It has a page with small pictures, the main figure, and tables as CSV only.
     pub small: bool,
 }
 
 impl Forms {
-    /// All forms.
+    /// All forms in full size.
     pub const ALL: Self = Self { html: true, latex: true, pdf: true, small: false };
-    /// What a repository keeps.
+    /// The small report for a repository.
     pub const SMALL: Self = Self { html: true, latex: false, pdf: false, small: true };
 
-    /// As a page says with which other forms it was written.
+    /// The words by which a page records its forms.
     pub(crate) fn words(self) -> String {
         let words = [(self.html, "html"), (self.latex, "latex"), (self.pdf, "pdf"), (self.small, "small")];
         words.iter().filter(|(is, _)| *is).map(|(_, word)| *word).collect::<Vec<_>>().join(" ")
     }
 
-    /// What a page says of itself.
+    /// The forms that a page records.
     pub(crate) fn of_words(text: &str) -> Self {
         let has = |word: &str| text.split(' ').any(|one| one == word);
         Self { html: has("html"), latex: has("latex"), pdf: has("pdf"), small: has("small") }
     }
 }
 
-/// A report that was written.
+/// A written report.
 #[derive(Debug)]
 pub struct Report {
-    /// The folder it is in.
+    /// The folder of the report.
     pub folder: PathBuf,
-    /// Its page, or the first other form.
+    /// The page, or the first other form without a page.
     pub page: PathBuf,
-    /// The results in it, as a table for the terminal.
+    /// The results as a table for the terminal.
     pub summary: RunSummary,
-    /// Its section of the page that [`index`](crate::index) writes.
+    /// The report's section of the page that [`index`](crate::index) writes.
     pub findings: String,
 }
 
-/// The paper in its forms.
+/// The files of the forms, by order of [`Forms`].
 const PAPERS: [&str; 3] = ["report.html", "report.tex", "report.pdf"];
-/// So many trials are few.
+/// Maximum number of trials for which the figure of rates is the main figure.
 const FEW: usize = 8;
 
-/// One file: its name in the folder of the report, and its bytes.
+/// A file: its name in the folder of the report, and its bytes.
 pub(crate) type File = (String, Vec<u8>);
 
-/// Reads the logs in `run_dir` and writes into `folder`: the paper in the wanted forms, `figures/` as SVG and PDF,
-/// `tables/` as CSV and JSON with every plotted number, pictures as JPEG, `run.bib`, and the table for the terminal as
-/// `summary.txt`. Files of an earlier report that this one has not are removed from `figures/` and `tables/`.
+/// Writes the report on the logs in `run_dir` to `folder`.
+///
+/// The files are the report in the selected forms, `figures/` as SVG and PDF, `tables/` as CSV and JSON with every
+/// plotted number, pictures as JPEG, `run.bib`, and the table for the terminal as `summary.txt`. Stale files of an
+/// earlier report are removed from `figures/` and `tables/`.
 ///
 /// # Errors
-/// [`ReportError`] when there is no log, one cannot be read, the folder holds something and no report, or the report cannot be
-/// written.
+/// [`ReportError`] when the run has no log, a log cannot be read, the folder holds other files and no report, or a file
+/// cannot be written.
 pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, ReportError> {
     let run = Run::read(run_dir)?;
     if let Some(other) = foreign(folder) {
@@ -93,7 +97,7 @@ pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, Rep
     Ok(Report { folder: folder.to_owned(), page, summary, findings })
 }
 
-/// Everything that a report consists of.
+/// All files of a report.
 pub(crate) fn files(run: &Run, summary: &RunSummary, forms: Forms) -> Result<Vec<File>, ReportError> {
     let document = content::document(run, summary, forms.small)?;
     let html = || forms.html.then(|| print::html(&document, forms).into_bytes());
@@ -111,7 +115,7 @@ pub(crate) fn files(run: &Run, summary: &RunSummary, forms: Forms) -> Result<Vec
         return Ok(files);
     }
     for picture in document.pictures() {
-        // In the page they are already; LaTeX asks for files, and the first is the report's face.
+        // The page embeds its pictures; LaTeX needs files, and the picture of a fix is always written.
         if forms.latex || picture.id == "fix" {
             add(format!("{}.jpg", picture.id), picture.jpeg.clone());
         }
@@ -121,7 +125,7 @@ pub(crate) fn files(run: &Run, summary: &RunSummary, forms: Forms) -> Result<Vec
     Ok(files)
 }
 
-/// Of a small report: the main figure, the picture of a fix, and every table and plotted number.
+/// Adds the files of a small report: main figure, picture of a fix, tables as CSV.
 fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     if let Some(figure) = main_figure(document) {
         add("main.svg".to_owned(), print::standalone(&figure.drawing).into_bytes());
@@ -134,16 +138,16 @@ fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     }
 }
 
-/// The figure that shows the answer.
+/// The main figure of a report.
 fn main_figure(document: &Document) -> Option<&Figure> {
-    // Few trials side by side say at once how many fixes there were; of many their errors are the picture.
+    // The rates of a few trials are readable at a glance; for many trials the errors are the main figure.
     let few = document.figures().any(|figure| figure.id == "rates" && figure.data.lines.len() <= 2 * FEW);
     let order = ["error-over-noise", "sawtooth"].into_iter().chain(few.then_some("rates"));
     let mut order = order.chain(["error-over-condition", "success", "rates", "recall"]);
     order.find_map(|id| document.figures().find(|figure| figure.id == id))
 }
 
-/// Figures and tables, each in both its forms.
+/// The files of all figures and tables, each in two formats.
 fn figures(document: &Document) -> Vec<File> {
     let figures: Vec<&Figure> = document.figures().collect();
     let figure = |figure: &&Figure| {
@@ -162,7 +166,9 @@ fn figures(document: &Document) -> Vec<File> {
     figures.par_iter().flat_map_iter(figure).chain(tables.par_iter().flat_map_iter(table)).collect()
 }
 
-/// What `figures/` and `tables/` of the report in `folder` hold that is none of its `files`: of an earlier report, or put there.
+/// The stale files of an earlier report in `folder`, which are not in `files`.
+///
+/// Only `figures/` and `tables/` are searched.
 pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for part in ["figures", "tables"] {
@@ -179,7 +185,7 @@ pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     found
 }
 
-/// Something in a folder that no report was written to yet: what is there is somebody else's.
+/// The first entry of a folder that has other files and no report.
 fn foreign(folder: &Path) -> Option<String> {
     let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
     let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
@@ -188,7 +194,7 @@ fn foreign(folder: &Path) -> Option<String> {
     if names.iter().any(report) { None } else { names.into_iter().next() }
 }
 
-/// Every file below `folder` that is none of the report's `files`, whoever put it there.
+/// All files below `folder` that are not in the report's `files`.
 pub(crate) fn strangers(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(next) = folders.pop() {
@@ -204,7 +210,7 @@ pub(crate) fn strangers(folder: &Path, files: &[File]) -> Vec<PathBuf> {
     found
 }
 
-/// Writes a file whole or not at all.
+/// Writes a file atomically: a partial file is renamed once it is complete.
 pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, ReportError> {
     let (path, partial) = (folder.join(name), folder.join(format!("{name}.partial")));
     let io = |source| ReportError::Io { doing: "write", path: path.clone(), source };

@@ -1,10 +1,10 @@
-//! The one error type of the library.
+//! The error type of the library.
 
 use seafix_component::Fault;
 
 use crate::PipelineError;
 
-/// A request that cannot be carried out. A rejected fix is no error but an [`Outcome`](crate::Outcome).
+/// A request that cannot be carried out. A rejected fix is not an error but an [`Outcome`](crate::Outcome).
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -14,15 +14,15 @@ pub enum Error {
     /// A file with several faults.
     #[error("{}", lines(.0))]
     Files(Vec<Fault>),
-    /// An invalid setting of the pipeline or of the navigation.
+    /// An invalid setting of the pipeline or the navigation.
     #[error("{0}")]
     Setting(#[from] PipelineError),
-    /// Settings that are no valid TOML.
+    /// Settings that are not valid TOML.
     #[error("cannot read the settings: {0}")]
     Settings(#[from] toml::de::Error),
     /// An image whose size differs from the calibration of its camera.
     #[error(
-        "cannot use the {side} image of {width}×{height} px: its camera is calibrated for {expected_width}×{expected_height}; resize the calibration or give the original image"
+        "cannot use the {side} image of {width}×{height} px: its camera is calibrated for {expected_width}×{expected_height}; scale the calibration or give the original image"
     )]
     ImageSize {
         /// `left` or `right`.
@@ -36,20 +36,20 @@ pub enum Error {
         /// Calibrated height (px).
         expected_height: u32,
     },
-    /// An object without a place in the world, where one is needed.
-    #[error("cannot {purpose}: the object `{object}` has no place in the world; add its `base_in_world` to the site")]
+    /// An object without a pose in the world where one is needed.
+    #[error("cannot {purpose}: the object `{object}` has no pose in the world; add its `base_in_world` to the site")]
     NoWorld {
-        /// The operation that needs the place.
+        /// The operation that needs the pose.
         purpose: &'static str,
         /// The object's name.
         object: String,
     },
-    /// A frame that a navigation session cannot take.
-    #[error("cannot navigate with the frame at {stamp_ns} ns: {cause}")]
+    /// A frame that a navigation session cannot use.
+    #[error("cannot use the frame at {stamp_ns} ns: {cause}")]
     Frame {
         /// Time of the frame (ns).
         stamp_ns: u64,
-        /// What is wrong with it.
+        /// The cause.
         cause: String,
     },
 }

@@ -2,15 +2,15 @@
 
 use std::fmt;
 
-/// An event of one frame: a change of state, the use of a fix, a displaced object, a key frame.
+/// An event of one frame, printed as one sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NavigationEvent {
-    /// The odometry has no motion to this stereo pair.
+    /// A stereo pair to which the odometry has no motion.
     NoMotion {
         /// The reason.
         why: String,
     },
-    /// A fix that cannot be used, because the effect of the model's errors on it is unknown.
+    /// A fix that is not used, because its sensitivity to model errors is undetermined.
     FixUnused {
         /// The object's name.
         object: String,
@@ -34,44 +34,44 @@ pub enum NavigationEvent {
         /// The contradiction, with its numbers.
         why: String,
     },
-    /// Several fixes that agree with each other replaced the navigated pose.
+    /// Several consistent fixes that replaced the navigated pose.
     FixesOverrule {
         /// The object's name.
         object: String,
     },
-    /// Two objects that contradict each other: one of them was moved since the survey.
+    /// Two objects whose distance contradicts the survey: one of them was moved.
     Disputed {
         /// The two objects' names.
         objects: [String; 2],
-        /// The contradiction (m).
+        /// The displacement of one if the other has not moved (m).
         metres: f64,
     },
     /// An object that was moved since the survey.
     Displaced {
         /// The object's name.
         object: String,
-        /// The distance from its surveyed place (m).
+        /// The displacement (m).
         metres: f64,
     },
     /// A key frame that was recognised.
     KeyframeFound {
         /// The index of the key frame.
         keyframe: usize,
-        /// The number of points found again.
+        /// The number of matches that agree with the motion.
         found: usize,
-        /// The number of points matched.
+        /// The number of matches.
         matches: usize,
-        /// Standard deviation of the position relative to the key frame (m).
+        /// The standard deviation of the position relative to the key frame (m).
         sigma: f64,
         /// Whether the pose graph rejected it.
         given_up: bool,
     },
-    /// No key frame was recognised where one may be in view.
+    /// A frame in which no key frame was recognised although one may be in view.
     NoKeyframe {
         /// The reason.
         why: String,
     },
-    /// A key frame was added to the map.
+    /// A key frame that was added to the map.
     KeyframeAdded {
         /// The index of the key frame.
         keyframe: usize,
@@ -92,28 +92,28 @@ impl fmt::Display for NavigationEvent {
         match self {
             Self::NoMotion { why } => write!(f, "no motion to this pair: {why}"),
             Self::FixUnused { object, why } => {
-                write!(f, "fix at {object} not used, what it owes to the model is unknown: {why}")
+                write!(f, "fix at {object} not used, its sensitivity to model errors is undetermined: {why}")
             }
-            Self::FixTaken { object } => write!(f, "fix at {object} taken"),
+            Self::FixTaken { object } => write!(f, "fix at {object} accepted"),
             Self::FixLeft { object } => {
-                write!(f, "fix at {object} left: the last one, carried here, is better known")
+                write!(f, "fix at {object} not used: the previous fix, moved here by odometry, is more accurate")
             }
-            Self::FixDoubted { object, why } => write!(f, "fix at {object} doubted: {why}"),
-            Self::FixesOverrule { object } => write!(f, "fixes at {object} overrule what was known"),
+            Self::FixDoubted { object, why } => write!(f, "fix at {object} held back: {why}"),
+            Self::FixesOverrule { object } => write!(f, "fixes at {object} replace the navigated pose"),
             Self::Disputed { objects: [one, other], metres } => {
-                write!(f, "{one} or {other} stands {metres:.3} m from its place, ")?;
-                write!(f, "one of the two; a third object will tell which")
+                write!(f, "{one} or {other} is {metres:.3} m from its place in the survey, ")?;
+                write!(f, "a third object decides which")
             }
-            Self::Displaced { object, metres } => write!(f, "{object} stands {metres:.3} m from its place"),
+            Self::Displaced { object, metres } => write!(f, "{object} is {metres:.3} m from its place in the survey"),
             Self::KeyframeFound { keyframe, found, matches, sigma, given_up } => {
-                write!(f, "key frame {keyframe} found again, {found} of {matches} points, ")?;
+                write!(f, "key frame {keyframe} recognised with {found} of {matches} matches, ")?;
                 match given_up {
-                    true => write!(f, "contradicts the network: given up"),
-                    false => write!(f, "to {:.1} mm", 1e3 * sigma),
+                    true => write!(f, "rejected: inconsistent with the pose graph"),
+                    false => write!(f, "position ± {:.1} mm", 1e3 * sigma),
                 }
             }
-            Self::NoKeyframe { why } => write!(f, "no key frame found again: {why}"),
-            Self::KeyframeAdded { keyframe } => write!(f, "key frame {keyframe} laid"),
+            Self::NoKeyframe { why } => write!(f, "no key frame recognised: {why}"),
+            Self::KeyframeAdded { keyframe } => write!(f, "key frame {keyframe} added"),
             Self::State { from, to, why } => write!(f, "{from} → {to}: {why}"),
         }
     }

@@ -1,4 +1,4 @@
-//! A stereo pair.
+//! Stereo pairs from image files.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use seafix_vision::Image;
 
 use crate::{Error, FrameData};
 
-/// The left and the right image of one instant.
+/// A stereo pair: the left and the right image of one instant.
 #[derive(Debug, Clone)]
 pub struct StereoImages {
     /// The left image.
@@ -18,7 +18,7 @@ pub struct StereoImages {
 }
 
 impl StereoImages {
-    /// Reads two image files (PNG, JPEG or PNM, grey or colour) of a rig.
+    /// Reads the two image files of a pair (PNG, JPEG or PNM, grey or colour).
     ///
     /// # Errors
     /// [`Error::File`]: a file that cannot be read or decoded, or an image of another size than its camera's calibration.
@@ -28,13 +28,13 @@ impl StereoImages {
         Ok(Self { left, right: read(right.as_ref(), rig.stereo.right().size())? })
     }
 
-    /// The same pair, to be given to a [`NavigationSession`](crate::NavigationSession).
+    /// The pair as the measurements of a [`SensorFrame`](crate::SensorFrame).
     pub fn into_frame_data(self) -> FrameData {
         FrameData::Stereo(self.left, self.right)
     }
 }
 
-/// Images have the sizes that their cameras are calibrated for.
+/// Checks that each image has the size that its camera is calibrated for.
 pub(crate) fn check_sizes(left: &Image, right: &Image, rig: &StereoRig) -> Result<(), Error> {
     for (side, image, camera) in [("left", left, rig.left()), ("right", right, rig.right())] {
         let [expected_width, expected_height] = camera.size();

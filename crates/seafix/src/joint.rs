@@ -1,4 +1,4 @@
-//! All objects in view solved together, with those of the frames before.
+//! Joint fixes over all objects in view and over the preceding frames.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -11,7 +11,7 @@ use seafix_referencing::{
 use crate::{FrameResult, PipelineStages, TargetAttempt, times::milliseconds};
 
 impl PipelineStages {
-    /// How many frames before its own a frame's answer looks back on.
+    /// The number of preceding frames that take part in a joint fix.
     pub fn window_length(&self) -> usize {
         match self.settings().target {
             TargetKind::Joint => self.settings().window - 1,
@@ -19,8 +19,8 @@ impl PipelineStages {
         }
     }
 
-    /// What a joint fix takes from a sighting: the identified points of every object that was fixed by itself, and those
-    /// of the other objects that stand where these put them.
+    /// The observations that a frame contributes to a joint fix: the identified points of every object with a fix of
+    /// its own, and the points of other objects at their predicted places.
     pub fn object_observations(
         &self,
         frame_result: &mut FrameResult,
@@ -50,9 +50,9 @@ impl PipelineStages {
         object_observations
     }
 
-    /// Replaces the pose of every object fixed by itself by that of one fix over all of them, over what was gathered of
-    /// others and over the `before` glimpses, and says of what. Where the images contradict each other, or
-    /// determine no joint fix, each keeps its own and is told why.
+    /// Replaces the pose of every fixed object by that of one joint fix. The joint fix uses all fixed objects, the
+    /// gathered points of others and the observations `before`. If the images contradict each other or determine no
+    /// joint fix, each object keeps its own pose and its attempt states the reason.
     pub fn join(
         &self,
         frame_result: &mut FrameResult,
@@ -65,7 +65,7 @@ impl PipelineStages {
             return;
         }
         let start = Instant::now();
-        // What shares no object with this frame says nothing about it.
+        // A frame that shares no object with this one adds no information about it.
         let related = |object_observations: &&&ObjectObservations| {
             object_observations.points.iter().any(|(object, _)| own.points.iter().any(|(same, _)| same == object))
         };
@@ -78,7 +78,7 @@ impl PipelineStages {
                 describe(&frame_result.gathered, own, all.len(), &fixes, targets)
             }
             Err(why) => JointReport {
-                all: format!("no joint fix, the pose is that of the object alone: {why}"),
+                all: format!("no joint fix, each object keeps its own pose: {why}"),
                 ..JointReport::default()
             },
         };
@@ -97,7 +97,7 @@ impl PipelineStages {
     }
 }
 
-/// The pairs of an attempt that was believed.
+/// The pairs of an accepted attempt.
 fn pairs(attempt: &TargetAttempt) -> Option<&[Correspondence]> {
     match &attempt.answer.outcome {
         Outcome::Fix(fix) => Some(&fix.pairs),
@@ -105,12 +105,12 @@ fn pairs(attempt: &TargetAttempt) -> Option<&[Correspondence]> {
     }
 }
 
-/// What is said of a joint fix.
+/// The sentences about a joint fix.
 #[derive(Default)]
 struct JointReport {
-    /// Of all that took part or might have.
+    /// The sentence for every fixed object.
     all: String,
-    /// Of each object that was not fixed by itself.
+    /// The sentence for each object without a fix of its own.
     own: BTreeMap<usize, String>,
 }
 
@@ -127,31 +127,31 @@ fn describe(
         let (name, seen) = (&target.name, points(own.count(object)));
         let gathered = others.added.iter().any(|(added, _)| *added == object);
         if fixes.left_out.contains(&object) {
-            let why = format!("{seen} contradict the rest");
+            let why = format!("{seen}, inconsistent with the other objects");
             out.push(format!("`{name}` ({why})"));
-            reported.insert(object, format!("no part in the joint fix: {why}"));
+            reported.insert(object, format!("not in the joint fix: {why}"));
             continue;
         }
-        let moved = if fixes.displaced.contains(&object) { ", not where it was surveyed" } else { "" };
-        let how = if gathered { ", not fixed by itself" } else { "" };
+        let moved = if fixes.displaced.contains(&object) { ", displaced since the survey" } else { "" };
+        let how = if gathered { ", without a fix of its own" } else { "" };
         part.push(format!("`{name}` ({seen}{how}{moved})"));
         if gathered {
-            reported.insert(object, format!("{seen} took part in the joint fix"));
+            reported.insert(object, format!("{seen} used in the joint fix"));
         }
     }
     for (object, why) in &others.left_out {
         out.push(format!("`{}` ({why})", targets[*object].name));
-        reported.insert(*object, format!("no part in the joint fix: {why}"));
+        reported.insert(*object, format!("not in the joint fix: {why}"));
     }
     let mut all = format!("joint fix over {}", part.join(", "));
     if instants > 1 {
         all += &format!(
-            " and {} before",
-            if instants == 2 { "1 frame".to_owned() } else { format!("{} frames", instants - 1) }
+            " and the previous {}",
+            if instants == 2 { "frame".to_owned() } else { format!("{} frames", instants - 1) }
         );
     }
     if !out.is_empty() {
-        all += &format!("; left out: {}", out.join(", "));
+        all += &format!("; excluded: {}", out.join(", "));
     }
     JointReport { all, own: reported }
 }
@@ -160,7 +160,8 @@ fn replace(frame_result: &mut FrameResult, fixes: &JointFixes, targets: &[Target
     for attempt in &mut frame_result.attempts {
         let Outcome::Fix(fix) = &mut attempt.answer.outcome else { continue };
         let Some((pose, covariance)) = fixes.object_from_camera[attempt.target] else { continue };
-        // What protects the object's own fix protects this one, and the way between them.
+        // The protection level of the object's own fix holds for the joint fix once the distance between the two is
+        // added.
         let moved = (pose.translation() - fix.object_from_camera.translation()).norm();
         let turned = seafix_geometry::so3::angle(&(pose.rotation().inverse() * fix.object_from_camera.rotation()));
         if let Some(level) = &mut fix.integrity.protection {

@@ -1,4 +1,4 @@
-//! Key frames on the way: laid, found again, kept for another run.
+//! Key frames of a run: added, recognised and stored for another run.
 
 use seafix_component::{Part, each_invalid};
 use seafix_geometry::StereoRig;
@@ -17,22 +17,25 @@ use crate::{
     session::places,
 };
 
-/// The key frames of a run.
+/// The settings of the key frames of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Keyframes {
-    /// Whether the network is kept, as `<trial>.pose_graph` in the folder of the run.
+    /// Whether the pose graph is written to the run's folder, as `<trial>.pose-graph`.
     pub add_keyframes: bool,
-    /// The network of an earlier run, relative to the experiment file; none where it is empty.
+    /// The pose graph of an earlier run, relative to the experiment file; none if empty.
     pub read: String,
-    /// SHA-256 of that file, where it must be a certain one; a log says which it was.
+    /// The SHA-256 of the file `read`; any file is accepted if empty. The log holds the hash of the file that was read.
     pub sha256: String,
-    /// When key frames are laid, and how they are found again.
+    /// The settings for adding and recognising key frames.
     pub settings: PoseGraphSettings,
 }
 
 impl Keyframes {
-    /// The same with every setting of its components written out.
+    /// The same settings with the defaults of all components written out.
+    ///
+    /// # Errors
+    /// The first invalid setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
         let r = &self.settings.recognition;
         let recognition = Recognition {
@@ -51,7 +54,7 @@ impl Keyframes {
         Ok(Self { settings: PoseGraphSettings { recognition, ..self.settings.clone() }, ..self.clone() })
     }
 
-    /// Everything that it cannot be worked with for.
+    /// All invalid settings.
     pub fn invalid(&self) -> Vec<PipelineError> {
         let r = &self.settings.recognition;
         let filters =
@@ -88,7 +91,7 @@ impl Keyframes {
         let own = each_invalid(&rest, PoseGraphSettings::check);
         all.extend(own.into_iter().map(|said| invalid_setting("pose-graph", format!("settings.{said}"))));
         if self.read.is_empty() && !self.sha256.is_empty() {
-            let message = "sha256 says which file is read; name it by `read`".to_owned();
+            let message = "sha256 belongs to the file `read`, which is not given; add `read`".to_owned();
             let (setting, key) = ("pose-graph", Some("sha256".to_owned()));
             all.push(PipelineError { setting, key, part: Part::Key, near: None, message });
         }
@@ -96,18 +99,18 @@ impl Keyframes {
     }
 }
 
-/// A run that lays key frames and finds them again.
+/// A pose graph that a run extends by key frames and in which it recognises them.
 #[derive(Debug)]
 pub struct KeyframeMapper<'a> {
     keyframes: &'a Keyframes,
     traverse: Traverse<'a>,
-    /// Of each target, its place among the network's objects, and the other way round.
+    /// The object of the pose graph for each target, and the target for each object.
     objects: Vec<usize>,
     targets: Vec<Option<usize>>,
 }
 
 impl<'a> KeyframeMapper<'a> {
-    /// Begins a map of key frames, from the `earlier` map of another session where there is one.
+    /// Begins a map of key frames, from the `earlier` map of another session if there is one.
     pub fn begin(
         keyframes: &'a Keyframes,
         targets: &[Target],
@@ -129,17 +132,17 @@ impl<'a> KeyframeMapper<'a> {
         Self { keyframes, traverse, objects, targets: back }
     }
 
-    /// Moves the map's pose by the odometry; `None` where no motion is known.
+    /// Moves the pose of the map by the odometry; `None` marks a gap.
     pub fn advance(&mut self, seconds: f64, motion: Option<&RelativeMotion>) {
         self.traverse.advance(seconds, motion);
     }
 
-    /// An object stands elsewhere than was believed.
+    /// Moves an object that is displaced since the survey.
     pub fn displaced(&mut self, found: &Displacement) {
         self.traverse.displaced(self.objects[found.object], found.place);
     }
 
-    /// A frame: what it adds to the network, and what the network says of the pose.
+    /// Processes a frame: adds a key frame, recognises one, and corrects the navigator's pose by it.
     pub fn visit(
         &mut self,
         sensor_frame: &SensorFrame,
@@ -171,7 +174,7 @@ impl<'a> KeyframeMapper<'a> {
                 });
                 let theirs = |pose: Navigated| Some(Navigated { object: self.targets[pose.object]?, ..pose });
                 if let Some(pose) = found.navigated.and_then(theirs) {
-                    navigator.settle(&pose, format!("key frame {pose_node} found again"));
+                    navigator.settle(&pose, format!("key frame {pose_node} recognised"));
                 }
             }
             Some(Err(why)) => events.push(NavigationEvent::NoKeyframe { why: why.to_string() }),
@@ -182,7 +185,7 @@ impl<'a> KeyframeMapper<'a> {
         }
     }
 
-    /// The network as a file, where it is to be kept.
+    /// The pose graph in its file format; `None` unless `add-keyframes` is set.
     pub fn finish(self) -> Option<String> {
         let pose_graph = self.traverse.finish();
         self.keyframes.add_keyframes.then(|| pose_graph.text(&self.keyframes.settings.recognition))

@@ -1,9 +1,9 @@
 //! Position and attitude of an underwater vehicle relative to a known structure, from stereo images.
 //!
-//! A [`Localizer`] takes *fixes*: it makes a cloud of 3D points from a stereo pair, finds among them the feature points of
-//! an object of a [`Site`] by structural coherence, and solves the rigid transform `object_from_camera`
-//! (Bobkov, Kudryashov and Inzartsev, *J. Mar. Sci. Eng.* 2021, 9, 1038). A [navigation session](NavigationSession) carries the last
-//! fix along by odometry and takes the next one when it is due.
+//! A [`Localizer`] computes *fixes*. It triangulates a cloud of 3D points from a stereo pair, identifies in it the
+//! feature points of an object of a [`Site`] by structural coherence (agreement of distances), and solves the rigid
+//! transform `object_from_camera` (Bobkov, Kudryashov and Inzartsev, *J. Mar. Sci. Eng.* 2021, 9, 1038). A
+//! [`NavigationSession`] moves the last fix from frame to frame by odometry and takes the next one when it is due.
 //!
 //! ```
 //! use seafix::{Localizer, Outcome, PosePrior, Rig, Site, StereoImages, geometry::Transform};
@@ -21,7 +21,7 @@
 //! let localizer = Localizer::new(&site, &rig)?;
 //! for target in localizer.localize(&images, &prior)? {
 //!     match target.outcome {
-//!         Outcome::Referenced(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
+//!         Outcome::Fix(fix) => println!("{}: ± {:.1} mm", target.name, 1e3 * fix.position_sigma()),
 //!         rejected => println!("{}: {rejected}", target.name),
 //!     }
 //! }
@@ -29,11 +29,16 @@
 //! # }
 //! ```
 //!
-//! Every stage is a component chosen by name ([`Localizer::from_toml`]) or given as a trait object
-//! ([`Localizer::with_solver`]). This crate reads images, rigs and sites; it knows no log, no simulator and no truth.
+//! A fix holds the pose, its covariance and its integrity. An image pair without a fix is no error: its [`Outcome`]
+//! states the reason and the remedy.
 //!
-//! Lengths are metres, angles radians, times nanoseconds and image positions pixels. `a_from_b` maps column vectors:
-//! `p_a = a_from_b · p_b`.
+//! Every stage is a component chosen by name ([`Localizer::from_toml`]) or given as a trait object
+//! ([`Localizer::with_solver`]). This crate reads images, rigs and sites. It does not depend on logs, simulation or
+//! ground truth.
+//!
+//! Units are metres, radians, nanoseconds and pixels. `a_from_b` maps column vectors: `p_a = a_from_b · p_b`.
+//!
+//! The terms are those of the field; `GLOSSARY.md` at the root of the repository defines each with its literature.
 
 mod error;
 mod event;

@@ -15,26 +15,45 @@ use crate::{
 pub type PosePrior = WorldPrior;
 
 impl WorldPrior {
-    /// A prior whose error has the same standard deviation in every direction: `attitude` (rad) per axis of the camera,
-    /// `position` (m) per axis.
+    /// A prior with equal standard deviations on all axes: `attitude` (rad) and `position` (m).
+    ///
+    /// ```
+    /// use seafix::{PosePrior, geometry::Transform};
+    ///
+    /// let prior = PosePrior::isotropic(Transform::identity(), 0.5_f64.to_radians(), 0.1);
+    /// assert!((prior.covariance.position_sigma() - 0.1 * 3_f64.sqrt()).abs() < 1e-12);
+    /// ```
     pub fn isotropic(world_from_camera: Transform<World, Camera>, attitude: f64, position: f64) -> Self {
         Self { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }
     }
 }
 
-/// The outcome of the attempt to fix one target.
+/// The outcome for one target.
 #[derive(Debug, Clone)]
 pub struct TargetOutcome {
     /// The name of the target: an object's id, or the site's name.
     pub name: String,
-    /// A fix, or why there is none.
+    /// The fix, or the reason why there is none.
     pub outcome: Outcome,
 }
 
-/// A pipeline for one site and one rig: it finds the objects of the site in stereo pairs or clouds.
+/// A pipeline that computes fixes for the objects of one site from one stereo rig.
 ///
-/// [`Localizer::new`] takes the default pipeline. A component of another name is chosen in a TOML text
-/// ([`Localizer::from_toml`]); a component of one's own is given as a trait object ([`Localizer::with_solver`]).
+/// [`Localizer::new`] uses the default pipeline. [`Localizer::from_toml`] chooses other components by name, and methods
+/// such as [`Localizer::with_solver`] take a component as a trait object.
+///
+/// ```
+/// use seafix::{Localizer, Rig, Site, component::Choice, referencing::SOLVERS};
+///
+/// # fn main() -> Result<(), seafix::Error> {
+/// # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../datasets/virtual-sample");
+/// # let (rig, site) = (Rig::from_file(folder)?, Site::from_file(format!("{folder}/site.toml"))?);
+/// let solver = seafix::build(&SOLVERS, &Choice::named("kabsch"))?;
+/// let localizer = Localizer::new(&site, &rig)?.with_solver(solver).with_seed(7);
+/// assert_eq!(localizer.targets()[0].name, "tree-a");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Localizer {
     stages: PipelineStages,
@@ -47,15 +66,34 @@ impl Localizer {
     /// A localizer with the default pipeline.
     ///
     /// # Errors
-    /// [`Error::NoWorld`]: an object without a place in the world, where the pipeline's target needs it.
+    /// [`Error::NoWorld`]: an object without a pose in the world, if the pipeline's target needs one.
     pub fn new(site: &Site, rig: &Rig) -> Result<Self, Error> {
         Self::with_pipeline(site, rig, &Pipeline::default())
     }
 
-    /// A localizer with the pipeline settings in `text`, the table `[pipeline]` of an experiment file.
+    /// A localizer with the pipeline settings in `text`.
+    ///
+    /// The text is the content of the table `[pipeline]` of an experiment file.
+    ///
+    /// ```
+    /// use seafix::{Error, Localizer, Rig, Site};
+    ///
+    /// # fn main() -> Result<(), Error> {
+    /// # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../datasets/virtual-sample");
+    /// # let (rig, site) = (Rig::from_file(folder)?, Site::from_file(format!("{folder}/site.toml"))?);
+    /// let settings = "target = 'joint'\nsolver = 'mahalanobis'";
+    /// Localizer::from_toml(&site, &rig, settings)?;
+    ///
+    /// let unknown_key = Localizer::from_toml(&site, &rig, "sover = 'mahalanobis'");
+    /// assert!(matches!(unknown_key, Err(Error::Settings(_))));
+    /// let unknown_component = Localizer::from_toml(&site, &rig, "solver = 'mahalanbis'");
+    /// assert!(matches!(unknown_component, Err(Error::Setting(_))));
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
-    /// [`Error::Settings`]: no valid TOML, or an unknown key; else as [`Localizer::with_pipeline`].
+    /// [`Error::Settings`]: invalid TOML or an unknown key. Other errors are those of [`Localizer::with_pipeline`].
     pub fn from_toml(site: &Site, rig: &Rig, text: &str) -> Result<Self, Error> {
         Self::with_pipeline(site, rig, &toml::from_str(text)?)
     }
@@ -63,70 +101,70 @@ impl Localizer {
     /// A localizer with these settings.
     ///
     /// # Errors
-    /// [`Error::Setting`]: an unknown component or an invalid value. [`Error::NoWorld`]: an object without a place in the
-    /// world, where the pipeline's target needs it.
+    /// [`Error::Setting`]: an unknown component or an invalid value. [`Error::NoWorld`]: an object without a pose in the
+    /// world, if the pipeline's target needs one.
     pub fn with_pipeline(site: &Site, rig: &Rig, pipeline: &Pipeline) -> Result<Self, Error> {
         let stages = pipeline.build()?;
         let targets = site
             .targets(pipeline.target)
-            .map_err(|missing| Error::NoWorld { purpose: "search for the whole site", object: missing.object })?;
+            .map_err(|missing| Error::NoWorld { purpose: "search for the complete site", object: missing.object })?;
         Ok(Self { stages, targets, rig: rig.clone(), seed: 0 })
     }
 
-    /// The same with another solver.
+    /// Replaces the solver of the rigid motion.
     #[must_use]
     pub fn with_solver(mut self, solver: Box<dyn Solver>) -> Self {
         self.stages.solver = solver;
         self
     }
 
-    /// The same with another search.
+    /// Replaces the search of Stage 2.
     #[must_use]
     pub fn with_search(mut self, search: Box<dyn Search>) -> Self {
         self.stages.search = search;
         self
     }
 
-    /// The same with another detector.
+    /// Replaces the corner detector.
     #[must_use]
     pub fn with_detector(mut self, detector: Box<dyn Detector>) -> Self {
         self.stages.front_end.detector = detector;
         self
     }
 
-    /// The same with another descriptor.
+    /// Replaces the descriptor.
     #[must_use]
     pub fn with_descriptor(mut self, descriptor: Box<dyn Descriptor>) -> Self {
         self.stages.front_end.descriptor = descriptor;
         self
     }
 
-    /// The same with another matcher.
+    /// Replaces the matcher.
     #[must_use]
     pub fn with_matcher(mut self, matcher: Box<dyn Matcher>) -> Self {
         self.stages.front_end.matcher = matcher;
         self
     }
 
-    /// The same with another seed for searches that draw random numbers; the default is 0.
+    /// Sets the seed of searches that draw random numbers; 0 by default.
     #[must_use]
     pub fn with_seed(self, seed: u64) -> Self {
         Self { seed, ..self }
     }
 
-    /// The targets, in the order of the outcomes.
+    /// The targets: the objects of the site, or the site as one.
     pub fn targets(&self) -> &[Target] {
         &self.targets
     }
 
-    /// The rig.
+    /// The stereo rig.
     pub fn rig(&self) -> &Rig {
         &self.rig
     }
 
-    /// Fixes from a stereo pair: an outcome for each target that the prior puts in view.
+    /// Outcomes of a stereo pair, one for each target in view by the prior.
     ///
-    /// Without a prior every target is searched in the whole cloud.
+    /// Without a prior every target is searched in the complete cloud.
     ///
     /// # Errors
     /// [`Error::ImageSize`]: an image of another size than its camera is calibrated for.
@@ -140,9 +178,35 @@ impl Localizer {
         Ok(self.outcomes(self.process(&frame(frame_data, prior.into()))))
     }
 
-    /// Fixes from a cloud of measured points (camera frame, m): an outcome for each target that the prior puts in view.
+    /// Outcomes of a cloud of measured points (camera frame, m).
     ///
-    /// A solver that works on pixels, as the default does, uses the points' pixels where they have any.
+    /// Each target in view by the prior has an outcome. Without a prior every target is searched in the complete cloud.
+    ///
+    /// The default solver minimises reprojection errors and needs points with pixels. The solver `mahalanobis` needs
+    /// covariances only.
+    ///
+    /// ```
+    /// use nalgebra::{Matrix3, Vector3};
+    /// use seafix::geometry::{MeasuredPoint, Point, UncertainPoint};
+    /// use seafix::{Localizer, Outcome, Rig, Site};
+    ///
+    /// # fn main() -> Result<(), seafix::Error> {
+    /// # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../datasets/virtual-sample");
+    /// # let (rig, site) = (Rig::from_file(folder)?, Site::from_file(format!("{folder}/site.toml"))?);
+    /// let localizer = Localizer::from_toml(&site, &rig, "solver = 'mahalanobis'")?;
+    /// let covariance = Matrix3::identity() * 0.008_f64.powi(2);
+    /// let point = |x, y, z| {
+    ///     let at = Point::from(Vector3::new(x, y, z));
+    ///     MeasuredPoint { position: UncertainPoint { at, covariance }, pixels: None }
+    /// };
+    /// let cloud = [point(-0.6747, 0.4299, 2.7510), point(0.3571, 0.3343, 2.7467)];
+    /// for target in localizer.localize_points(&cloud, None) {
+    ///     // Two points do not determine a pose.
+    ///     assert!(!matches!(target.outcome, Outcome::Fix(_)), "{}", target.name);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn localize_points<'a>(
         &self,
         points: &[MeasuredPoint],
@@ -151,7 +215,7 @@ impl Localizer {
         self.outcomes(self.process(&frame(FrameData::Points(points.to_vec()), prior.into())))
     }
 
-    /// Everything that the pipeline computed from one frame: key points, cloud, candidates and answers.
+    /// The complete result for one frame: key points, cloud, candidates and outcomes.
     pub fn process(&self, frame: &SensorFrame) -> FrameResult {
         let rig = &self.rig.stereo;
         let cloud = self.stages.cloud(&frame.frame_data, rig);
@@ -166,10 +230,12 @@ impl Localizer {
         result
     }
 
-    /// Begins to navigate with these components, from `map` where an earlier session left one.
+    /// Begins a navigation session.
+    ///
+    /// A stack with key frames also recognises those of `map`, the pose graph of an earlier session.
     ///
     /// # Errors
-    /// [`Error::NoWorld`]: navigation needs the place of every object in the world.
+    /// [`Error::NoWorld`]: an object without a pose in the world.
     pub fn navigate<'a>(
         &'a self,
         navigation_stack: &'a NavigationStack,

@@ -11,17 +11,17 @@ use crate::{
     pipeline::{build, faults, resolve},
 };
 
-/// The settings of the way from fix to fix.
+/// The settings of navigation from fix to fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Navigation {
-    /// Carries the last fix along.
+    /// The odometry that moves the last fix from frame to frame.
     pub odometry: Choice,
-    /// When a fix is tried.
+    /// The policy that decides when a fix is due.
     pub policy: Choice,
-    /// What becomes of the navigated pose when a fix comes.
+    /// The fusion of a fix with the navigated pose.
     pub fusion: Choice,
-    /// Key frames where no object is in view; without it none are laid.
+    /// The key frames that support navigation where no object is in view; none if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pose_graph: Option<Keyframes>,
 }
@@ -38,10 +38,10 @@ impl Default for Navigation {
 }
 
 impl Navigation {
-    /// The same with every setting of its components written out.
+    /// The same settings with the defaults of all components written out.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
         Ok(Self {
             odometry: resolve(&ODOMETRIES, &self.odometry)?,
@@ -51,7 +51,7 @@ impl Navigation {
         })
     }
 
-    /// Every setting that it cannot be built with.
+    /// All faults that keep the navigation stack from being built.
     pub fn invalid(&self) -> Vec<PipelineError> {
         let mut all = faults(&ODOMETRIES, &self.odometry);
         all.extend(faults(&POLICIES, &self.policy));
@@ -60,10 +60,10 @@ impl Navigation {
         all
     }
 
-    /// Ready to work.
+    /// Builds all components.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn build(&self) -> Result<NavigationStack, PipelineError> {
         let invalid = self.pose_graph.iter().flat_map(Keyframes::invalid).next();
         invalid.map_or(Ok(()), Err)?;
@@ -76,23 +76,23 @@ impl Navigation {
     }
 }
 
-/// The components between fixes, built.
+/// The built components of navigation: odometry, policy, fusion and key frames.
 #[derive(Debug)]
 pub struct NavigationStack {
     pub(crate) odometry: Box<dyn Odometry>,
     pub(crate) policy: Box<dyn Policy>,
     pub(crate) fusion: Box<dyn Fusion>,
-    /// The settings of the key frames, where any are kept.
+    /// The settings of the key frames, if there are any.
     pub pose_graph: Option<Keyframes>,
 }
 
 impl NavigationStack {
-    /// Whether it cannot do without what the vehicle's Doppler log and gyro say.
+    /// Whether the odometry requires readings of the vehicle's Doppler log and gyro.
     pub fn listens(&self) -> bool {
         self.odometry.listens()
     }
 
-    /// Its odometry, with nothing seen yet.
+    /// The odometry at its start.
     pub fn begin_odometry<'a>(
         &'a self,
         rig: &'a StereoRig,

@@ -1,4 +1,4 @@
-//! An odometry between the frames of a passage.
+//! The odometry of a sequence of sensor frames.
 
 use std::time::Instant;
 
@@ -8,30 +8,30 @@ use seafix_vision::Threads;
 
 use crate::{FrameData, SensorFrame, times::milliseconds};
 
-/// An odometry on its way through the frames of a passage. It depends on no fix, so that trials with the same odometry can
-/// share it.
+/// An odometry at work on a sequence of frames. It is independent of fixes, so that trials with the same odometry share
+/// it.
 pub struct TrialOdometry<'a>(Box<dyn OdometrySession + 'a>);
 
 /// The odometry's result for one frame.
 pub struct OdometryResult {
-    /// Whether the pair was followed, began a segment, or was skipped.
+    /// Whether the frame extended a segment, began one, or was skipped.
     pub followed: OdometryOutcome,
-    /// The last waypoint and the number of its segment.
+    /// The last waypoint and the index of its segment.
     pub latest: Option<(usize, Waypoint)>,
-    /// Duration (ms).
+    /// The duration (ms).
     pub ms: f64,
 }
 
 impl<'a> TrialOdometry<'a> {
-    /// It has seen nothing yet.
+    /// The odometry before its first frame.
     pub fn begin(odometry: &'a dyn Odometry, rig: &'a StereoRig, body_from_camera: Transform<Body, Camera>) -> Self {
         Self(odometry.begin(rig, body_from_camera, Threads::One))
     }
 
-    /// The next frame, and what the vehicle's sensors told since the one before.
+    /// Processes the next frame with the sensor readings since the previous one.
     ///
     /// # Errors
-    /// A sentence: the frame is no stereo pair, or not after the one before.
+    /// The cause as a sentence: a frame without images, or one that is not later than the previous frame.
     pub fn advance(&mut self, sensor_frame: &SensorFrame) -> Result<OdometryResult, String> {
         let start = Instant::now();
         let pair = stereo_pair(sensor_frame)?;
@@ -41,13 +41,13 @@ impl<'a> TrialOdometry<'a> {
     }
 }
 
-/// The images of a frame.
+/// The stereo pair of a frame.
 ///
 /// # Errors
-/// A sentence: it has none.
+/// The cause as a sentence: a frame without images.
 pub fn stereo_pair(sensor_frame: &SensorFrame) -> Result<StereoPair<'_>, String> {
     let FrameData::Stereo(left, right) = &sensor_frame.frame_data else {
-        return Err("a frame without images".to_owned());
+        return Err("no images, but odometry needs a stereo pair".to_owned());
     };
     Ok(StereoPair { stamp_ns: sensor_frame.stamp_ns, left, right })
 }

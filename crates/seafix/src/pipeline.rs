@@ -1,4 +1,4 @@
-//! The settings of the way from a sight to fixes, and what is built from them.
+//! Settings of the pipeline from a sensor frame to fixes, and the components built from them.
 
 use seafix_component::{BuildError, Choice, Part, Registry, each_invalid, in_range, out_of_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
@@ -10,41 +10,42 @@ use serde::{Deserialize, Serialize};
 
 use crate::PipelineStages;
 
-/// The settings of the way from a frame to a fix.
+/// The settings of the pipeline from a sensor frame to a fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Pipeline {
-    /// What is searched for: each object in view, each and then all together, or the whole site at once.
+    /// The target of a search: each object in view, each object followed by a joint fix, or the complete site.
     pub target: TargetKind,
-    /// How many frames a joint fix is over: the frame itself and those before it.
+    /// The number of frames of a joint fix, 1 to 1000: the current frame and those before it.
     pub window: usize,
-    /// Prepare each image, one after the other; none by default.
+    /// The filters applied to each image, in order; none by default.
     pub filters: Vec<Choice>,
-    /// Finds corners in each image.
+    /// The corner detector.
     pub detector: Choice,
-    /// Says where exactly the corners are.
+    /// The locator that refines the position of a detected corner.
     pub locator: Choice,
-    /// Describes their surroundings.
+    /// The descriptor of a corner's neighbourhood.
     pub descriptor: Choice,
-    /// Pairs left with right.
+    /// The matcher of left and right key points.
     pub matcher: Choice,
-    /// Says more exactly where the right image shows each left place. Settings without a name are those of `direct`.
+    /// The refinement of a match to a fraction of a pixel. A table without `name` has the settings of `direct`.
     #[serde(deserialize_with = "read_refinement")]
     pub refinement: Choice,
-    /// Turns pairs into points. Settings without a name are those of `optimal`.
+    /// The triangulator of matched pairs. A table without `name` has the settings of `optimal`.
     #[serde(deserialize_with = "read_triangulator")]
     pub triangulator: Choice,
-    /// Stage 1: the shells.
+    /// The gates of Stage 1 ("shells" in the paper).
     pub gate: Gate,
-    /// Whether shells grow where nothing is found in them, and then vanish: an object may have been displaced.
+    /// Whether the search is repeated with larger gates, then without, when it finds nothing. A displaced object is
+    /// outside its gates.
     pub expand_gates: bool,
-    /// When two distances agree.
+    /// The tolerance within which two distances agree.
     pub tolerance: Tolerance,
-    /// Stage 2: the search. Of points that say which ones they are none is asked for.
+    /// The search of Stage 2. Labelled points need none.
     pub search: Choice,
-    /// The solver.
+    /// The solver of the rigid motion.
     pub solver: Choice,
-    /// When an answer is believed.
+    /// The acceptance tests of a fix.
     pub acceptance: Acceptance,
 }
 
@@ -70,27 +71,27 @@ impl Default for Pipeline {
     }
 }
 
-/// A setting of the pipeline that cannot be.
+/// An invalid pipeline setting.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct PipelineError {
     /// The key below `pipeline`.
     pub setting: &'static str,
-    /// The key below that, where it is known; of a component that does not exist its `name`.
+    /// The key below `setting`, if known; `name` for an unknown component.
     pub key: Option<String>,
-    /// What of that key it is.
+    /// The faulty part: key or value.
     pub part: Part,
-    /// The component that was meant by a name that none has.
+    /// The existing component whose name is closest to an unknown name.
     pub near: Option<&'static str>,
-    /// What is wrong, and the nearest right thing.
+    /// The fault and the closest valid setting.
     pub message: String,
 }
 
 impl Pipeline {
-    /// The same pipeline with every setting of its components written out.
+    /// The same pipeline with the defaults of all components written out.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
         Ok(Self {
             filters: each_filter(&self.filters, resolve)?,
@@ -106,7 +107,7 @@ impl Pipeline {
         })
     }
 
-    /// Every setting that it cannot be built with.
+    /// All faults that keep the pipeline from being built.
     pub fn invalid(&self) -> Vec<PipelineError> {
         let filters = self.filters.iter().enumerate().flat_map(|(place, choice)| {
             let of = move |error: PipelineError| in_list(place, error);
@@ -138,16 +139,16 @@ impl Pipeline {
         fits.map_err(|message| invalid_setting("window", message))
     }
 
-    /// Standard deviation of the coordinates of a key point that no corner was fitted to (px); none of a pipeline that
-    /// cannot be built.
+    /// The standard deviation of a key point's coordinates without a corner fit (px); `None` for an invalid
+    /// triangulator.
     pub fn pixel_sigma(&self) -> Option<f64> {
         build(&TRIANGULATORS, &self.triangulator).ok().map(|triangulator| triangulator.rules().sigma_px)
     }
 
-    /// The part of it between two images and a cloud, ready to work.
+    /// The front end: the stages from two images to a cloud.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn front_end(&self) -> Result<FrontEnd, PipelineError> {
         let choices = StageChoices {
             filters: &self.filters,
@@ -167,10 +168,10 @@ impl Pipeline {
         })
     }
 
-    /// The pipeline, ready to work.
+    /// Builds all components.
     ///
     /// # Errors
-    /// [`PipelineError`] names the setting.
+    /// The first invalid setting.
     pub fn build(&self) -> Result<PipelineStages, PipelineError> {
         self.gate.check().map_err(|message| invalid_setting("gate", message))?;
         self.tolerance.check().map_err(|message| invalid_setting("tolerance", message))?;
@@ -181,11 +182,11 @@ impl Pipeline {
     }
 }
 
-/// What a check of settings that are no component's says.
+/// The error of a setting without component, such as `gate` or `acceptance`.
 pub fn invalid_setting(setting: &'static str, message: String) -> PipelineError {
-    // Some checks say by themselves whose they are.
+    // Some messages begin with the name of the setting.
     let own = message.strip_prefix(&format!("{setting}: ")).unwrap_or(&message);
-    // Settings of a list say their places: `faults[0].to`.
+    // The keys of a list's entries have indices, as in `faults[0].to`.
     let (key, message) = match out_of_range(own) {
         Some(key) => match key.strip_prefix(setting) {
             Some(below) => (Some(below.to_owned()).filter(|below| !below.is_empty()), own.to_owned()),
@@ -196,7 +197,7 @@ pub fn invalid_setting(setting: &'static str, message: String) -> PipelineError 
     PipelineError { setting, key, part: Part::Value, near: None, message }
 }
 
-/// The choice with every setting of its component written out.
+/// The choice with all defaults of its component written out.
 ///
 /// # Errors
 /// An unknown component or an invalid value.
@@ -204,7 +205,7 @@ pub fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Cho
     registry.resolve(choice).map_err(|error| in_pipeline(registry, &error))
 }
 
-/// The chosen component.
+/// Builds the chosen component.
 ///
 /// # Errors
 /// An unknown component or an invalid value.
@@ -212,18 +213,18 @@ pub fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T
     registry.build(choice).map_err(|error| in_pipeline(registry, &error))
 }
 
-/// Everything that keeps a stage from being built.
+/// All faults that keep a component from being built.
 pub fn faults<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Vec<PipelineError> {
     registry.faults(choice).iter().map(|error| in_pipeline(registry, error)).collect()
 }
 
-/// The fault of the filter in this place of the list.
+/// The fault of the filter at index `place` of the list.
 fn in_list(place: usize, error: PipelineError) -> PipelineError {
     let below = error.key.map_or_else(String::new, |key| format!(".{key}"));
     PipelineError { setting: "filters", key: Some(format!("{place}{below}")), ..error }
 }
 
-/// What `make` makes of each filter; an error names its place in the list.
+/// Applies `make` to each filter; an error names the filter's index.
 fn each_filter<T>(
     choices: &[Choice],
     make: fn(&Registry<dyn Filter>, &Choice) -> Result<T, PipelineError>,
@@ -236,7 +237,7 @@ fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> Pipelin
     invalid(registry.kind(), error)
 }
 
-/// What is wrong with a component, as the fault of its setting.
+/// The fault of a component as the fault of its setting.
 fn invalid(setting: &'static str, error: &BuildError) -> PipelineError {
     let key = error.key().map(str::to_owned);
     PipelineError { setting, key, part: error.part(), near: error.near(), message: error.to_string() }

@@ -1,4 +1,4 @@
-//! What a method is given at one instant.
+//! The input of the pipeline at one instant.
 
 use std::sync::Arc;
 
@@ -7,23 +7,25 @@ use seafix_navigation::Reading as SensorReading;
 use seafix_referencing::{Prior, Target, problem_file::CoherenceProblem};
 use seafix_vision::Image;
 
-/// The measurements of one instant and the prior knowledge of its pose.
+/// The measurements of one instant and the prior of its pose.
+///
+/// A frame holds everything that a method may use. It holds no ground truth.
 #[derive(Debug, Clone)]
 pub struct SensorFrame {
-    /// Time (ns).
+    /// The time (ns).
     pub stamp_ns: u64,
     /// The stereo pair or the cloud.
     pub frame_data: FrameData,
     /// The prior pose of the left camera in the world, if one is known.
     pub prior: Option<WorldPrior>,
-    /// Correspondences or a problem that come with the data.
+    /// Correspondences or a coherence problem supplied with the data.
     pub hints: Hints,
-    /// The readings of the navigation sensors since the previous instant, in the order of arrival.
+    /// The readings of the navigation sensors since the previous frame, in the order of arrival.
     pub readings: Vec<SensorReading>,
 }
 
 impl SensorFrame {
-    /// The prior pose relative to each target; `None` without a prior or without a place of the target in the world.
+    /// The prior pose relative to each target; `None` without a prior or without a pose of the target in the world.
     pub fn prior_pose(&self, targets: &[Target]) -> Vec<Option<Prior>> {
         let prior = |target: &Target| {
             let world = self.prior.as_ref()?;
@@ -33,25 +35,25 @@ impl SensorFrame {
     }
 }
 
-/// Knowledge of the correspondences that comes with the data.
+/// Knowledge about the correspondences that the data supply.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum Hints {
     /// No knowledge.
     #[default]
     Nothing,
-    /// The feature point of each cloud point as (object, point) indices, no two the same. No search runs.
+    /// The label of each cloud point as (object, point) indices, each at most once. No search runs.
     Names(Vec<(usize, usize)>),
-    /// An identification problem with its own model, tolerance, candidates and prior. The settings `gate` and `tolerance` of
+    /// A coherence problem with model, tolerance, candidates and prior of its own. The settings `gate` and `tolerance` of
     /// the pipeline do not apply.
     Problem(Arc<CoherenceProblem>),
 }
 
-/// The measurements of the cameras.
+/// The cameras' part of a sensor frame.
 #[derive(Debug, Clone)]
 pub enum FrameData {
-    /// A stereo pair.
+    /// A stereo pair: the left and the right image.
     Stereo(Image, Image),
-    /// A cloud without images.
+    /// A cloud of measured points (camera frame, m) without images.
     Points(Vec<MeasuredPoint>),
 }
 

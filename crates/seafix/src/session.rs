@@ -1,4 +1,4 @@
-//! A navigation session: fixes, and odometry between them.
+//! Navigation from fix to fix, with odometry in between.
 
 use std::cell::OnceCell;
 
@@ -20,17 +20,44 @@ use crate::{
     stages::{Cloud, View},
 };
 
-/// How the reason ends why no motion is known to a pair that the odometry goes on from. A pair that it left out has another
-/// reason; of that, the way goes on over it.
-pub const UNKNOWN_MOTION: &str = "the way here is unknown";
+/// The end of [`Motion::lost`] where the trajectory is broken and begins again. The reason of a skipped frame does not
+/// end so, because the next motion spans that frame.
+pub const UNKNOWN_MOTION: &str = "the motion to this frame is unknown";
 
-/// Changes the motion that the odometry found, given the time since the first frame (s).
+/// A function that replaces the motion of the odometry, given the time since the first frame (s).
 pub type MotionFilter<'a> = Box<dyn FnMut(f64, Option<RelativeMotion>) -> Option<RelativeMotion> + Send + 'a>;
 
-/// Navigation from fix to fix through successive frames.
+/// Navigation of a vehicle through successive frames, from fix to fix.
 ///
-/// It holds the navigated pose relative to the object of the last fix. For each frame the odometry moves that pose, the
-/// policy decides whether a fix is due, and the fusion joins the fix to the pose.
+/// The session holds the pose of the camera relative to the object of the last fix. The odometry moves that pose to
+/// each frame, the policy decides whether a fix is due, and the fusion combines the fix with the pose.
+///
+/// ```
+/// use seafix::geometry::Transform;
+/// use seafix::{Hints, Localizer, Navigation, PosePrior, Rig, SensorFrame, Site, StereoImages};
+///
+/// # fn main() -> Result<(), seafix::Error> {
+/// # let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../datasets/virtual-sample");
+/// # let (rig, site) = (Rig::from_file(folder)?, Site::from_file(format!("{folder}/site.toml"))?);
+/// # let attitude = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(-0.31943, -0.10266, -0.03577, 0.94135));
+/// # let world_from_camera = Transform::new(attitude, nalgebra::Vector3::new(-23.459, -5.727, 36.558));
+/// # let images = StereoImages::open(format!("{folder}/left000.png"), format!("{folder}/right000.png"), &rig)?;
+/// let localizer = Localizer::new(&site, &rig)?;
+/// let navigation_stack = Navigation::default().build()?;
+/// let mut session = localizer.navigate(&navigation_stack, None)?;
+/// let state = session.push(&SensorFrame {
+///     stamp_ns: 1_700_000_000_000_000_000,
+///     frame_data: images.into_frame_data(),
+///     prior: Some(PosePrior::isotropic(world_from_camera, 0.5_f64.to_radians(), 0.1)),
+///     hints: Hints::Nothing,
+///     readings: Vec::new(),
+/// })?;
+/// println!("{}", state.state);
+/// state.events.iter().for_each(|event| println!("{event}"));
+/// assert!(state.due, "the default policy asks for a fix at every frame");
+/// # Ok(())
+/// # }
+/// ```
 pub struct NavigationSession<'a> {
     navigation_stack: &'a NavigationStack,
     stages: &'a PipelineStages,
@@ -38,38 +65,38 @@ pub struct NavigationSession<'a> {
     rig: &'a StereoRig,
     navigator: Navigator<'a>,
     keyframe_mapper: Option<KeyframeMapper<'a>>,
-    /// Changes the motions of the odometry, for a study of its failures.
+    /// The filter of the odometry's motions, for the study of its failures.
     filter: Option<MotionFilter<'a>>,
     body_from_camera: Transform<Body, Camera>,
-    /// The odometry of [`push`](Self::push), from its first frame on.
+    /// The odometry of [`push`](Self::push); `None` before the first frame.
     odometry: Option<TrialOdometry<'a>>,
     frames: u64,
-    /// When the first frame was taken (ns).
+    /// The time of the first frame (ns).
     began: Option<u64>,
-    /// Changes of the navigator's state that have been told.
+    /// The number of reported changes of the navigator's state.
     reported: usize,
-    /// The pair that the odometry knew last: when, and in which segment.
+    /// The last frame that the odometry accepted: its time (ns) and its segment.
     last: Option<(u64, usize)>,
     /// Whether there has been a fix.
     fixed: bool,
-    /// The first fix, carried along by odometry alone, until the way is lost.
+    /// The first fix moved by odometry alone; `None` from the first gap of the odometry on.
     odometry_only: Option<Navigated>,
 }
 
 /// The state of a navigation session after a frame.
 #[derive(Debug, Clone)]
 pub struct NavigationState {
-    /// What the pose rests on: the prior, a fix, or dead reckoning since a fix.
+    /// The source of the pose: the prior, a fix, or dead reckoning since a fix.
     pub state: State,
-    /// Whether a fix was attempted.
+    /// Whether a fix was due.
     pub due: bool,
-    /// The navigated pose, relative to the object of the last fix; `None` while there is none.
+    /// The pose relative to the object of the last fix; `None` before the first fix and for a frame without motion.
     pub pose: Option<Navigated>,
-    /// The first fix, moved here by odometry alone; `None` before it and after a gap in the odometry.
+    /// The first fix moved to this frame by odometry alone; `None` before it and after a gap of the odometry.
     pub odometry_only: Option<Navigated>,
     /// The motion of the odometry to this frame.
     pub odometry: Motion,
-    /// What happened, in order.
+    /// The events of this frame, in order.
     pub events: Vec<NavigationEvent>,
     /// Duration of the odometry (ms).
     pub odometry_ms: f64,
@@ -78,11 +105,11 @@ pub struct NavigationState {
 /// The motion of the odometry to a frame.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
-    /// Why no motion to the frame is known; empty where one is, and at the first frame. It ends in
+    /// The reason why the motion to this frame is unknown; empty if it is known, and at the first frame. It ends in
     /// [`UNKNOWN_MOTION`] where the trajectory is broken and begins again at this frame. Otherwise the frame was
     /// skipped, and the next motion spans it.
     pub lost: String,
-    /// The motion from the last known frame, `earlier_from_later`.
+    /// The motion since the last accepted frame, `earlier_from_later`.
     pub step: Option<RelativeMotion>,
 }
 
@@ -96,7 +123,8 @@ impl std::fmt::Debug for NavigationSession<'_> {
 }
 
 impl<'a> NavigationSession<'a> {
-    /// Sets out, in the network of an earlier run where there is one; every target stands somewhere in the world.
+    /// Begins a session, with the pose graph of an `earlier` run if there is one. Every target needs a pose in the
+    /// world.
     pub fn begin(
         navigation_stack: &'a NavigationStack,
         stages: &'a PipelineStages,
@@ -130,23 +158,24 @@ impl<'a> NavigationSession<'a> {
         }
     }
 
-    /// The same with `filter` between the odometry and the navigator.
+    /// Sets a `filter` between the odometry and the navigator.
     #[must_use]
     pub fn with_motion_filter(self, filter: MotionFilter<'a>) -> Self {
         Self { filter: Some(filter), ..self }
     }
 
-    /// The targets; a [`Navigated`] pose names its object by the index here.
+    /// The targets; the field `object` of a [`Navigated`] pose is an index into them.
     pub fn targets(&self) -> &'a [Target] {
         self.targets
     }
 
-    /// Takes the next frame: moves the pose by odometry and takes a fix where one is due.
+    /// Processes the next frame: moves the pose by odometry and takes a fix if one is due.
     ///
-    /// Frames come in order of time and must be stereo pairs of the session's rig.
+    /// Frames are stereo pairs of the session's rig, in order of time.
     ///
     /// # Errors
-    /// [`Error::Frame`]: a frame without images, or one that is not later than the frame before.
+    /// [`Error::ImageSize`]: an image of another size than its camera is calibrated for. [`Error::Frame`]: a frame
+    /// without images, or one that is not later than the previous frame.
     pub fn push(&mut self, frame: &SensorFrame) -> Result<NavigationState, Error> {
         let invalid = |cause: String| Error::Frame { stamp_ns: frame.stamp_ns, cause };
         if let FrameData::Stereo(left, right) = &frame.frame_data {
@@ -162,11 +191,12 @@ impl<'a> NavigationSession<'a> {
         self.advance(frame, &moved, make, &mut rng).map(|(_, state)| state).map_err(invalid)
     }
 
-    /// The same for a caller that computes odometry and cloud itself. The last fix is carried along by the `moved` odometry, and another is taken from the `cloud` where
-    /// one is due.
+    /// Processes the next frame with odometry and cloud that the caller computed.
+    ///
+    /// The odometry result `moved` moves the pose. The closure `cloud` is called only if a fix is due.
     ///
     /// # Errors
-    /// A sentence: the frame is no stereo pair.
+    /// The cause as a sentence: the frame is no stereo pair.
     pub fn advance<'b>(
         &mut self,
         sensor_frame: &'b SensorFrame,
@@ -178,7 +208,7 @@ impl<'a> NavigationSession<'a> {
         let mut events = Vec::new();
         let odometry = self.carry(sensor_frame, moved, &mut events);
 
-        // Where the odometry is not, neither is the navigator: a fix would have no place in the order of motions.
+        // A fix at a frame that the odometry skipped would have no place in the sequence of motions: none is attempted.
         let here = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sensor_frame.stamp_ns);
         let prior_pose = sensor_frame.prior_pose(self.targets);
         let priors = self.priors(&prior_pose);
@@ -206,7 +236,7 @@ impl<'a> NavigationSession<'a> {
         Ok((frame_result, NavigationState { state, due, pose, odometry_only, odometry, events, odometry_ms: moved.ms }))
     }
 
-    /// Carries the pose to this frame where the odometry knows the way.
+    /// Moves the pose to this frame if the motion is known.
     fn carry(
         &mut self,
         sensor_frame: &SensorFrame,
@@ -236,13 +266,13 @@ impl<'a> NavigationSession<'a> {
         self.keyframe_mapper.iter_mut().for_each(|keyframe_mapper| keyframe_mapper.advance(seconds, motion.as_ref()));
         self.odometry_only = self.odometry_only.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
         let Some(motion) = motion else {
-            let why = if found.is_some() { "it failed" } else { "a new segment begins" };
+            let why = if found.is_some() { "the odometry failed" } else { "a new segment begins" };
             return Motion { lost: format!("{why}: {UNKNOWN_MOTION}"), step: None };
         };
         Motion { lost: String::new(), step: Some(motion) }
     }
 
-    /// What is known before a fix: the navigated pose, passed to each object; else the rough one.
+    /// The prior of each object: the navigated pose passed to it, otherwise the prior pose of the frame.
     fn priors(&self, prior_pose: &[Option<Prior>]) -> Vec<Option<Prior>> {
         let known = |index| {
             let ObjectPose { object_from_camera, covariance, .. } = self.navigator.pose_at(index)?.object_pose;
@@ -251,8 +281,8 @@ impl<'a> NavigationSession<'a> {
         prior_pose.iter().enumerate().map(|(index, prior_pose)| known(index).or_else(|| prior_pose.clone())).collect()
     }
 
-    /// Attempts every object in view where it is believed to be. What stands elsewhere than surveyed is not found there:
-    /// the rough pose then says where to look once more.
+    /// Searches every object in view at its predicted pose. An object that was moved since the survey is not found
+    /// there, so that the search is repeated with the frame's prior pose.
     fn search_targets(
         &self,
         sensor_frame: &SensorFrame,
@@ -269,7 +299,7 @@ impl<'a> NavigationSession<'a> {
         frame_result
     }
 
-    /// Gives the fixes to the navigator; those that it took.
+    /// Gives the fixes to the navigator and returns the accepted ones.
     fn fix(&mut self, frame_result: &FrameResult, events: &mut Vec<NavigationEvent>) -> Vec<Navigated> {
         let mut taken = Vec::new();
         for attempt in &frame_result.attempts {
@@ -287,7 +317,7 @@ impl<'a> NavigationSession<'a> {
                 .with_consider_states(ConsiderStates::of_model(attempt.target, sensitivities));
             let fix = Navigated { object: attempt.target, object_pose };
             let event = self.navigator.fix(&fix);
-            // What is laid by an object that may have been moved would stand where it does not.
+            // A key frame added at an object that may have been moved would be placed wrongly.
             let sure = !self.navigator.is_disputed(attempt.target);
             if sure && matches!(event, Event::Taken | Event::Left | Event::Relocated) {
                 taken.push(fix.clone());
@@ -315,7 +345,7 @@ impl<'a> NavigationSession<'a> {
         taken
     }
 
-    /// What its network has become, as a file, where it is to be kept.
+    /// The pose graph in its file format; `None` unless the settings ask for it.
     pub fn pose_graph(self) -> Option<String> {
         self.keyframe_mapper?.finish()
     }
@@ -332,7 +362,7 @@ impl<'a> NavigationSession<'a> {
     }
 }
 
-/// Where the objects stand by the survey.
+/// The surveyed poses of the targets in the world.
 pub fn places(targets: &[Target]) -> Vec<ObjectPlacement> {
     let place = |target: &Target| ObjectPlacement {
         world_from_object: target.world_from_object.expect("checked when the source was opened"),

@@ -1,4 +1,4 @@
-//! From a sight to fixes: the method, one line a stage, in the paper's order.
+//! The pipeline from a sensor frame to fixes, one function a stage, in the paper's order.
 
 use std::{sync::Arc, time::Instant};
 
@@ -17,7 +17,7 @@ use crate::{
     times::{milliseconds, timed},
 };
 
-/// A pipeline, built.
+/// A pipeline whose components are built and ready.
 #[derive(Debug)]
 pub struct PipelineStages {
     pub(crate) front_end: FrontEnd,
@@ -26,38 +26,38 @@ pub struct PipelineStages {
     settings: Pipeline,
 }
 
-/// Everything the pipeline made of one sight; nothing, where none was to be made.
+/// The result of the pipeline for one sensor frame; empty if no fix was due.
 #[derive(Debug, Default)]
 pub struct FrameResult {
-    /// Key points of the left image.
+    /// The key points of the left image.
     pub keypoints: Arc<[Keypoint]>,
-    /// The cloud.
+    /// The triangulated points, in the camera's frame.
     pub cloud: Arc<[MeasuredPoint]>,
     /// One attempt for each target in view.
     pub attempts: Vec<TargetAttempt>,
-    /// What a joint fix takes of objects that were not fixed by themselves.
+    /// The points that a joint fix takes from objects without a fix of their own.
     pub gathered: Gathered,
-    /// Times of the common stages.
+    /// The durations of the stages that serve all targets.
     pub times: FrameTimes,
 }
 
-/// What came of one target.
+/// The result of the search for one target.
 #[derive(Debug)]
 pub struct TargetAttempt {
-    /// Index among the site's targets.
+    /// The index of the target.
     pub target: usize,
-    /// The shells' content.
+    /// The candidates of Stage 1.
     pub candidates: Candidates,
-    /// The answer.
+    /// The outcome with its pairs and integrity.
     pub answer: seafix_referencing::Attempt,
-    /// What became of the joint fix that was asked for.
+    /// The result of the joint fix as a sentence; `None` if none was asked for.
     pub joint: Option<String>,
-    /// Times of this target's stages.
+    /// The durations of this target's stages.
     pub times: TargetTimes,
 }
 
 impl TargetAttempt {
-    /// `times` (ms) are those of candidates, search and solution, and of all that was done for this target.
+    /// An attempt with its durations (ms): candidates, search and solution, then all stages of this target.
     fn new(
         target: usize,
         candidates: Candidates,
@@ -70,28 +70,28 @@ impl TargetAttempt {
     }
 }
 
-/// The cloud of one frame. It depends on the front end alone, so that trials with the same front end can share it.
+/// The cloud of one frame. It depends on the front end alone, so that trials with the same front end share it.
 #[derive(Debug)]
 pub struct Cloud {
-    /// Key points of the left image.
+    /// The key points of the left image.
     keypoints: Arc<[Keypoint]>,
     points: Arc<[MeasuredPoint]>,
     times: FrameTimes,
-    /// Duration of all stages together (ms).
+    /// The duration of all stages together (ms).
     total_ms: f64,
 }
 
-/// The candidates of one target, and the answer of the search to them. Both depend on no solver, so that trials which
-/// differ in nothing else can share them.
+/// The candidates of one target and the result of the search among them. Both are independent of the solver, so that
+/// trials with different solvers share them.
 #[derive(Debug, Clone)]
 pub struct Sought {
     candidates: Candidates,
     found: Result<Identification, Rejected>,
-    /// Durations of the candidates and of the search (ms).
+    /// The durations of candidate selection and search (ms).
     spent: [f64; 2],
 }
 
-/// One frame and the targets that are searched for in it.
+/// One frame with its cloud, and the targets to search for.
 #[derive(Debug, Clone, Copy)]
 pub struct View<'a> {
     /// The measurements and their prior.
@@ -100,28 +100,28 @@ pub struct View<'a> {
     pub cloud: &'a Cloud,
     /// The targets.
     pub targets: &'a [Target],
-    /// The rig.
+    /// The stereo rig.
     pub rig: &'a StereoRig,
 }
 
 impl PipelineStages {
-    /// A pipeline of these components.
+    /// A pipeline with these components.
     pub fn new(front_end: FrontEnd, search: Box<dyn Search>, solver: Box<dyn Solver>, settings: Pipeline) -> Self {
         Self { front_end, search, solver, settings }
     }
 
-    /// Whether its solver works on pixels, and on nothing else.
+    /// Whether the solver requires the points' pixels.
     pub fn needs_pixels(&self) -> bool {
         self.solver.needs_pixels()
     }
 
-    /// The settings it was built from.
+    /// The settings that it was built from.
     pub fn settings(&self) -> &Pipeline {
         &self.settings
     }
 
-    /// The way from one sight to fixes, in the paper's order: key points, matches, cloud; then for
-    /// each target in view candidates (Stage 1), the search (Stage 2) and the solution.
+    /// Computes fixes from one sensor frame, in the paper's order: key points, matches, cloud; then for each target in
+    /// view the candidates (Stage 1), the search (Stage 2) and the solution.
     pub fn compute_fix(
         &self,
         sensor_frame: &SensorFrame,
@@ -133,8 +133,9 @@ impl PipelineStages {
         self.fix_from(View { sensor_frame, cloud, targets, rig }, &sensor_frame.prior_pose(targets), None, rng)
     }
 
-    /// The same from a cloud, and from what is known before of the pose relative to each target. The answers of the
-    /// search are those of [`PipelineStages::seek_all`], where they are known already.
+    /// Computes fixes from a cloud and from a prior pose relative to each target.
+    ///
+    /// `sought` are results of [`PipelineStages::seek_all`] for the same view; `None` searches here.
     pub fn fix_from(
         &self,
         view: View<'_>,
@@ -155,7 +156,7 @@ impl PipelineStages {
         FrameResult { keypoints, cloud, attempts, gathered: Gathered::default(), times: *times }
     }
 
-    /// Seeks once more, from other priors, what was not found.
+    /// Repeats the search, with other priors, for the targets without a fix.
     pub fn again(&self, frame_result: &mut FrameResult, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) {
         for attempt in &mut frame_result.attempts {
             let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
@@ -170,7 +171,7 @@ impl PipelineStages {
         }
     }
 
-    /// What a fix owes to the errors of its model: for each point that it rests on, by its place in the model.
+    /// The sensitivity of a fix to its model errors, for each model point by its index.
     pub fn model_errors(
         &self,
         fix: &Fix,
@@ -183,12 +184,12 @@ impl PipelineStages {
         Ok(fix.pairs.iter().map(|pair| pair.model).zip(sensitivities).collect())
     }
 
-    /// Whether enough of `target` should be in view for a fix, by what is known of the pose; without that it may be.
+    /// Whether enough points of `target` may be in view for a fix; true without a prior.
     pub fn shows(target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
         in_view(target, prior.as_ref(), rig).is_some()
     }
 
-    /// The front end's part.
+    /// The cloud of a frame's measurements: the front end's result, or the given points.
     pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig) -> Cloud {
         let (left, right) = match frame_data {
             FrameData::Points(cloud) => {
@@ -198,7 +199,7 @@ impl PipelineStages {
             FrameData::Stereo(left, right) => (left, right),
         };
         let start = Instant::now();
-        // Frames are worked on side by side: within one, a single thread keeps the times honest.
+        // Frames are processed in parallel. A single thread within a frame keeps the durations comparable.
         let mut output = FrontEndOutput::default();
         self.front_end.run(left, right, rig, &mut output);
         let times = FrameTimes {
@@ -213,12 +214,12 @@ impl PipelineStages {
         Cloud { keypoints, points, times, total_ms: milliseconds(start) }
     }
 
-    /// Stages 1 and 2 of every target in view, in order.
+    /// Stages 1 and 2 for every target in view, in order.
     pub fn seek_all(&self, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) -> Vec<Option<Sought>> {
         (0..view.targets.len()).map(|index| self.seek(view, index, priors[index].as_ref(), rng)).collect()
     }
 
-    /// Stages 1 and 2 of one target; `None` where it is not in view, or where every point says which one it is.
+    /// Stages 1 and 2 for one target; `None` if it is out of view or if its points are labelled.
     fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<Sought> {
         let target = &view.targets[index];
         match &view.sensor_frame.hints {
@@ -246,7 +247,7 @@ impl PipelineStages {
         Sought { candidates, found, spent: [stage1, stage2] }
     }
 
-    /// The same of a problem that states its own candidates, tolerance and rough pose.
+    /// Stages 1 and 2 of a problem with candidates, tolerance and prior pose of its own.
     fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> Sought {
         let (listed, stage1) = timed(|| problem.candidates());
         let (candidates, refused) = match listed {
@@ -258,7 +259,7 @@ impl PipelineStages {
         Sought { candidates, found, spent: [stage1, stage2] }
     }
 
-    /// The answer about one target; `None` where it is not in view. What the search says of it may be `sought` already.
+    /// The attempt on one target; `None` if it is out of view. `sought` is an earlier result of Stages 1 and 2.
     fn attempt(
         &self,
         view: View<'_>,
@@ -277,7 +278,8 @@ impl PipelineStages {
         }
     }
 
-    /// The answer to what was sought; where that is nothing, and shells may grow, to what is found in wider ones.
+    /// Solves and tests the result of a search. If it is no fix and `expand-gates` is set, the search is repeated with
+    /// larger gates.
     fn solve(
         &self,
         view: View<'_>,
@@ -315,7 +317,7 @@ impl PipelineStages {
         TargetAttempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
     }
 
-    /// The answer where every point says which one it is; `None` of a target that no point belongs to.
+    /// The answer for labelled points; `None` for a target without any.
     fn labelled(
         &self,
         view: View<'_>,
@@ -338,7 +340,7 @@ impl PipelineStages {
         Some(TargetAttempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
     }
 
-    /// The answer to a problem that states its own candidates, tolerance and rough pose.
+    /// The answer to a problem with candidates, tolerance and prior pose of its own.
     fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> TargetAttempt {
         let Sought { candidates, found, spent: [stage1, stage2] } = sought;
         let posed = posed(target, problem, &candidates);
@@ -348,28 +350,28 @@ impl PipelineStages {
     }
 }
 
-/// The search's view of a problem that states its own tolerance and rough pose.
+/// The input of the search for a problem with tolerance and prior pose of its own.
 fn posed<'a>(target: &'a Target, problem: &'a CoherenceProblem, candidates: &'a Candidates) -> Problem<'a> {
     let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
     Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior }
 }
 
-/// The pairs of points that say which ones they are, in the order of the model: of an object its own, of the site those
-/// of all its objects.
+/// The pairs that the labels of the cloud points state, in the order of the model. A target of one object takes the
+/// labels of that object, a target of the site those of all its objects.
 fn labelled(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Correspondence> {
     let pair = |(cloud, &name)| Some(Correspondence { model: target.place_of(index, name)?, cloud });
     let mut pairs: Vec<Correspondence> = names.iter().enumerate().filter_map(pair).collect();
     pairs.sort_unstable();
-    // Of two that say the same the first is believed.
+    // The first of two points with the same label is taken.
     pairs.dedup_by_key(|pair| pair.model);
     pairs
 }
 
-/// Which points of `target` may be in view: predicted in both images, or out of them by no more than
-/// three standard deviations of the prediction, and not from behind. `None` when fewer than three are
-/// predicted inside, so that no fix is attempted. Without a prior everything may be in view.
+/// The points of `target` that may be in view: predicted in both images, or outside by at most three standard
+/// deviations of the prediction, and not seen from behind. `None` if fewer than three are predicted inside,
+/// so that no fix is attempted. Without a prior, every point may be in view.
 fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
-    /// Cosine of the angle between a point's normal and the line of sight below which it shows its back.
+    /// The minimum cosine between normal and line of sight; below it a point is seen from behind.
     const BACK: f64 = -0.2;
     let Some(prior) = prior else { return Some(vec![true; target.points.len()]) };
     let camera_from_object = prior.object_from_camera.inverse();
@@ -380,7 +382,7 @@ fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Ve
         })
     };
     let inside = |point: &ModelPoint| faces(point) && rig.sees(&(camera_from_object * point.at), 0.0).is_some();
-    // Most targets of a large site are nowhere near: that is known before any covariance is.
+    // This cheap test rejects most targets of a large site before any covariance is computed.
     if target.points.iter().filter(|point| inside(point)).take(3).count() < 3 {
         return None;
     }

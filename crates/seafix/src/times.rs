@@ -1,4 +1,4 @@
-//! How long the stages took.
+//! Durations of the pipeline's stages.
 
 use std::time::Instant;
 

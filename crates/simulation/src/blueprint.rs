@@ -7,20 +7,20 @@ const DRILL_CENTRE: &str = include_str!("../data/drill-centre.toml");
 
 /// The exact geometry of a site.
 ///
-/// Every object has a design frame: x forward, y to starboard, origin on the mean bed; heights are
-/// counted upwards from there. Lengths are metres.
+/// Every object has a design frame with x forward, y to starboard and the origin on the mean seabed. Heights are
+/// positive upwards from there. Lengths are in metres.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Blueprint {
-    /// The site's name.
+    /// Name of the site.
     pub name: String,
-    /// The object whose frame is the site's.
+    /// Id of the object whose frame is the site's frame.
     pub site_frame: String,
-    /// Depth of the mean bed below the world's origin.
+    /// Depth of the mean seabed below the world's origin.
     pub depth: f64,
-    /// Rocks around each object.
+    /// Number of rocks around each object.
     pub rocks: usize,
-    /// The objects, in the order of the route past them.
+    /// The objects, in the order in which frames view them.
     #[serde(rename = "object")]
     pub objects: Vec<ObjectPlan>,
 }
@@ -29,29 +29,29 @@ pub struct Blueprint {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ObjectPlan {
-    /// Its name.
+    /// Id of the object.
     pub id: String,
-    /// North and east of its origin.
+    /// North and east of the design frame's origin.
     pub at: [f64; 2],
-    /// Heading of its x axis, degrees from north to east.
+    /// Heading of the x axis (degrees, from north over east).
     pub yaw_deg: f64,
-    /// Roll and pitch it settled with, degrees.
+    /// Roll and pitch of the settled object (degrees).
     pub tilt_deg: [f64; 2],
-    /// P1, P2, P3 of the Fig. 2 rule: names of points.
+    /// Names of the base points P1, P2, P3 (the paper's Figure 2).
     pub base: [String; 3],
-    /// Its bodies.
+    /// Boxes.
     #[serde(rename = "box")]
     pub boxes: Vec<BoxPlan>,
     /// Painted areas on tops of boxes.
     #[serde(rename = "panel")]
     pub panels: Vec<PanelPlan>,
-    /// Chequered markings on tops of boxes: corners that are no feature points.
+    /// Chequered markings on tops of boxes, whose corners are no feature points.
     #[serde(default, rename = "chequer")]
     pub chequers: Vec<ChequerPlan>,
-    /// Pipes: ends that are no feature points.
+    /// Pipes, whose ends are no feature points.
     #[serde(default, rename = "pipe")]
     pub pipes: Vec<PipePlan>,
-    /// The feature points.
+    /// Feature points.
     #[serde(rename = "point")]
     pub points: Vec<PointPlan>,
 }
@@ -60,17 +60,17 @@ pub struct ObjectPlan {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct BoxPlan {
-    /// Centre of its footprint.
+    /// Centre of the footprint.
     pub centre: [f64; 2],
     /// Length and width.
     pub size: [f64; 2],
-    /// Height of its lower face.
+    /// Height of the lower face.
     pub bottom: f64,
-    /// Height of its upper face.
+    /// Height of the upper face.
     pub top: f64,
-    /// Turn about the vertical, degrees.
+    /// Rotation about the vertical (degrees).
     pub yaw_deg: f64,
-    /// Share of the light it returns.
+    /// Albedo.
     pub albedo: f64,
 }
 
@@ -78,12 +78,12 @@ pub struct BoxPlan {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PanelPlan {
-    /// The box that carries it, from 0.
+    /// Index of the box that carries it, from 0.
     #[serde(rename = "box")]
     pub carrier: usize,
-    /// Its corners on the upper face, from that face's centre along the box's axes.
+    /// Corners on the upper face, from the face's centre along the box's axes.
     pub outline: Vec<[f64; 2]>,
-    /// Share of the light it returns.
+    /// Albedo.
     pub albedo: f64,
 }
 
@@ -91,18 +91,18 @@ pub struct PanelPlan {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ChequerPlan {
-    /// The box that carries it, from 0.
+    /// Index of the box that carries it, from 0.
     #[serde(rename = "box")]
     pub carrier: usize,
-    /// Its first corner on the upper face.
+    /// First corner on the upper face.
     pub corner: [f64; 2],
-    /// Turn on that face, degrees.
+    /// Rotation on that face (degrees).
     pub yaw_deg: f64,
     /// Side of a square.
     pub square: f64,
-    /// Squares along and across.
+    /// Number of squares along and across.
     pub cells: [u32; 2],
-    /// Share of the light that the dark squares return.
+    /// Albedo of the dark squares.
     pub albedo: f64,
 }
 
@@ -110,13 +110,13 @@ pub struct ChequerPlan {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PipePlan {
-    /// One end of its axis: x, y, height.
+    /// Start of the axis: x, y, height.
     pub from: [f64; 3],
-    /// The other end.
+    /// End of the axis: x, y, height.
     pub to: [f64; 3],
-    /// Its radius.
+    /// Radius.
     pub radius: f64,
-    /// Share of the light it returns.
+    /// Albedo.
     pub albedo: f64,
 }
 
@@ -124,28 +124,29 @@ pub struct PipePlan {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointPlan {
-    /// Its name, unique on the site.
+    /// Name of the point, unique on the site.
     pub id: String,
-    /// The panel, from 0; otherwise `box` is given.
+    /// Index of its panel, from 0, unless it lies on a box.
     #[serde(default)]
     pub panel: Option<usize>,
-    /// The box, from 0.
+    /// Index of its box, from 0, unless it lies on a panel.
     #[serde(default, rename = "box")]
     pub carrier: Option<usize>,
-    /// Which corner, from 0.
+    /// Index of the corner, from 0.
     pub corner: usize,
 }
 
 impl Blueprint {
-    /// The virtual production system that comes with Seafix.
+    /// The built-in virtual production system.
     pub fn drill_centre() -> Self {
         toml::from_str(DRILL_CENTRE).expect("the built-in geometry is read by a test")
     }
 }
 
 impl BoxPlan {
-    /// A place on the upper face, given from that face's centre along the box's axes, in the
-    /// design frame: x, y, height.
+    /// A place on the upper face in the design frame: x, y, height.
+    ///
+    /// `place` is measured from the face's centre along the box's axes.
     pub fn on_top(&self, place: [f64; 2]) -> [f64; 3] {
         let (sine, cosine) = libm::sincos(self.yaw_deg.to_radians());
         [
@@ -155,7 +156,7 @@ impl BoxPlan {
         ]
     }
 
-    /// The corners of the upper face from its centre, in order around it.
+    /// Corners of the upper face from its centre, in order.
     pub fn corners(&self) -> [[f64; 2]; 4] {
         let [x, y] = [0.5 * self.size[0], 0.5 * self.size[1]];
         [[-x, -y], [x, -y], [x, y], [-x, y]]
@@ -163,7 +164,7 @@ impl BoxPlan {
 }
 
 impl ObjectPlan {
-    /// Where a feature point is in the design frame: x, y, height.
+    /// The design-frame position of a feature point: x, y, height.
     pub fn place(&self, point: &PointPlan) -> [f64; 3] {
         match (point.panel, point.carrier) {
             (Some(panel), _) => {

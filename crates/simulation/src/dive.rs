@@ -1,4 +1,4 @@
-//! A dive over the virtual site: its settings, its plan, its frames.
+//! A dive over the virtual site: settings, plan and frames.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{
@@ -18,44 +18,46 @@ use crate::{
     virtual_scene::VirtualScene,
 };
 
-/// The first stamp: some time in 2023, so that stamps look like those of a real log.
+/// Stamp of the start of a dive (ns since 1970): November 2023, like the stamps of a real log.
 const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
-/// A view's feature points are wanted this far from the image border (px).
+/// Minimum distance of a feature point from the image border when views are chosen (px).
 const VIEW_MARGIN: f64 = 24.0;
-/// How many views are tried before the best one is taken.
+/// Number of random views from which one is chosen.
 const VIEW_TRIALS: usize = 100;
-/// The cameras stay this far above anything beneath them (m).
+/// Minimum height of the cameras above everything beneath them (m).
 const CLEARANCE: f64 = 0.4;
 
 /// The settings of a dive over the virtual site.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Dive {
-    /// Frames, each a view of the next object of the route.
+    /// Number of frames, from 1 to 1 000 000; consecutive frames view consecutive objects. The default is ten of each
+    /// of the seven objects.
     pub frames: usize,
-    /// Distance from the left camera to the mean of the object's feature points (m).
+    /// Distance from the left camera to the object's centroid (m), from 1 to 30.
     pub distance: f64,
-    /// Least and greatest angle of the optical axis to the vertical (degrees).
+    /// Minimum and maximum angle between optical axis and vertical (degrees), from 0 to 40.
     pub tilt_deg: [f64; 2],
-    /// How far the object's centre may lie off the middle of the view (tangent of the angle).
+    /// Maximum offset of the object's centroid from the view's centre (tangent of the angle), from 0 to 1.
     pub off_centre: f64,
-    /// Feature points of the object that a view should show in both images, if it can.
+    /// Number of the object's feature points that a view should show in both images. A view with fewer is taken only if
+    /// no random view shows enough.
     pub min_visible: usize,
-    /// Frames a second.
+    /// Frame rate (Hz), from 0.001 to 10 000. The default is the paper's.
     pub rate: f64,
-    /// Standard deviation of the rough pose's position, each world axis (m).
+    /// Standard deviation of the prior position on each world axis (m), from 0 to 100.
     pub prior_position: f64,
-    /// Standard deviation of the rough pose's attitude, each camera axis (degrees).
+    /// Standard deviation of the prior attitude about each camera axis (degrees), from 0 to 45.
     pub prior_attitude_deg: f64,
-    /// Standard deviation of each coordinate of the model's points (m).
+    /// Standard deviation of each coordinate of a model point (m), from 0 to 0.1.
     pub model_sigma: f64,
-    /// Standard deviation of each surveyed world coordinate of base points (m).
+    /// Standard deviation of each surveyed world coordinate of a base point (m), from 0 to 0.2.
     pub survey_sigma: f64,
-    /// The cameras.
+    /// The stereo rig.
     pub rig: VirtualRig,
     /// Lens and sensor of both cameras.
     pub sensor: Sensor,
-    /// The same dive as points.
+    /// Measurement noise of frames that hold points.
     pub points: PointNoise,
 }
 
@@ -79,16 +81,16 @@ impl Default for Dive {
     }
 }
 
-/// Two equal cameras side by side, axes parallel. The defaults are the paper's camera; the paper
-/// gives no baseline.
+/// Two equal cameras side by side with parallel axes. The defaults are the paper's virtual camera; the paper gives no
+/// baseline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct VirtualRig {
-    /// Width and height of the images (px).
+    /// Width and height of the images (px), from 16 to 8192 each.
     pub size: [u32; 2],
     /// Focal length (px).
     pub focal: f64,
-    /// Distance between the cameras (m).
+    /// Distance between the cameras (m), from 0.001 to 5.
     pub baseline: f64,
 }
 
@@ -99,10 +101,10 @@ impl Default for VirtualRig {
 }
 
 impl VirtualRig {
-    /// The rig; its principal points lie in the middle of the images.
+    /// Builds the rig; the principal points are the image centres.
     ///
     /// # Errors
-    /// [`BadDive`] when the numbers describe no rig.
+    /// [`BadDive`] for an invalid camera or rig.
     pub fn build(&self) -> Result<StereoRig, BadDive> {
         let principal = self.size.map(|n| 0.5 * (f64::from(n) - 1.0));
         let camera = Pinhole::new(self.size, [self.focal; 2], principal, &[])?;
@@ -111,76 +113,78 @@ impl VirtualRig {
     }
 }
 
-/// Why settings describe no dive.
+/// An invalid dive setting.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BadDive {
     /// A number outside its range.
     #[error("{name} = {value}; {remedy}")]
     Value {
-        /// The setting.
+        /// The setting's key.
         name: &'static str,
-        /// Its value.
+        /// The value given.
         value: f64,
-        /// What it may be.
+        /// The valid range, as a request.
         remedy: &'static str,
     },
-    /// No layout lies before both cameras.
-    #[error("no layout of {points} points at {distance} m lies in both images; bring it nearer to 1 to 10 m")]
+    /// No layout is visible in both images.
+    #[error(
+        "cannot place {points} points at {distance} m: no layout lies in both images; give a distance from 1 to 10 m"
+    )]
     Layout {
-        /// How many points.
+        /// Number of points.
         points: usize,
-        /// Their mean depth (m).
+        /// Mean depth of the points (m).
         distance: f64,
     },
-    /// No camera.
+    /// An invalid camera.
     #[error("rig: {0}")]
     Camera(#[from] BadCamera),
-    /// No rig.
+    /// An invalid rig.
     #[error("rig: {0}")]
     Rig(#[from] BadRig),
 }
 
-/// The rough pose that a method may use.
+/// The prior pose of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatedPrior {
-    /// The left camera in the world, with its error.
+    /// The left camera's pose, with the prior's error.
     pub world_from_camera: Transform<World, Camera>,
-    /// Standard deviation of the position, each world axis (m).
+    /// Standard deviation of the position on each world axis (m).
     pub position_sigma: f64,
-    /// Standard deviation of the attitude, each camera axis (rad).
+    /// Standard deviation of the attitude about each camera axis (rad).
     pub attitude_sigma: f64,
 }
 
 /// A feature point that both cameras see.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VisiblePoint {
-    /// Index of its object in the site.
+    /// Index of the object in the site.
     pub object: usize,
     /// Index of the point in its object.
     pub point: usize,
-    /// Its true pixels.
+    /// True pixels of the point.
     pub pixels: StereoPixels,
 }
 
-/// What no method may see.
+/// The truth of a frame, which no method receives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameTruth {
     /// Index of the object that the view was chosen for.
     pub object: usize,
-    /// The left camera in the world.
+    /// The left camera's pose.
     pub world_from_camera: Transform<World, Camera>,
-    /// The feature points, of any object, that lie in both images with nothing before them.
+    /// The feature points of all objects that are inside both images and not occluded.
     pub visible: Vec<VisiblePoint>,
 }
 
 impl Dive {
-    /// The dive number `dive` of the experiment with this seed.
+    /// Plans dive number `dive` of an experiment with this seed.
     ///
-    /// The site, its survey and the bed are functions of the seed alone, so that the dives of one
-    /// experiment visit one place; views, rough poses and noise also differ between dives.
+    /// The site, its survey and the seabed depend on the seed alone, so all dives of an experiment visit the same
+    /// place. Views, prior poses and noise differ between dives.
     ///
     /// # Errors
-    /// [`BadDive`] names the setting that is wrong.
+    /// [`BadDive`] with the invalid setting.
     pub fn plan(&self, seed: u64, dive: u64) -> Result<PlannedDive, BadDive> {
         self.check()?;
         let rig = self.rig.build()?;
@@ -191,7 +195,7 @@ impl Dive {
         Ok(PlannedDive { settings: self.clone(), seed, dive, rig, scene, site, world_from_object })
     }
 
-    /// Whether the settings describe a dive.
+    /// Checks that every setting lies in its range.
     ///
     /// # Errors
     /// The first setting outside its range.
@@ -201,29 +205,29 @@ impl Dive {
             if value >= low && value <= high { Ok(()) } else { fail(name, value, remedy) }
         };
         within("frames", self.frames as f64, 1.0, 1e6, "give 1 to 1000000 frames")?;
-        within("distance", self.distance, 1.0, 30.0, "views are taken from 1 m to 30 m")?;
+        within("distance", self.distance, 1.0, 30.0, "give metres, from 1 to 30")?;
         let [low, high] = self.tilt_deg;
-        within("tilt-deg[0]", low, 0.0, 40.0, "angles from the vertical go from 0 to 40 degrees")?;
-        within("tilt-deg[1]", high, low, 40.0, "the greatest angle is at least the least, and at most 40 degrees")?;
+        within("tilt-deg[0]", low, 0.0, 40.0, "give degrees, from 0 to 40")?;
+        within("tilt-deg[1]", high, low, 40.0, "give degrees, from the minimum angle to 40")?;
         within("off-centre", self.off_centre, 0.0, 1.0, "give a tangent from 0 to 1")?;
-        within("rate", self.rate, 1e-3, 1e4, "give frames a second, from 0.001 to 10000")?;
+        within("rate", self.rate, 1e-3, 1e4, "give hertz, from 0.001 to 10000")?;
         within("prior-position", self.prior_position, 0.0, 100.0, "give metres, from 0 to 100")?;
         within("prior-attitude-deg", self.prior_attitude_deg, 0.0, 45.0, "give degrees, from 0 to 45")?;
         within("model-sigma", self.model_sigma, 0.0, 0.1, "give metres, from 0 to 0.1")?;
         within("survey-sigma", self.survey_sigma, 0.0, 0.2, "give metres, from 0 to 0.2")?;
         within("rig.baseline", self.rig.baseline, 1e-3, 5.0, "give metres, from 0.001 to 5")?;
         for n in self.rig.size {
-            within("rig.size", f64::from(n), 16.0, 8192.0, "an image has 16 to 8192 pixels a side")?;
+            within("rig.size", f64::from(n), 16.0, 8192.0, "give pixels, from 16 to 8192")?;
         }
         within("sensor.blur", self.sensor.blur, 0.0, 20.0, "give pixels, from 0 to 20")?;
         within("sensor.noise", self.sensor.noise, 0.0, 255.0, "give grey levels, from 0 to 255")?;
         within("sensor.white", self.sensor.white, 0.0, 1e6, "give a grey level, zero or more")?;
         within("points.sigma-px", self.points.sigma_px, 0.0, 20.0, "give pixels, from 0 to 20")?;
-        within("points.found", self.points.found, 0.0, 1.0, "give a share, from 0 to 1")
+        within("points.found", self.points.found, 0.0, 1.0, "give a fraction, from 0 to 1")
     }
 }
 
-/// A dive whose site and bed are drawn; frames are made when asked for, in any order.
+/// A dive with its site and seabed; frames are computed on demand, in any order.
 #[derive(Debug, Clone)]
 pub struct PlannedDive {
     settings: Dive,
@@ -236,7 +240,7 @@ pub struct PlannedDive {
 }
 
 impl PlannedDive {
-    /// The site as a method knows it.
+    /// The site as a method receives it, with the errors of its survey.
     pub fn site(&self) -> &Site {
         &self.site
     }
@@ -246,27 +250,27 @@ impl PlannedDive {
         &self.rig
     }
 
-    /// The settings it was planned with.
+    /// The settings of the dive.
     pub fn settings(&self) -> &Dive {
         &self.settings
     }
 
-    /// Truth: where each object is, as the best fit of its model's points to their true places.
+    /// The true pose of each object: the least-squares fit of its model points to their true places.
     pub fn world_from_object(&self) -> &[Transform<World, Object>] {
         &self.world_from_object
     }
 
-    /// How many frames it has.
+    /// The number of frames.
     pub fn len(&self) -> usize {
         self.settings.frames
     }
 
-    /// Whether it has no frame.
+    /// Whether there is no frame.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Frame number `index`, a function of seed, dive and index alone.
+    /// Frame number `index`, a function of settings, seed, dive and index alone.
     pub fn frame(&self, index: usize) -> DiveFrame<'_> {
         let object = index % self.scene.bodies.len();
         let placed_rig = self.view(object, &mut self.stream(index, Purpose::View));
@@ -291,7 +295,7 @@ impl PlannedDive {
         Stream::new(self.seed, self.dive, frame as u64, purpose)
     }
 
-    /// A view of an object: the first of many random ones that shows enough of it, or the best.
+    /// The first random view that shows enough points of an object, or else the best one.
     fn view(&self, object: usize, stream: &mut Stream) -> PlacedRig<'_> {
         let body = &self.scene.bodies[object];
         let wanted = self.settings.min_visible.min(body.points.len());
@@ -310,7 +314,7 @@ impl PlannedDive {
             }
         }
         best.map_or_else(
-            // Only distances below a metre or so leave no room above an object: look from straight above.
+            // Distances below about 1 m leave no room above an object: take the vertical view.
             || PlacedRig { rig: &self.rig, world_from_camera: self.aim(&body.centroid(), [0.0; 2], 0.0, 0.0, 0.0) },
             |(_, placed_rig)| placed_rig,
         )
@@ -325,8 +329,8 @@ impl PlannedDive {
         self.aim(place, off, heading, about, tilt)
     }
 
-    /// The view with this heading, tilted by `tilt` about the direction `about` of the image plane,
-    /// that shows `place` at `off` (tangents) from the middle of what both cameras see.
+    /// The view with this heading, tilted by `tilt` about the direction `about` of the image plane. It shows `place` at
+    /// the offset `off` (tangents) from the centre of the common field of view.
     fn aim(
         &self,
         place: &Vector3<f64>,
@@ -335,7 +339,7 @@ impl PlannedDive {
         about: f64,
         tilt: f64,
     ) -> Transform<World, Camera> {
-        // Straight down, heading north: the image's right is east, its lower edge is aft.
+        // Straight down with heading north: the image's right is east, its lower edge is aft.
         let down = so3::exp(&(Vector3::z() * (heading + std::f64::consts::FRAC_PI_2)));
         let (sine, cosine) = libm::sincos(about);
         let rotation = down * so3::exp(&Vector3::new(tilt * cosine, tilt * sine, 0.0));
@@ -359,8 +363,8 @@ impl PlannedDive {
         all
     }
 
-    /// The rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the
-    /// position's along the world's.
+    /// The prior pose: T_true = T_prior · Exp(ξ), with the attitude error about the camera's axes and the position
+    /// error along the world's.
     fn prior_pose(&self, truth: &Transform<World, Camera>, stream: &mut Stream) -> SimulatedPrior {
         let (position_sigma, attitude_sigma) =
             (self.settings.prior_position, self.settings.prior_attitude_deg.to_radians());
@@ -371,21 +375,21 @@ impl PlannedDive {
     }
 }
 
-/// One frame of a dive: what a method may see, and apart from it the truth.
+/// One frame of a dive: the data for a method, and apart from them the truth.
 #[derive(Debug, Clone)]
 pub struct DiveFrame<'a> {
     dive: &'a PlannedDive,
-    /// Its number in the dive.
+    /// Frame number in the dive.
     pub index: usize,
-    /// When it was taken (ns since 1970).
+    /// Time of the exposure (ns since 1970).
     pub stamp_ns: u64,
-    /// The rough pose.
+    /// The prior pose.
     pub prior: SimulatedPrior,
     truth: FrameTruth,
 }
 
 impl DiveFrame<'_> {
-    /// The left and the right image: a plain function of the frame.
+    /// Renders the left and the right image, a function of the frame alone.
     pub fn render(&self) -> (Image, Image) {
         let placed_rig = self.placed_rig();
         let world_from_right = placed_rig.world_from_camera * placed_rig.rig.right_from_left().inverse();
@@ -403,13 +407,13 @@ impl DiveFrame<'_> {
         )
     }
 
-    /// The same view as measured points: visible corners, feature points among them, and clutter.
+    /// Measured points of the same view: visible corners with the feature points among them, and clutter.
     pub fn points(&self) -> Vec<MeasuredPoint> {
         let mut stream = self.dive.stream(self.index, Purpose::Points);
         self.placed_rig().measure(&self.dive.scene, &self.dive.settings.points, &mut stream)
     }
 
-    /// What no method may see.
+    /// The truth, for evaluation only.
     pub fn truth(&self) -> &FrameTruth {
         &self.truth
     }

@@ -1,4 +1,4 @@
-//! Points before two cameras and nothing else: what a Monte Carlo of solvers draws from.
+//! Layouts of points before a stereo rig, without a scene, for the Monte Carlo of solvers.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{
@@ -11,34 +11,34 @@ use crate::{
     stream::{Purpose, Stream},
 };
 
-/// How the points lie.
+/// The distribution of the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
-    /// Over the middle 70 % of the width and of the height of the common field, depths within ±10 %.
+    /// Spread: over the central 70 % of width and height of the common field of view, with depths within ±10 %.
     #[default]
     Spread,
-    /// In a box of 0.5 × 0.4 × 0.3 m, turned at random.
+    /// Compact: in a box of 0.5 × 0.4 × 0.3 m with a random rotation.
     Compact,
 }
 
-/// A layout of model points before a rig, and how they are measured.
+/// A layout of model points before a rig, with its measurement noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Layout {
-    /// How the points lie.
+    /// Distribution of the points.
     pub shape: Shape,
-    /// How many there are.
+    /// Number of points.
     pub points: usize,
-    /// Which of all such layouts.
+    /// Seed of the layout: equal numbers give equal layouts.
     pub number: u64,
     /// Mean depth (m).
     pub distance: f64,
-    /// Standard deviation of each pixel coordinate, in each image (px).
+    /// Standard deviation of each pixel coordinate in each image (px).
     pub sigma_px: f64,
-    /// Standard deviation of each coordinate of a model point (m), drawn afresh each draw.
+    /// Standard deviation of each coordinate of a model point (m), sampled anew in each draw.
     pub model_sigma: f64,
-    /// The cameras.
+    /// The stereo rig.
     pub rig: VirtualRig,
 }
 
@@ -56,29 +56,29 @@ impl Default for Layout {
     }
 }
 
-/// A layout, drawn: the model as its survey has it, and the true pose.
+/// A placed layout: the surveyed model and the true pose.
 #[derive(Debug, Clone)]
 pub struct Placed {
     settings: Layout,
     seed: u64,
-    /// The cameras.
+    /// The stereo rig.
     pub rig: StereoRig,
-    /// The model's points.
+    /// The model points.
     pub model: Vec<Point<Object>>,
     /// The true pose.
     pub object_from_camera: Transform<Object, Camera>,
 }
 
-/// Second extent of a layout over the first: below it points are nearly a line.
+/// Minimum ratio of the second extent of a layout to the first; below it the points are nearly collinear.
 const MIN_RATIO: f64 = 0.15;
-/// Layouts that are drawn before none is said to fit.
+/// Maximum number of layouts that are tried.
 const MAX_TRIES: usize = 10_000;
 
 impl Layout {
-    /// The layout of this `seed`.
+    /// Places the points with this `seed`.
     ///
     /// # Errors
-    /// [`BadDive`] when the numbers describe no rig, or when no layout lies before both cameras.
+    /// [`BadDive`] for an invalid rig, or if no layout is visible in both images.
     pub fn place(&self, seed: u64) -> Result<Placed, BadDive> {
         let rig = self.rig.build()?;
         let mut stream = Stream::new(seed, self.number, 0, Purpose::View);
@@ -102,7 +102,7 @@ impl Layout {
         let [width, height] = rig.left().size().map(|n| f64::from(n - 1));
         let one = |_| {
             let depth = self.distance * stream.between(0.9, 1.1);
-            // What both cameras see at this depth begins where the right image begins.
+            // The common field of view at this depth begins at the left border of the right image.
             let hidden = self.rig.focal * self.rig.baseline / depth;
             let across = hidden + (width - hidden) * (0.5 + FRACTION * (stream.unit() - 0.5));
             let pixel = Pixel { u: across, v: height * (0.5 + FRACTION * (stream.unit() - 0.5)) };
@@ -126,24 +126,26 @@ impl Layout {
 }
 
 impl Placed {
-    /// One draw: the points in the order of the model, as triangulated from disturbed pixels; `None` where noise
-    /// leaves a point untriangulable.
+    /// Generates one draw: the points in the order of the model, triangulated from noisy pixels. `None` if noise
+    /// prevents the triangulation of a point.
     pub fn draw(&self, draw: u64) -> Option<Vec<MeasuredPoint>> {
         let mut stream = Stream::new(self.seed, self.settings.number, draw, Purpose::Points);
         let (sigma, by_model) = (self.settings.sigma_px, self.settings.model_sigma);
         let measure = |model: &Point<Object>| {
             let truly = *model + stream.normal3(by_model);
-            // A covariance of zero would claim what no camera can know.
+            // A covariance of zero would claim an exact measurement.
             self.measure(&truly, sigma.max(1e-3), || sigma * stream.normal())
         };
         self.model.iter().map(measure).collect()
     }
 
-    /// A wrong match of a point of the model: another one, uniform in what both cameras see of the shell of this half-size (m)
-    /// about it (camera axes), with the noise of all others. It is drawn until it can be triangulated.
+    /// A wrong match of a model point, with the noise of all others.
+    ///
+    /// It is uniform over the visible part of the gate of this half-size (m) about the point, along the camera's axes.
+    /// Points are sampled until one can be triangulated.
     ///
     /// # Panics
-    /// Never: the true place is in view, and with it some of any shell.
+    /// Never: the true point is in view, and with it a part of any gate.
     pub fn elsewhere(&self, model: &Point<Object>, gate: f64, stream: &mut Stream) -> MeasuredPoint {
         let (place, sigma) = (self.object_from_camera.inverse() * *model, self.settings.sigma_px);
         let mut draw = || {
@@ -151,10 +153,10 @@ impl Placed {
             self.rig.sees(&other, 0.0)?;
             self.measure(&(self.object_from_camera * other), sigma.max(1e-3), || sigma * stream.normal())
         };
-        (0..MAX_TRIES).find_map(|_| draw()).expect("some of the shell is in view")
+        (0..MAX_TRIES).find_map(|_| draw()).expect("a part of the gate is in view")
     }
 
-    /// The points without any noise, with the covariance of pixels that err by `sigma_px`.
+    /// The points without noise, with the covariance of pixel errors of standard deviation `sigma_px`.
     ///
     /// # Panics
     /// Never: every point of the layout lies before both cameras.
@@ -174,13 +176,13 @@ impl Placed {
     }
 }
 
-/// A rotation, uniform over all (Shoemake, *Uniform random rotations*, 1992): that of a normal quaternion.
+/// A uniform random rotation from a normal quaternion (Shoemake, *Uniform random rotations*, 1992).
 fn rotation(stream: &mut Stream) -> nalgebra::UnitQuaternion<f64> {
     let imaginary = stream.normal3(1.0);
     nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::from_parts(stream.normal(), imaginary))
 }
 
-/// Whether the second extent of the points is more than 0.15 of the first.
+/// Whether the second extent of the points exceeds 0.15 of the first.
 fn is_wide(places: &[Vector3<f64>]) -> bool {
     let centre = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
     let scatter: Matrix3<f64> = places.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();

@@ -1,4 +1,4 @@
-//! Closed-form noise: the same value at the same place, whoever asks.
+//! Closed-form noise: a pure function of place and seed.
 
 /// Sixteen unit vectors.
 pub(crate) const DIRECTIONS: [[f32; 2]; 16] = {
@@ -25,7 +25,7 @@ pub(crate) const DIRECTIONS: [[f32; 2]; 16] = {
     ]
 };
 
-/// 32 well-mixed bits of a cell of the plane.
+/// A hash of 32 bits for a cell of the plane.
 #[inline(always)]
 pub(crate) fn hash(x: i32, y: i32, seed: u32) -> u32 {
     let mut h = seed ^ (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77).rotate_left(15);
@@ -55,15 +55,14 @@ pub(crate) fn gradient(x: f64, y: f64, seed: u32) -> f32 {
     1.5 * (above + sy * (below - above))
 }
 
-/// The whole number below `x`, and the rest: a cast is quicker than the platform's `floor`.
+/// The integer part (floor) and the fraction of `x`; a cast is faster than the platform's `floor`.
 pub(crate) fn split(x: f64) -> (i32, f32) {
     let cut = x as i32;
     let below = cut - i32::from(f64::from(cut) > x);
     (below, (x - f64::from(below)) as f32)
 }
 
-/// How much of a pattern of this wavelength a pixel of this footprint shows: all of it from four
-/// pixels on, none below two.
+/// Visible fraction of a pattern of this wavelength at a pixel of this footprint: 1 from four pixels on, 0 below two.
 #[inline(always)]
 pub(crate) fn shown(wavelength: f64, footprint: f64) -> f32 {
     let t = ((wavelength / footprint - 2.0) * 0.5).clamp(0.0, 1.0) as f32;

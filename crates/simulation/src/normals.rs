@@ -1,15 +1,15 @@
-//! Many normal numbers at once: those of [`Stream::normal`](crate::Stream::normal), bit by bit, by loops that vectorise.
+//! Vectorised normal numbers with the bits of [`Stream::normal`](crate::Stream::normal).
 //!
-//! The elementary functions are `libm`'s `log` and `sincos`, step by step, for the arguments that occur; the few for which `libm`
-//! goes another way are left to `libm` itself.
+//! The elementary functions repeat the steps of `libm`'s `log` and `sincos` for the arguments that occur. The few
+//! arguments for which `libm` branches are passed to `libm` itself.
 
-/// Pairs of numbers that are worked on at once.
+/// Number of pairs computed in one pass.
 pub(crate) const PAIRS: usize = 32;
 
-/// A number for each pair.
+/// One number for each pair.
 type Lane<T> = [T; PAIRS];
 
-/// Two independent normal numbers of each two uniform ones in [0, 1). (Box and Muller, 1958.)
+/// Two independent normal numbers from two uniform numbers in [0, 1) (Box and Muller, 1958).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(crate) fn normals(first: &Lane<f64>, second: &Lane<f64>) -> [Lane<f64>; 2] {
     let (mut radius, mut angle) = ([0.0; PAIRS], [0.0; PAIRS]);
@@ -26,7 +26,7 @@ pub(crate) fn normals(first: &Lane<f64>, second: &Lane<f64>) -> [Lane<f64>; 2] {
     [cosine, sine]
 }
 
-/// The natural logarithm of positive, normal numbers. (FreeBSD's `e_log.c`.)
+/// The natural logarithm of positive, normal numbers (FreeBSD's `e_log.c`).
 #[inline(always)]
 fn log(x: &Lane<f64>, out: &mut Lane<f64>) {
     const LN2_HI: f64 = 6.931_471_803_691_238e-1;
@@ -62,7 +62,7 @@ fn log(x: &Lane<f64>, out: &mut Lane<f64>) {
     }
 }
 
-/// Sine and cosine of angles from 0 to 2π. (FreeBSD's `s_sin.c`, `e_rem_pio2.c`, `k_sin.c` and `k_cos.c`.)
+/// Sine and cosine of angles from 0 to 2π (FreeBSD's `s_sin.c`, `e_rem_pio2.c`, `k_sin.c` and `k_cos.c`).
 #[inline(always)]
 fn sincos(x: &Lane<f64>, sine: &mut Lane<f64>, cosine: &mut Lane<f64>) {
     const PIO2_1: f64 = 1.570_796_326_734_125_6;
@@ -83,7 +83,7 @@ fn sincos(x: &Lane<f64>, sine: &mut Lane<f64>, cosine: &mut Lane<f64>) {
         2.087_572_321_298_175e-9,
         -1.135_964_755_778_819_5e-11,
     ];
-    // How many quarter turns are taken off.
+    // Number of quarter turns to subtract.
     let (mut quarters, mut rare) = ([0_i32; PAIRS], false);
     for i in 0..PAIRS {
         let high = (x[i].to_bits() >> 32) as u32;
@@ -108,7 +108,7 @@ fn sincos(x: &Lane<f64>, sine: &mut Lane<f64>, cosine: &mut Lane<f64>) {
         let c = w + (((1.0 - w) - half) + (z * r - y0 * y1));
         let odd = quarters[i] & 1 == 1;
         let (across, along) = if odd { (c, s) } else { (s, c) };
-        // Of 0 to 4 quarters: the sine is turned round in the third and fourth, the cosine in the second and third.
+        // The sine changes its sign in the third and fourth quarter, the cosine in the second and third.
         sine[i] = if quarters[i] & 2 == 2 { -across } else { across };
         cosine[i] = if (quarters[i] + 1) & 2 == 2 { -along } else { along };
     }
@@ -121,7 +121,7 @@ fn sincos(x: &Lane<f64>, sine: &mut Lane<f64>, cosine: &mut Lane<f64>) {
     }
 }
 
-/// Whether an angle, by its upper bits, is so near to a multiple of a quarter turn that `libm` reduces it with more digits.
+/// Whether an angle, given by its upper bits, is so near to a multiple of π/2 that `libm` reduces it with more digits.
 #[inline(always)]
 fn near_quarter(high: u32) -> bool {
     (high & 0xF_FFFF == 0x9_21FB) | (high == 0x4012_D97C)
@@ -131,7 +131,8 @@ fn near_quarter(high: u32) -> bool {
 mod tests {
     use super::*;
 
-    /// Seen to fail with the cosine of the third quarter not turned round, and with the limit of the first quarter a bit higher.
+    /// Regression: a wrong sign of the cosine in the third quarter, and a higher limit of the first quarter, fail this
+    /// test.
     #[test]
     fn the_functions_are_those_of_libm_bit_by_bit() {
         let near = |x: f64| (-40..40_i64).map(move |k| f64::from_bits((x.to_bits() as i64 + k) as u64));

@@ -1,4 +1,4 @@
-//! What colour a place of a surface has: closed-form textures and a fixed light.
+//! Colours of surfaces: closed-form textures under a fixed light.
 
 use nalgebra::Vector3;
 
@@ -7,9 +7,9 @@ use crate::{
     virtual_scene::Finish,
 };
 
-/// Share of the light that comes from everywhere.
+/// Ambient part of the light.
 const AMBIENT: f32 = 0.38;
-/// Share of the light that comes from the lamp.
+/// Directional part of the light, from the lamp.
 const LAMP: f32 = 0.72;
 
 /// The unit vector towards the light (world): high, from the north-east.
@@ -17,13 +17,13 @@ fn towards_light() -> Vector3<f64> {
     Vector3::new(0.45, 0.38, -0.81).normalize()
 }
 
-/// How brightly a surface with this normal is lit. (Lambert.)
+/// The irradiance of a surface with this normal, by Lambert's law.
 pub(crate) fn light(normal: &Vector3<f64>) -> f32 {
     let cosine = normal.dot(&towards_light()) / normal.norm();
     AMBIENT + LAMP * cosine.max(0.0) as f32
 }
 
-/// Sine and cosine of each octave's turn: their grids do not align.
+/// Sine and cosine of each octave's rotation, which keeps their grids from aligning.
 pub(crate) const OCTAVE_TURNS: [(f64, f64); 4] = [(0.0, 1.0), (0.6, 0.8), (0.8, -0.6), (-0.28, 0.96)];
 
 /// The seed of octave `k`.
@@ -31,12 +31,12 @@ pub(crate) fn octave_seed(seed: u32, k: usize) -> u32 {
     seed.wrapping_add(k as u32 * 0x51ED)
 }
 
-/// The octaves of the bed: feature size (m) and amplitude.
+/// Octaves of the seabed: feature size (m) and amplitude.
 pub(crate) const SAND: [(f64, f32); 4] = [(0.34, 0.12), (0.13, 0.13), (0.05, 0.13), (0.019, 0.12)];
-/// The two grids of stones of the bed: what their seeds differ by, and the side of a cell (m). The second is turned.
+/// The two grids of stones on the seabed: offset of the seed, and side of a cell (m). The second grid is rotated.
 pub(crate) const STONES: [(u32, f64); 2] = [(0xA5A5, 0.21), (0x5A5A, 0.085)];
 
-/// The sum of noise octaves: pairs of feature size (m) and amplitude.
+/// The sum of noise octaves, given as pairs of feature size (m) and amplitude.
 fn octaves(x: f64, y: f64, footprint: f64, seed: u32, layers: &[(f64, f32)]) -> f32 {
     let mut sum = 0.0;
     for (k, &(size, amplitude)) in layers.iter().enumerate() {
@@ -50,7 +50,7 @@ fn octaves(x: f64, y: f64, footprint: f64, seed: u32, layers: &[(f64, f32)]) -> 
     sum
 }
 
-/// Pebbles: in each cell of a grid at most one, lit from one side.
+/// Pebbles: at most one in each cell of a grid, lit from one side.
 fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
     let weight = shown(cell * 0.5, footprint);
     if weight == 0.0 {
@@ -74,13 +74,12 @@ fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
     weight * inside * tone
 }
 
-/// By what the bed's albedo is multiplied around a place (north, east): patches of metres.
+/// A factor of the seabed's albedo around a place (north, east), with patches of metres.
 pub(crate) fn patches(north: f64, east: f64, seed: u32) -> f32 {
     1.0 + octaves(north, east, 0.1, seed ^ 0x3C3C, &[(2.3, 0.14), (0.9, 0.14)])
 }
 
-/// Share of the light that the bed returns at a place (north, east), seen by pixels of this
-/// footprint (m).
+/// The seabed's albedo at a place (north, east) for pixels with this footprint (m).
 pub(crate) fn seabed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
     let sand = octaves(north, east, footprint, seed, &SAND);
     let (tu, tv) = (0.8 * north - 0.6 * east, 0.6 * north + 0.8 * east);
@@ -90,10 +89,10 @@ pub(crate) fn seabed(north: f64, east: f64, footprint: f64, seed: u32) -> f32 {
     0.33 * (1.0 + sand + 0.8 * stones).max(0.1)
 }
 
-/// Octaves of noise, with what their seed differs by from that of the surface.
+/// Octaves of noise, with the offset of their seed from the surface's.
 pub(crate) type Coat = (u32, &'static [(f64, f32)]);
 
-/// What a finish is the sum of, besides 1.
+/// The coats of a finish; their sum plus 1 is the factor of the albedo.
 pub(crate) fn coats(finish: Finish) -> &'static [Coat] {
     match finish {
         // Stains and growth: large blotches, and small ones where they are thick.
@@ -103,7 +102,7 @@ pub(crate) fn coats(finish: Finish) -> &'static [Coat] {
     }
 }
 
-/// By what a surface's albedo is multiplied at (x, y) of its plane (m).
+/// The factor of a surface's albedo at (x, y) of its plane (m).
 pub(crate) fn finish(finish: Finish, x: f64, y: f64, footprint: f64, seed: u32) -> f32 {
     coats(finish).iter().fold(1.0, |sum, (salt, layers)| sum + octaves(x, y, footprint, seed ^ salt, layers))
 }

@@ -1,4 +1,4 @@
-//! One view as noisy points: what a detector would have measured, without the image.
+//! One view as noisy points: a detector's measurements without the image.
 
 use seafix_geometry::{
     Camera, MeasuredPoint, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint, World,
@@ -10,16 +10,16 @@ use crate::{
     virtual_scene::{Corner, VirtualScene},
 };
 
-/// How points are measured. The default noise is what the paper's figures imply, not what the
-/// rendered images allow: σ_d = √2·σ_px = 0.28 px.
+/// Measurement noise of points. The default follows the paper's figures, σ_d = √2·σ_px = 0.28 px; rendered images are
+/// less noisy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointNoise {
-    /// Standard deviation of each pixel coordinate, in each image (px).
+    /// Standard deviation of each pixel coordinate in each image (px), from 0 to 20.
     pub sigma_px: f64,
-    /// Share of the visible corners that are measured.
+    /// Fraction of the visible corners that are measured, from 0 to 1.
     pub found: f64,
-    /// Other measured points a view, anywhere on bed and objects.
+    /// Number of clutter points in a view, anywhere on seabed and objects.
     pub clutter: usize,
 }
 
@@ -29,7 +29,7 @@ impl Default for PointNoise {
     }
 }
 
-/// The rig in the world.
+/// The rig with its pose in the world.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlacedRig<'a> {
     pub(crate) rig: &'a StereoRig,
@@ -37,21 +37,20 @@ pub(crate) struct PlacedRig<'a> {
 }
 
 impl PlacedRig<'_> {
-    /// Where the left and the right camera are.
+    /// The positions of the left and the right camera.
     pub(crate) fn places(&self) -> [nalgebra::Vector3<f64>; 2] {
         let right = self.world_from_camera * self.rig.right_from_left().inverse();
         [self.world_from_camera.translation(), right.translation()]
     }
 
-    /// The pixels of a corner that both cameras see, at least `margin` (px) from the border.
+    /// The pixels of a corner that both cameras see at least `margin` (px) from the border.
     pub(crate) fn see(&self, scene: &VirtualScene, corner: &Corner, margin: f64) -> Option<StereoPixels> {
         let at = self.world_from_camera.inverse() * Point::from(corner.at);
         let pixels = self.rig.sees(&at, margin)?;
         self.places().iter().all(|from| scene.sees(from, corner)).then_some(pixels)
     }
 
-    /// The pixels of a place that lies where the left camera looks along `pixel`, if the right one
-    /// sees it too.
+    /// The stereo pixels of the surface point at `pixel` of the left image, if both cameras see it.
     fn project_visible(&self, scene: &VirtualScene, pixel: &Pixel) -> Option<StereoPixels> {
         let [left, right] = self.places();
         let direction = self.rig.left().normalize(pixel)?.push(1.0);
@@ -60,7 +59,7 @@ impl PlacedRig<'_> {
         scene.clear(&right, &place.coords).then_some(pixels)
     }
 
-    /// The view as points, in an order that tells nothing.
+    /// The measured points of the view, in random order.
     pub(crate) fn measure(&self, scene: &VirtualScene, noise: &PointNoise, stream: &mut Stream) -> Vec<MeasuredPoint> {
         let mut pixels = Vec::new();
         for corner in scene.bodies.iter().flat_map(|b| b.points.iter().chain(&b.distractors)) {
@@ -86,7 +85,7 @@ impl PlacedRig<'_> {
                     v: p.v + noise.sigma_px * stream.normal(),
                 };
                 let seen = StereoPixels { left: disturbed(&exact.left), right: disturbed(&exact.right) };
-                // A covariance of zero would claim what no camera can know.
+                // A covariance of zero would claim an exact measurement.
                 let pixels = UncertainPixels::independent(seen, noise.sigma_px.max(1e-3));
                 let found = self.rig.triangulate(&pixels).ok()?;
                 let position = UncertainPoint { at: found.point, covariance: found.covariance };

@@ -1,23 +1,21 @@
-//! Which flat facet each pixel sees, and at what depth: exact at the centre of every pixel, and at
-//! many places of the pixels that edges cross.
+//! Visible flat facets and their depths, exact at pixel centres and supersampled along edges.
 //!
-//! Every facet is a plane: 1/Z is linear in the image, and a place of the image sees exactly the
-//! depth at which its ray meets the plane. Pixels that no edge crosses need one sample; the others
-//! get [`SAMPLES`], spread so evenly over the pixel that a straight edge in any direction is
-//! measured to about 1/100 of the pixel's area.
+//! Every facet is a plane, so 1/Z is linear in the image, and the depth at an image point is exactly that of its ray's
+//! intersection with the plane. Pixels that no edge crosses need one sample. The others get [`SAMPLES`], distributed so
+//! evenly that a straight edge in any direction is measured to about 1/100 of the pixel's area.
 
 use nalgebra::Vector3;
 use seafix_geometry::Pinhole;
 
 use crate::render::changes;
 
-/// Samples of a pixel that an edge crosses: a Fibonacci lattice.
+/// Number of samples of a pixel that an edge crosses: a Fibonacci lattice.
 pub(crate) const SAMPLES: usize = 34;
 /// The generator of the lattice.
 const LATTICE: usize = 21;
-/// Nothing nearer than this is drawn (m).
+/// Distance of the near plane (m).
 const NEAR: f64 = 0.05;
-/// A facet of a higher layer wins although it is this much (relative) deeper: paint lies *in* its plate.
+/// Relative depth by which a facet of a higher layer may be deeper and still win: paint lies *in* its plate.
 const LAYER_STEP: f64 = 1e-4;
 /// No facet.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -26,44 +24,44 @@ pub(crate) const NONE: u32 = u32::MAX;
 #[derive(Debug, Clone)]
 pub(crate) struct Facet {
     pub(crate) corners: Vec<Vector3<f64>>,
-    /// What it belongs to.
+    /// Id of the surface to which it belongs.
     pub(crate) id: u32,
-    /// Higher layers lie upon lower ones in the same plane.
+    /// Layer; a higher layer lies upon a lower one in the same plane.
     pub(crate) layer: u8,
     /// Whether its edges are inner edges of a larger surface with the same `id`.
     pub(crate) seamless: bool,
 }
 
-/// What a part of a pixel sees.
+/// A part of a pixel that sees one facet.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Part {
-    /// The facet's `id`, [`NONE`] where there is nothing.
+    /// The facet's `id`, or [`NONE`].
     pub(crate) id: u32,
-    /// Share of the pixel.
+    /// Fraction of the pixel.
     pub(crate) fraction: f32,
-    /// Mean place of the part, from the pixel's centre.
+    /// Mean position of the part from the pixel's centre.
     pub(crate) offset: [f64; 2],
-    /// 1/Z at that place.
+    /// 1/Z at that position.
     pub(crate) inverse_depth: f64,
 }
 
-/// What a camera sees.
+/// The visible facets of one camera.
 #[derive(Debug)]
 pub(crate) struct Visibility {
     width: usize,
     ids: Vec<u32>,
     inverse_depths: Vec<f64>,
-    /// Place among the crossed pixels, or [`NONE`].
+    /// Index among the crossed pixels, or [`NONE`].
     slots: Vec<u32>,
     sample_ids: Vec<[u32; SAMPLES]>,
     sample_depths: Vec<[f64; SAMPLES]>,
-    /// Places of the samples from the centre of their pixel: all u, all v.
+    /// Positions of the samples from the centre of their pixel: all u, all v.
     places: [[f64; SAMPLES]; 2],
 }
 
 /// The pixels that edges cross, row by row.
 struct Crossed {
-    /// Where the columns of each row begin among all; the last is their end.
+    /// Index of the first column of each row; the last entry is the end.
     starts: Vec<usize>,
     columns: Vec<u32>,
 }
@@ -126,8 +124,8 @@ impl Outline {
         })
     }
 
-    /// The columns of row `v` at which every line exceeds −`slack` times half a pixel: as a
-    /// half-open range within 0..width.
+    /// The columns of row `v` at which every line exceeds −`slack` times half a pixel, as a half-open range within
+    /// 0..width.
     fn span(&self, v: f64, slack: f64, width: usize) -> (usize, usize) {
         let (mut low, mut high) = (0.0, width as f64 - 1.0);
         for ([a, b, c], half) in &self.edges {
@@ -144,7 +142,7 @@ impl Outline {
         if low > high { (0, 0) } else { (low as usize, high as usize + 1) }
     }
 
-    /// The rows of the image that the facet touches, pixels being squares.
+    /// The rows of the image that the facet touches; pixels are squares.
     fn touched_rows(&self, height: usize) -> std::ops::Range<usize> {
         let first = (self.rows[0] - 0.5).ceil().max(0.0) as usize;
         let end = ((self.rows[1] + 0.5).floor() + 1.0).clamp(0.0, height as f64) as usize;
@@ -156,7 +154,7 @@ fn cross(p: &[f64; 2], q: &[f64; 2]) -> f64 {
     p[0] * q[1] - q[0] * p[1]
 }
 
-/// The part of a polygon in front of the near plane. (Sutherland and Hodgman, 1974.)
+/// The part of a polygon in front of the near plane (Sutherland and Hodgman, 1974).
 fn clipped(corners: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     if corners.iter().all(|p| p.z >= NEAR) {
         return corners.to_vec();
@@ -175,7 +173,7 @@ fn clipped(corners: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 impl Visibility {
-    /// What `camera` sees of the facets. The camera has no distortion: edges stay straight.
+    /// Rasterises the facets. The camera has no distortion, so edges stay straight.
     pub(crate) fn new(facets: &[Facet], camera: &Pinhole) -> Self {
         let [width, height] = camera.size().map(|n| n as usize);
         let outlines: Vec<Outline> = facets.iter().filter_map(|facet| Outline::new(facet, camera)).collect();
@@ -206,7 +204,7 @@ impl Visibility {
         seen
     }
 
-    /// Draws a facet at the centres of the pixels and marks those that its edges cross.
+    /// Draws a facet at the pixel centres and marks the pixels that its edges cross.
     fn draw_centres(&mut self, outline: &Outline, layered: &mut [f64], crossed: &mut [bool], height: usize) {
         for row in outline.touched_rows(height) {
             let (v, start) = (row as f64, row * self.width);
@@ -230,8 +228,7 @@ impl Visibility {
         }
     }
 
-    /// Marks the pixels beside a change of surface: where two facets pass through each other, no
-    /// edge says so.
+    /// Marks the pixels beside a change of surface, because facets that intersect have no edge there.
     fn cross_borders(&self, crossed: &mut [bool]) {
         let rows: Vec<&[u32]> = self.ids.chunks_exact(self.width).collect();
         for (row, ids) in rows.iter().enumerate() {
@@ -283,13 +280,13 @@ impl Visibility {
         }
     }
 
-    /// What is seen at the centre of a pixel: the `id` and 1/Z.
+    /// The `id` and 1/Z of the facet at a pixel's centre.
     pub(crate) fn centre(&self, column: usize, row: usize) -> (u32, f64) {
         let place = row * self.width + column;
         (self.ids[place], self.inverse_depths[place])
     }
 
-    /// What a pixel sees that no edge crosses, the `id` and 1/Z; `None` of one that has parts.
+    /// The `id` and 1/Z of a pixel that no edge crosses; `None` for a pixel with parts.
     pub(crate) fn full(&self, column: usize, row: usize) -> Option<(u32, f64)> {
         (self.slots[row * self.width + column] == NONE).then(|| self.centre(column, row))
     }
@@ -324,8 +321,8 @@ impl Visibility {
     }
 }
 
-/// Gives pixels from (u, v) on to an outline where it is nearer (1/Z) than what they see; `layered` are the depths by which that
-/// is decided.
+/// Assigns pixels from (u, v) on to an outline where it is nearer (1/Z) than the present facet. `layered` holds the
+/// depths that decide.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn centres(outline: &Outline, [u, v]: [f64; 2], layered: &mut [f64], depths: &mut [f64], ids: &mut [u32]) {
     let n = layered.len();
@@ -340,7 +337,7 @@ fn centres(outline: &Outline, [u, v]: [f64; 2], layered: &mut [f64], depths: &mu
     }
 }
 
-/// The same of the samples of one pixel, as far as they lie within these edges.
+/// Assigns the samples of one pixel that lie inside these edges, by the same comparison.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn samples(
     outline: &Outline,
@@ -449,7 +446,7 @@ mod tests {
 
     #[test]
     fn facets_that_pass_through_each_other_fraction_the_pixels_between() {
-        // Two planes that cross at u = 20.3.
+        // Two planes that intersect at u = 20.3.
         let x = |u: f64| (u - 31.5) / 50.0;
         let flat = facet(&[[-3.0, -3.0, 2.0], [3.0, -3.0, 2.0], [3.0, 3.0, 2.0], [-3.0, 3.0, 2.0]], 1, 0);
         let at = 2.0 * x(20.3);

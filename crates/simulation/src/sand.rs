@@ -1,5 +1,5 @@
-//! Albedos at many places at once: the values of [`paint::seabed`](crate::paint::seabed) and [`paint::finish`](crate::paint::finish),
-//! bit by bit, by loops that vectorise.
+//! Vectorised albedos with the bits of [`paint::seabed`](crate::paint::seabed) and
+//! [`paint::finish`](crate::paint::finish).
 
 use crate::{
     noise::{DIRECTIONS, hash, shown},
@@ -7,13 +7,13 @@ use crate::{
     virtual_scene::Finish,
 };
 
-/// Places that are worked on at once.
+/// Number of places computed in one pass.
 const CHUNK: usize = 32;
 
-/// A number for each place.
+/// One number for each place.
 type Lane<T> = [T; CHUNK];
 
-/// [`paint::seabed`](crate::paint::seabed) at each place (north, east), seen by pixels of these footprints (m).
+/// [`paint::seabed`](crate::paint::seabed) at each place (north, east) for pixels with these footprints (m).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(crate) fn seabeds(north: &[f64], east: &[f64], footprint: &[f64], seed: u32, out: &mut Vec<f32>) {
     out.clear();
@@ -42,7 +42,7 @@ pub(crate) fn seabeds(north: &[f64], east: &[f64], footprint: &[f64], seed: u32,
     }
 }
 
-/// [`paint::finish`](crate::paint::finish) at each place (x, y) of a surface, seen by pixels of these footprints (m).
+/// [`paint::finish`](crate::paint::finish) at each place (x, y) of a surface for pixels with these footprints (m).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(crate) fn finishes(finish: Finish, x: &[f64], y: &[f64], footprint: &[f64], seed: u32, out: &mut Vec<f32>) {
     out.clear();
@@ -61,7 +61,7 @@ pub(crate) fn finishes(finish: Finish, x: &[f64], y: &[f64], footprint: &[f64], 
     }
 }
 
-/// Adds those octaves of gradient noise that some place shows.
+/// Adds the octaves of gradient noise that are visible at some place.
 #[inline(always)]
 fn octaves(layers: &[(f64, f32)], x: &Lane<f64>, y: &Lane<f64>, width: &Lane<f64>, seed: u32, sum: &mut Lane<f32>) {
     for (k, &(size, amplitude)) in layers.iter().enumerate() {
@@ -90,7 +90,7 @@ fn octave(k: usize, size: f64, x: &Lane<f64>, y: &Lane<f64>, seed: u32, weight: 
         directions[2][i] = direction(column(0) ^ row(1));
         directions[3][i] = direction(column(1) ^ row(1));
     }
-    // The look-ups by themselves, so that what is around them works on whole vectors.
+    // A separate look-up loop leaves whole vectors to the loops around it.
     let gradients = directions.map(|lane| lane.map(|k| PACKED[(k & 15) as usize]));
     for i in 0..CHUNK {
         let corner = |corner: usize, dx: f32, dy: f32| {
@@ -106,7 +106,7 @@ fn octave(k: usize, size: f64, x: &Lane<f64>, y: &Lane<f64>, seed: u32, weight: 
     }
 }
 
-/// Both numbers of each direction in one.
+/// Both numbers of each direction, packed.
 const PACKED: [u64; 16] = {
     let mut all = [0; 16];
     let mut k = 0;
@@ -137,11 +137,11 @@ fn pebbles(x: f64, y: f64, footprint: f64, seed: u32, cell: f64) -> f32 {
     if h & 7 > 3 { 0.0 } else { weight * inside * tone }
 }
 
-/// The whole number below `x`, and the rest: as [`noise::split`](crate::noise::split), for |x| < 2³¹, without a cast, which
-/// no loop would vectorise.
+/// Integer part and fraction of `x` as in [`noise::split`](crate::noise::split), for |x| < 2³¹. A cast would keep loops
+/// from being vectorised.
 #[inline(always)]
 fn split(x: f64) -> (i32, f32) {
-    // 1.5·2⁵²: adding it rounds to a whole number, which stands in the lowest bits then.
+    // 1.5·2⁵²: adding it rounds to an integer, which then stands in the lowest bits.
     const MAGIC: f64 = 6_755_399_441_055_744.0;
     let near = (x + MAGIC) - MAGIC;
     let below = if near > x { near - 1.0 } else { near };
@@ -153,10 +153,10 @@ mod tests {
     use super::*;
     use crate::paint;
 
-    /// Seen to fail when the stones of the second grid are not turned.
+    /// Regression: stones of the second grid without rotation fail this test.
     #[test]
     fn many_places_have_the_values_of_each() {
-        // Pixels from millimetres, which show everything, to decimetres, which show nothing.
+        // Footprints from millimetres, with every octave visible, to decimetres, with none.
         for (footprint, count) in [(0.002, 5000), (0.006, 5000), (0.02, 5000), (0.09, 501), (2.0, 33)] {
             let of = |step: f64| (0..count).map(|k| f64::from(k) * step - 7.0).collect::<Vec<_>>();
             let (north, east) = (of(0.0137), of(-0.0051));

@@ -1,4 +1,4 @@
-//! The relief of the sea bed: gentle waves, on a grid of triangles.
+//! The relief of the seabed: gentle waves on a triangle grid.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,7 @@ use crate::{
     stream::{Purpose, Stream},
 };
 
-/// Side of a cell of the grid (m); each is split along its rising diagonal into two triangles.
+/// Side of a grid cell (m); its rising diagonal divides it into two triangles.
 const CELL: f64 = 0.25;
 
 /// One wave of the relief: amplitude (m), wave vector (rad/m), phase.
@@ -19,7 +19,7 @@ struct Wave {
     phase: f64,
 }
 
-/// The sea bed. The surface *is* the triangles: rays and pixels see the same one.
+/// The seabed. Its surface consists of the triangles, so rays and pixels see the same surface.
 #[derive(Debug, Clone)]
 pub(crate) struct Seabed {
     depth: f64,
@@ -27,7 +27,7 @@ pub(crate) struct Seabed {
     mounds: Vec<Mound>,
 }
 
-/// Silt that has settled around a place: `height` (m) up to `radius` (m), falling to nothing at twice that.
+/// Silt around a place: `height` (m) up to `radius` (m), falling to 0 at twice the radius.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Mound {
     pub(crate) centre: [f64; 2],
@@ -36,7 +36,7 @@ pub(crate) struct Mound {
 }
 
 impl Mound {
-    /// Its height at a place, and its slopes. (Smoothstep between the two radii.)
+    /// Height and slopes at a place, by a smoothstep between the two radii.
     fn rise(&self, north: f64, east: f64) -> (f64, [f64; 2]) {
         let (x, y) = (north - self.centre[0], east - self.centre[1]);
         let away = (x * x + y * y).sqrt();
@@ -46,7 +46,7 @@ impl Mound {
     }
 }
 
-/// A rectangle of the bed's grid, for one image.
+/// A rectangle of the seabed's grid, for one image.
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
     first: [i64; 2],
@@ -56,12 +56,12 @@ pub(crate) struct Patch {
 }
 
 impl Seabed {
-    /// The bed at this mean depth (m).
+    /// The seabed at this mean depth (m).
     pub(crate) fn new(depth: f64, seed: u64) -> Self {
         Self::with_relief(depth, 1.0, seed)
     }
 
-    /// The bed with waves `relief` times as high: 0 is flat.
+    /// The seabed with waves scaled by `relief`: 0 is flat.
     pub(crate) fn with_relief(depth: f64, relief: f64, seed: u64) -> Self {
         let mut stream = Stream::new(seed, 0, 0, Purpose::Relief);
         let waves = [9.0, 6.1, 4.3, 3.1].map(|length| {
@@ -77,7 +77,7 @@ impl Seabed {
         Self { depth, waves: waves.to_vec(), mounds: Vec::new() }
     }
 
-    /// The same bed with silt upon it.
+    /// The seabed with silt upon it.
     pub(crate) fn silted(mut self, mounds: Vec<Mound>) -> Self {
         self.mounds = mounds;
         self
@@ -88,12 +88,12 @@ impl Seabed {
         self.depth
     }
 
-    /// How far the bed rises above its mean depth at most (m).
+    /// Maximum height above the mean seabed (m).
     pub(crate) fn crest(&self) -> f64 {
         self.waves.iter().map(|w| w.amplitude).sum::<f64>() + self.mounds.iter().map(|m| m.height).fold(0.0, f64::max)
     }
 
-    /// Depth of a vertex of the grid, and its slopes.
+    /// Depth and slopes at a grid vertex.
     fn vertex(&self, i: i64, j: i64) -> (f64, [f64; 2]) {
         let (north, east) = (i as f64 * CELL, j as f64 * CELL);
         let (mut down, mut slope) = (self.depth, [0.0; 2]);
@@ -103,7 +103,7 @@ impl Seabed {
             slope[0] += w.amplitude * w.north * cosine;
             slope[1] += w.amplitude * w.east * cosine;
         }
-        // Silt of several objects lies as high as the highest of its mounds.
+        // Overlapping mounds do not add up; the highest counts.
         let rises = self.mounds.iter().map(|m| m.rise(north, east));
         if let Some((rise, [x, y])) = rises.max_by(|a, b| a.0.total_cmp(&b.0)) {
             down -= rise;
@@ -112,7 +112,7 @@ impl Seabed {
         (down, slope)
     }
 
-    /// Depth of the surface at a place (m), and the slopes of the triangle there.
+    /// Depth of the surface at a place (m), and the slopes of its triangle.
     fn surface(&self, north: f64, east: f64) -> (f64, [f64; 2]) {
         let (x, y) = (north / CELL, east / CELL);
         let (i, j) = (x.floor(), y.floor());
@@ -134,14 +134,14 @@ impl Seabed {
         self.surface(north, east).0
     }
 
-    /// The t > 0 at which `from + t·along` meets the bed, coming from above.
+    /// The t > 0 at which `from + t·along` meets the seabed from above.
     pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
         if along.z <= 0.15 * along.norm() {
-            return None; // nearly level or upwards: the waves' slopes stay below 0.08, so no bed within sight
+            return None; // nearly level or upwards: the waves' slopes stay below 0.08, so no seabed is within sight
         }
         let mut t = (self.depth - from.z) / along.z;
-        // Newton's steps on the triangles: exact once the right triangle is reached, and the slopes
-        // are so gentle that it is reached at once.
+        // Newton's iteration on the triangles. It is exact on the right triangle, which gentle slopes make it reach at
+        // once.
         for _ in 0..20 {
             let at = from + along * t;
             let (down, [north, east]) = self.surface(at.x, at.y);
@@ -172,7 +172,7 @@ impl Seabed {
             let mut before = (corner(i, j0), corner(i + 1, j0));
             for j in j0..j1 {
                 let after = (corner(i, j + 1), corner(i + 1, j + 1));
-                // The same diagonal as `surface`; seen from above (z is down) the corners turn left.
+                // The same diagonal as in `surface`; seen from above (z is down) the corners are anticlockwise.
                 add([before.0, after.1, before.1]);
                 add([before.0, after.0, after.1]);
                 before = after;
@@ -180,8 +180,8 @@ impl Seabed {
         }
     }
 
-    /// The grid over the rectangle from `low` to `high` (north, east); its brightness is a function
-    /// of the place and the normal.
+    /// The grid over the rectangle from `low` to `high` (north, east); `tone` gives the brightness from place and
+    /// normal.
     pub(crate) fn patch(&self, low: [f64; 2], high: [f64; 2], tone: impl Fn([f64; 2], &Vector3<f64>) -> f32) -> Patch {
         let first = low.map(|x| (x / CELL).floor() as i64);
         let last = high.map(|x| (x / CELL).ceil() as i64);
@@ -219,14 +219,14 @@ impl Patch {
         })
     }
 
-    /// The brightness at many places (north, east), bit by bit that of each.
+    /// The brightness at many places (north, east), with the bits of [`brightness`](Self::brightness).
     pub(crate) fn brightnesses(&self, north: &[f64], east: &[f64], out: &mut Vec<f32>) {
         out.clear();
         out.resize(north.len(), 0.0);
         brightnesses(self, north, east, out);
     }
 
-    /// The brightness at a place: smooth over the triangles.
+    /// The brightness at a place, interpolated smoothly over the triangles.
     pub(crate) fn brightness(&self, north: f64, east: f64) -> f32 {
         let at = |x: f64, first: i64, count: usize| {
             let x = (x / CELL - first as f64).clamp(0.0, (count - 1) as f64);
@@ -243,7 +243,7 @@ impl Patch {
     }
 }
 
-/// Places that are looked up at once.
+/// Number of places looked up in one pass.
 const CHUNK: usize = 32;
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
@@ -263,7 +263,7 @@ fn brightnesses(patch: &Patch, north: &[f64], east: &[f64], out: &mut [f32]) {
             (fx[i], fy[i]) = ((u - f64::from(row)) as f32, (v - f64::from(column)) as f32);
             place[i] = row * columns + column;
         }
-        // The look-ups by themselves, so that what is around them works on whole vectors.
+        // A separate look-up loop leaves whole vectors to the loops around it.
         let mut four = [[0.0_f32; CHUNK]; 4];
         for i in 0..n {
             let above = &patch.brightness[place[i] as usize..][..columns as usize + 2];
@@ -282,7 +282,7 @@ fn brightnesses(patch: &Patch, north: &[f64], east: &[f64], out: &mut [f32]) {
 mod tests {
     use super::*;
 
-    /// Seen to fail with north and east exchanged.
+    /// Regression: exchanging north and east fails this test.
     #[test]
     fn many_places_are_as_bright_as_each() {
         let patch = Seabed::new(40.0, 3).patch([-1.0, -2.0], [1.0, 3.0], |[x, y], normal| (x * y + normal.x) as f32);

@@ -1,18 +1,18 @@
-//! What lens and sensor do to an image: blur, noise, 8 bits.
+//! A simple camera model: blur, noise and 8-bit quantisation.
 
 use serde::{Deserialize, Serialize};
 
 use crate::stream::Stream;
 
-/// Lens and sensor.
+/// Lens and sensor of the virtual scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sensor {
-    /// Standard deviation of the lens's blur (px).
+    /// Standard deviation of the lens blur (px), from 0 to 20.
     pub blur: f64,
-    /// Standard deviation of the noise of a pixel (grey levels of 255).
+    /// Standard deviation of the pixel noise (grey levels of 255), from 0 to 255.
     pub noise: f64,
-    /// Grey level of a white surface that faces the light.
+    /// Grey level of a white surface that faces the light, from 0 to 1 000 000.
     pub white: f64,
 }
 
@@ -23,7 +23,7 @@ impl Default for Sensor {
 }
 
 impl Sensor {
-    /// The image of this radiance (1: white facing the light), rounded to 8 bits.
+    /// Converts radiance (1: white facing the light) to an 8-bit image with noise.
     pub(crate) fn expose(&self, radiance: Vec<f32>, width: usize, mut noise: Stream) -> Vec<f32> {
         let mut image = blurred(radiance, width, self.blur);
         let mut normal = [0.0; CHUNK];
@@ -37,10 +37,10 @@ impl Sensor {
     }
 }
 
-/// Pixels that are graded at once.
+/// Number of pixels quantised in one pass.
 const CHUNK: usize = 1024;
 
-/// Turns radiances into whole grey levels, with noise of deviation `sigma` from normal numbers.
+/// Rounds radiances to whole grey levels after adding noise of deviation `sigma` from normal numbers.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn graded(values: &mut [f32], white: f64, sigma: f64, normal: &[f64; CHUNK]) {
     for (value, normal) in values.iter_mut().zip(normal) {
@@ -50,7 +50,7 @@ fn graded(values: &mut [f32], white: f64, sigma: f64, normal: &[f64; CHUNK]) {
     }
 }
 
-/// The image convolved with a Gaussian; at the border the nearest pixel continues.
+/// The image convolved with a Gaussian; border pixels are replicated.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn blurred(image: Vec<f32>, width: usize, sigma: f64) -> Vec<f32> {
     if !(sigma > 0.0) {

@@ -1,68 +1,67 @@
-//! All randomness of a dive: counter-based streams, so that nothing depends on order or threads.
+//! Counter-based random streams: results do not depend on order or threads.
 
 use rand::Rng;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 
 use crate::normals::{PAIRS, normals};
 
-/// What a stream of random numbers is drawn for; each purpose has its own.
+/// The purpose of a random stream; each purpose has a stream of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Purpose {
-    /// Errors of the model's points and of the survey.
+    /// Errors of the model points and of the survey.
     Survey,
-    /// Rocks on the bed.
+    /// Rocks on the seabed.
     Rocks,
-    /// The relief of the bed.
+    /// Relief of the seabed.
     Relief,
-    /// The textures of all surfaces.
+    /// Textures of all surfaces.
     Texture,
-    /// From where a frame is taken.
+    /// Viewpoint of a frame.
     View,
-    /// The error of a frame's rough pose.
+    /// Error of a frame's prior pose.
     Prior,
-    /// The noise of a frame's left image.
+    /// Noise of a frame's left image.
     LeftImage,
-    /// The noise of a frame's right image.
+    /// Noise of a frame's right image.
     RightImage,
-    /// The clutter and the noise of a frame's points.
+    /// Clutter and noise of a frame's points.
     Points,
-    /// What a search draws in a frame.
+    /// Random choices of a search in a frame.
     Search,
-    /// An identification problem of a family.
+    /// A generated coherence problem.
     Problem,
-    /// Whereto objects moved since the survey.
+    /// Displacements of objects since the survey.
     Changes,
-    /// Things in the way.
+    /// Occluders.
     Occluders,
-    /// A site drawn at random.
+    /// A random site.
     Site,
-    /// The current's fluctuations.
+    /// Fluctuations of the current.
     Current,
-    /// Which instants a faulty device fails at.
+    /// Instants at which a faulty device fails.
     Faults,
-    /// A ping of the acoustic positioning.
+    /// A fix of the acoustic positioning.
     Acoustics,
     /// A reading of the Doppler log.
     Doppler,
     /// A reading of gyro and attitude.
     Gyro,
-    /// A reading of the depth.
+    /// A reading of the depth gauge.
     Depth,
-    /// Imperfections that a device keeps for the whole dive.
+    /// Device errors that are constant over a dive.
     FaultyDevice,
-    /// The particles in the water.
+    /// Particles in the water.
     Snow,
-    /// A question to the transponders on the bed.
+    /// An interrogation of the transponders.
     Transponders,
-    /// Which points are wrong matches, and where these lie.
+    /// Selection and positions of wrong matches.
     Mismatches,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.
 ///
-/// The four numbers *are* the key of the cipher: streams never overlap, and a further frame
-/// changes no earlier one. The elementary functions are those of `libm`: the same numbers on
-/// every platform.
+/// The four numbers are the key of the cipher, so streams never overlap, and a further frame changes no earlier one.
+/// The elementary functions are those of `libm`, so the numbers are the same on every platform.
 #[derive(Debug, Clone)]
 pub struct Stream {
     rng: ChaCha8Rng,
@@ -70,7 +69,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// The stream for `purpose` in `frame` of the dive (or trial) number `dive`.
+    /// The stream for `purpose` in `frame` of dive (or trial) number `dive`.
     pub fn new(seed: u64, dive: u64, frame: u64, purpose: Purpose) -> Self {
         let mut key = [0; 32];
         for (bytes, word) in key.chunks_exact_mut(8).zip([seed, dive, frame, purpose as u64]) {
@@ -79,7 +78,7 @@ impl Stream {
         Self { rng: ChaCha8Rng::from_seed(key), spare: None }
     }
 
-    /// The generator itself, for code that draws through `rand`'s traits.
+    /// The generator itself, for code that uses `rand`'s traits.
     pub fn rng(&mut self) -> &mut dyn Rng {
         &mut self.rng
     }
@@ -89,22 +88,22 @@ impl Stream {
         self.rng.next_u64()
     }
 
-    /// Uniform in [0, 1).
+    /// A uniform number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// Uniform in [low, high).
+    /// A uniform number in [low, high).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Uniform in 0..n; 0 where n is 0.
+    /// A uniform integer in 0..n; 0 if n is 0.
     pub fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.bits()) * n as u128) >> 64) as usize
     }
 
-    /// Normal with mean 0 and standard deviation 1. (Box and Muller, 1958.)
+    /// A normal number with mean 0 and standard deviation 1 (Box and Muller, 1958).
     pub fn normal(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
@@ -115,7 +114,7 @@ impl Stream {
         radius * cosine
     }
 
-    /// Fills a list with what as many calls of [`normal`](Self::normal) would give.
+    /// Fills a slice with the results of as many calls of [`normal`](Self::normal).
     pub(crate) fn normals(&mut self, out: &mut [f64]) {
         let spare = usize::from(self.spare.is_some()).min(out.len());
         let (first, rest) = out.split_at_mut(spare);
@@ -134,7 +133,7 @@ impl Stream {
         chunks.into_remainder().iter_mut().for_each(|x| *x = self.normal());
     }
 
-    /// Three independent normal numbers of standard deviation `sigma`.
+    /// Three independent normal numbers with standard deviation `sigma`.
     pub fn normal3(&mut self, sigma: f64) -> nalgebra::Vector3<f64> {
         let [x, y, z] = [self.normal(), self.normal(), self.normal()];
         nalgebra::Vector3::new(x, y, z) * sigma
@@ -145,7 +144,7 @@ impl Stream {
 mod tests {
     use super::*;
 
-    /// Seen to fail when the spare number is not used first.
+    /// Regression: ignoring the spare number of the pair fails this test.
     #[test]
     fn many_normal_numbers_are_those_generated_one_by_one() {
         let stream = || Stream::new(4, 0, 7, Purpose::LeftImage);

@@ -1,4 +1,4 @@
-//! The virtual site as a method knows it, with the errors of its survey, and as it is.
+//! The virtual site with the errors of its survey, and its truth.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Object, Point, Transform, World, triad};
@@ -10,11 +10,11 @@ use crate::{
     virtual_scene::{Body, VirtualScene},
 };
 
-/// Errors of distances between surveyed points are kept below this many standard deviations, so
-/// that every drawn survey passes the site file's own check at four.
+/// Limit of distance errors between surveyed points, in standard deviations. Every sampled survey thus passes the site
+/// file's own check at four.
 const SURVEY_LIMIT: f64 = 3.5;
 
-/// The errors that the site's description has.
+/// The survey errors of a site.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SurveyErrors {
     /// Standard deviation of each coordinate of a model point (m).
@@ -23,7 +23,7 @@ pub(crate) struct SurveyErrors {
     pub(crate) survey: f64,
 }
 
-/// The site as described, and where its objects truly are.
+/// The site as surveyed, and the true poses of its objects.
 pub(crate) fn survey(
     blueprint: &Blueprint,
     scene: &VirtualScene,
@@ -56,15 +56,15 @@ fn survey_object(
     survey_marks(&plan.id, base, &marks, errors, stream)
 }
 
-/// A feature point where it truly is, in the world.
+/// The true position of a feature point in the world.
 pub(crate) struct Mark<'a> {
     pub(crate) id: &'a str,
     pub(crate) at: Vector3<f64>,
-    /// The side from which it is seen.
+    /// Outward normal of the side from which the point is visible.
     pub(crate) normal: Option<Vector3<f64>>,
 }
 
-/// An object as its survey describes it, and where the described points truly are.
+/// An object as surveyed, and the true pose of its surveyed points.
 pub(crate) fn survey_marks(
     id: &str,
     base: [usize; 3],
@@ -73,7 +73,7 @@ pub(crate) fn survey_marks(
     stream: &mut Stream,
 ) -> (SiteObject, Transform<World, Object>) {
     let truth: Vec<Vector3<f64>> = marks.iter().map(|mark| mark.at).collect();
-    // The model is measured on the object itself: each point with its own small error.
+    // The model is measured on the object itself, with an independent error of each point.
     let measured: Vec<Point<World>> = truth.iter().map(|p| Point::from(p + stream.normal3(errors.model))).collect();
     let [p1, p2, p3] = base.map(|k| measured[k]);
     let object_from_world =
@@ -104,7 +104,7 @@ pub(crate) fn survey_marks(
     (object, world_from_object)
 }
 
-/// The world coordinates of the base with the survey's errors.
+/// The world coordinates of the base points with the survey's errors.
 fn surveyed_base(
     truth: [Vector3<f64>; 3],
     model: [Point<Object>; 3],
@@ -113,7 +113,7 @@ fn surveyed_base(
 ) -> [Point<World>; 3] {
     let limit = SURVEY_LIMIT * (2.0 * (errors.survey.powi(2) + errors.model.powi(2))).sqrt() + 5e-6;
     let mut sampled = truth;
-    // Almost every draw passes; where a thousand do not, the last stands and the site file's check tells.
+    // Nearly every sample passes. After a thousand failures the last one stands, and the site file's check reports it.
     for _ in 0..1000 {
         sampled = truth.map(|p| (p + stream.normal3(errors.survey)).map(micrometres));
         let fits =
@@ -125,15 +125,15 @@ fn surveyed_base(
     sampled.map(Point::from)
 }
 
-/// Rounded to a micrometre: the site file stays readable.
+/// Rounded to 1 µm, which keeps the site file readable.
 fn micrometres(x: f64) -> f64 {
     (x * 1e6).round() / 1e6 + 0.0
 }
 
-/// The motion that carries the model's points onto their true places with the least squared error,
-/// from a start that is nearly there.
+/// The least-squares motion from the model points to their true positions, from a nearly correct start.
 ///
-/// Centroids first, then small rotations: at a fit of millimetres three steps reach rounding error.
+/// The centroids are aligned first, then small rotations are iterated; with residuals of millimetres three steps reach
+/// rounding error.
 fn best_fit(
     start: Transform<World, Object>,
     pairs: impl Iterator<Item = (Point<Object>, Vector3<f64>)> + Clone,
@@ -191,7 +191,7 @@ mod tests {
                     model += ((*world_from_object * point.at).coords - corner.at).norm_squared();
                     n += 3.0;
                 }
-                n -= 6.0; // the fit takes six
+                n -= 6.0; // the fit has six degrees of freedom
                 for (surveyed, &k) in object.base_in_world.unwrap().iter().zip(&object.base) {
                     survey += (surveyed.coords - body.points[k].at).norm_squared();
                     m += 3.0;

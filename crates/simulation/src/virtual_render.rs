@@ -1,4 +1,4 @@
-//! From the scene and a camera to an image.
+//! Rendering of the virtual scene.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Frame, Pinhole, Transform, World};
@@ -12,14 +12,14 @@ use crate::{
     virtual_scene::{Finish, VirtualScene},
 };
 
-/// Share of the light that comes from where nothing is.
+/// Radiance of pixels that see nothing.
 const VOID: f32 = 0.05;
-/// The bed is drawn up to this far from the camera (m).
+/// Maximum distance at which the seabed is drawn (m).
 const SEABED_REACH: f64 = 40.0;
-/// The `id` of the bed's facets; those of bodies follow.
+/// The `id` of the seabed's facets; those of bodies follow.
 const SEABED: u32 = 0;
 
-/// A surface as one camera sees it.
+/// A surface in one camera's frame.
 struct Seen {
     origin: Vector3<f64>,
     x: Vector3<f64>,
@@ -30,8 +30,10 @@ struct Seen {
     seed: u32,
 }
 
-/// Pixels of a row that see nothing but the bed, or nothing but one surface: their columns and 1/Z, where they see it (north and
-/// east, or x and y of the surface's plane), and how wide they are there (m).
+/// Uniform pixels of a row, which see the seabed only or one surface only.
+///
+/// Their columns and 1/Z, their surface coordinates (north and east, or x and y of the surface's plane), and their
+/// footprints (m).
 #[derive(Debug, Default)]
 struct Integer {
     columns: Vec<u32>,
@@ -52,7 +54,7 @@ impl Integer {
         self.inverse_depths.push(inverse_depth);
     }
 
-    /// Finds the places by the values of [`Rendering::ground`] or [`Rendering::upon`].
+    /// Computes the surface coordinates by the formulas of [`Rendering::ground`] or [`Rendering::upon`].
     fn place(&mut self, row: usize, sensor_frame: &SensorFrame<'_>) {
         let n = self.columns.len();
         for list in [&mut self.x, &mut self.y, &mut self.footprint] {
@@ -66,7 +68,7 @@ impl Integer {
     }
 }
 
-/// A camera, and a surface that it looks at, or the bed.
+/// A camera and a surface in its view, or the seabed.
 struct SensorFrame<'a> {
     focal: [f64; 2],
     principal: [f64; 2],
@@ -75,7 +77,7 @@ struct SensorFrame<'a> {
     surface: Option<&'a Seen>,
 }
 
-/// [`Rendering::ground`] for many pixels of row `v`, bit by bit.
+/// [`Rendering::ground`] for many pixels of row `v`, with the same bits.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn on_seabed(
     sensor_frame: &SensorFrame<'_>,
@@ -104,8 +106,8 @@ fn on_seabed(
     }
 }
 
-/// [`Rendering::upon`] for many pixels of row `v`, bit by bit.
-#[expect(clippy::too_many_arguments, reason = "a slice of its own each: the compiler knows that none overlap")]
+/// [`Rendering::upon`] for many pixels of row `v`, with the same bits.
+#[expect(clippy::too_many_arguments, reason = "separate slices, which the compiler knows not to overlap")]
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn on_surface(
     sensor_frame: &SensorFrame<'_>,
@@ -139,7 +141,7 @@ fn on_surface(
 pub(crate) struct Rendering<'a> {
     scene: &'a VirtualScene,
     camera: &'a Pinhole,
-    /// The camera's axes and place in the world.
+    /// The camera's rotation and position in the world.
     turn: Matrix3<f64>,
     from: Vector3<f64>,
     patch: Patch,
@@ -148,7 +150,7 @@ pub(crate) struct Rendering<'a> {
 }
 
 impl<'a> Rendering<'a> {
-    /// What `camera`, placed by `world_from_camera`, sees of the scene.
+    /// The rendering of the scene by `camera` at `world_from_camera`.
     pub(crate) fn new<F: Frame>(
         scene: &'a VirtualScene,
         camera: &'a Pinhole,
@@ -231,7 +233,7 @@ impl<'a> Rendering<'a> {
         image
     }
 
-    /// The radiance of one pixel by itself.
+    /// The radiance of a single pixel.
     #[cfg(test)]
     pub(crate) fn pixel(&self, column: usize, row: usize) -> f32 {
         let mut value = 0.0;
@@ -250,20 +252,20 @@ impl<'a> Rendering<'a> {
         Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0)
     }
 
-    /// How wide a pixel is (m) on a surface that its ray meets there, `slope` being the ray's part along the normal.
+    /// The footprint of a pixel (m) on a surface; `slope` is the ray's component along the normal.
     fn footprint(&self, ray: &Vector3<f64>, inverse_depth: f64, slope: f64) -> f64 {
         let pixel = 1.0 / (inverse_depth * self.camera.focal()[0]);
         pixel / (slope.abs() / ray.norm()).max(0.25)
     }
 
-    /// Where a ray meets the bed: north, east, and how wide a pixel is there (m).
+    /// The intersection of a ray with the seabed: north, east, and the pixel's footprint (m).
     fn ground(&self, ray: &Vector3<f64>, inverse_depth: f64) -> [f64; 3] {
         let along = self.turn * ray;
         let place = self.from + along / inverse_depth;
         [place.x, place.y, self.footprint(ray, inverse_depth, along.z)]
     }
 
-    /// The depth Z (m) at the centre of a pixel, where there is anything.
+    /// The depth Z (m) at a pixel's centre; `None` for the void.
     #[cfg(test)]
     pub(crate) fn depth(&self, column: usize, row: usize) -> Option<f64> {
         let (id, inverse) = self.visibility.centre(column, row);
@@ -286,7 +288,7 @@ impl<'a> Rendering<'a> {
         surface.brightness * paint::finish(surface.finish, x, y, footprint, surface.seed)
     }
 
-    /// Where a ray meets a surface: x and y of its plane, and how wide a pixel is there (m).
+    /// The intersection of a ray with a surface: x and y of its plane, and the pixel's footprint (m).
     fn upon(&self, surface: &Seen, ray: &Vector3<f64>, inverse_depth: f64) -> [f64; 3] {
         let from = ray / inverse_depth - surface.origin;
         let footprint = self.footprint(ray, inverse_depth, surface.normal.dot(ray));
@@ -294,7 +296,7 @@ impl<'a> Rendering<'a> {
     }
 }
 
-/// The rectangle (north, east) of the bed that the camera can see.
+/// The visible rectangle of the seabed (north, east).
 fn footprint<F: Frame>(
     scene: &VirtualScene,
     camera: &Pinhole,
@@ -308,7 +310,7 @@ fn footprint<F: Frame>(
     for (u, v) in [(-1.0, -1.0), (width, -1.0), (-1.0, height), (width, height)] {
         let ray = world_from_camera.rotation() * Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0);
         let level = (ray.x * ray.x + ray.y * ray.y).sqrt();
-        // A ray that goes up, or far away, is followed to the limit.
+        // A ray upwards or to far away ends at the limit.
         let far = SEABED_REACH / level.max(1e-9);
         let t = if ray.z > 0.0 { ((lowest - from.z) / ray.z).clamp(0.0, far) } else { far };
         for (k, x) in [from.x + ray.x * t, from.y + ray.y * t].into_iter().enumerate() {

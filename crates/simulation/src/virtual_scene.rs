@@ -1,4 +1,4 @@
-//! The scene: every flat surface of the site in the world, and rays through it.
+//! The virtual scene: every flat surface of the site in the world, and ray casting.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Point, World};
@@ -9,7 +9,7 @@ use crate::{
     stream::{Purpose, Stream},
 };
 
-/// What a surface is made of.
+/// The finish of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Finish {
     /// Coated steel with stains and growth.
@@ -23,26 +23,26 @@ pub(crate) enum Finish {
 /// A flat, convex surface in the world.
 #[derive(Debug, Clone)]
 pub(crate) struct Surface {
-    /// Its corners, in order around it.
+    /// Corners, in order.
     pub(crate) corners: Vec<Vector3<f64>>,
-    /// The unit normal, to the outside.
+    /// Outward unit normal.
     pub(crate) normal: Vector3<f64>,
-    /// Share of the light it returns.
+    /// Albedo.
     pub(crate) albedo: f32,
-    /// What it is made of.
+    /// Finish.
     pub(crate) finish: Finish,
-    /// 1 for paint, which lies in the plane of the plate that carries it; 0 otherwise.
+    /// Layer: 1 for paint, which lies in the plane of its plate; 0 otherwise.
     pub(crate) layer: u8,
-    /// A ball around it.
+    /// Bounding sphere.
     ball: Ball,
 }
 
-/// A place that a detector may find: a feature point or another corner.
+/// A corner that a detector may find: a feature point or a distractor.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Corner {
-    /// Where.
+    /// Position.
     pub(crate) at: Vector3<f64>,
-    /// The side from which it is seen.
+    /// Outward normal of the side from which the corner is visible.
     pub(crate) normal: Vector3<f64>,
 }
 
@@ -50,14 +50,14 @@ pub(crate) struct Corner {
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
     pub(crate) surfaces: Vec<Surface>,
-    /// The feature points, in the order of the blueprint.
+    /// Feature points, in the order of the blueprint.
     pub(crate) points: Vec<Corner>,
     /// Corners that are no feature points.
     pub(crate) distractors: Vec<Corner>,
     ball: Ball,
 }
 
-/// Everything that can be seen.
+/// Everything visible.
 #[derive(Debug, Clone)]
 pub(crate) struct VirtualScene {
     pub(crate) bodies: Vec<Body>,
@@ -65,10 +65,10 @@ pub(crate) struct VirtualScene {
     pub(crate) texture: u32,
 }
 
-/// Sides of a pipe's cross-section.
+/// Number of sides of a pipe's cross-section.
 const PIPE_SIDES: usize = 16;
 
-/// A ball that encloses something.
+/// A bounding sphere.
 #[derive(Debug, Clone, Copy)]
 struct Ball {
     centre: Vector3<f64>,
@@ -76,12 +76,12 @@ struct Ball {
 }
 
 impl Ball {
-    /// The ball around a centre that holds all places.
+    /// The smallest sphere about a centre that holds all places.
     fn around<'a>(centre: Vector3<f64>, places: impl Iterator<Item = &'a Vector3<f64>>) -> Self {
         Self { centre, radius: places.map(|p| (p - centre).norm()).fold(0.0, f64::max) + 1e-6 }
     }
 
-    /// Whether the line through `from` along `along` passes through it.
+    /// Whether the line through `from` along `along` meets the sphere.
     fn meets(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> bool {
         let miss = (self.centre - from).cross(along).norm_squared();
         miss <= self.radius * self.radius * along.norm_squared()
@@ -97,7 +97,7 @@ impl Surface {
         Self { corners, normal, albedo: albedo as f32, finish, layer: u8::from(finish == Finish::Paint), ball }
     }
 
-    /// The t at which `from + t·along` passes through the surface.
+    /// The t at which `from + t·along` meets the surface.
     fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let slope = self.normal.dot(along);
         if slope.abs() < 1e-12 || !self.ball.meets(from, along) {
@@ -217,7 +217,7 @@ fn pipe_surfaces(
     }
 }
 
-/// One rock beside an object, half sunk into the bed.
+/// One rock beside an object, half sunk into the seabed.
 fn rock_surfaces(
     origin: &Vector3<f64>,
     seabed: &Seabed,
@@ -257,7 +257,7 @@ fn rock_surfaces(
 }
 
 impl VirtualScene {
-    /// The scene of a blueprint; relief, rocks and textures come from the seed.
+    /// Builds the scene of a blueprint; relief, rocks and textures depend on the seed.
     pub(crate) fn new(blueprint: &Blueprint, seed: u64) -> Self {
         let seabed = Seabed::new(blueprint.depth, seed);
         let bodies = blueprint
@@ -273,14 +273,14 @@ impl VirtualScene {
         Self { bodies, seabed, texture }
     }
 
-    /// The first t > 0 at which `from + t·along` meets a body or the bed.
+    /// The first t > 0 at which `from + t·along` meets a body or the seabed.
     pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let bodies = self.bodies.iter().filter(|b| b.ball.meets(from, along));
         let solid = bodies.flat_map(|b| &b.surfaces).filter_map(|s| s.hit(from, along));
         solid.chain(self.seabed.hit(from, along)).min_by(f64::total_cmp)
     }
 
-    /// Whether nothing lies between `from` and the place `to`, up to a millimetre before it.
+    /// Whether `to` is visible from `from`, up to a millimetre before it.
     pub(crate) fn clear(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let along = to - from;
         let before = 1.0 - 1e-3 / along.norm();
@@ -289,17 +289,17 @@ impl VirtualScene {
         !hits.any(|t| t < before)
     }
 
-    /// Whether a corner is turned towards `from` and nothing hides it.
+    /// Whether a corner faces `from` and is not occluded.
     pub(crate) fn sees(&self, from: &Vector3<f64>, corner: &Corner) -> bool {
         corner.normal.dot(&(from - corner.at)) > 0.0 && self.clear(from, &corner.at)
     }
 
-    /// The place that `from` sees along `along`.
+    /// The surface point that a ray meets.
     pub(crate) fn seen(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<Point<World>> {
         self.hit(from, along).map(|t| Point::from(from + along * t))
     }
 
-    /// The least depth of anything within `reach` (m) of the vertical through a place.
+    /// The smallest depth of anything within `reach` (m) of the vertical through a place.
     pub(crate) fn summit(&self, at: &Vector3<f64>, reach: f64) -> f64 {
         let near = self.bodies.iter().flat_map(|b| &b.surfaces).flat_map(|s| &s.corners);
         near.filter(|c| (c.xy() - at.xy()).norm() < reach)

@@ -1,9 +1,9 @@
-//! How exactly corners are located: synthetic corners at random places and angles, beside the Cramér–Rao bound.
+//! Accuracy of corner localisation: synthetic corners at random positions and angles against the Cramér–Rao bound.
 //!
-//! `cargo bench -p seafix-vision --bench accuracy` prints the table; nothing is measured but the errors and, at
-//! the end, the time. The images are integrated numerically, not by the model that is fitted.
+//! `cargo bench -p seafix-vision --bench accuracy` prints a table of errors and, at its end, run times. The images are
+//! integrated numerically, not by the model that is fitted.
 
-#![allow(clippy::print_stdout, reason = "a bench prints")]
+#![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
 #[path = "common/random.rs"]
 mod random;
@@ -17,23 +17,24 @@ use seafix_vision::{
 
 use random::Random;
 
-/// Blur (px), and grey levels either side of the middle one.
+/// The standard deviation of the blur (px).
 const BLUR: f64 = 0.8;
+/// Half the contrast (grey levels).
 const CONTRAST: f64 = 60.0;
-/// Grey levels.
+/// The standard deviations of the noise (grey levels).
 const NOISES: [f64; 3] = [0.0, 2.0, 5.0];
 const CORNERS: usize = 200;
 const SIDE: usize = 31;
-/// The square of pixels that the bound is of.
+/// The side of the square window of the bound (px).
 const WINDOW: usize = 11;
-/// An error beyond this is a failure, not an inaccuracy (px).
+/// The error (px) from which on a result counts as a failure and not as an inaccuracy.
 const FAILED: f64 = 1.0;
 
-/// Centre, directions of two normals, blur, dark, bright − dark.
+/// The centre, the directions of two normals, blur, dark level, and contrast.
 type Parameters = [f64; 7];
 
 fn main() {
-    // `cargo test` runs benches too: one corner shows that it works.
+    // `cargo test` runs benches too; a few corners suffice there.
     let count = if std::env::args().any(|argument| argument == "--bench") { CORNERS } else { 4 };
     println!(
         "{count} corners, blur {BLUR} px, contrast ±{CONTRAST}, 8 bit; RMS px an axis (NEES/2, failures) for noise {NOISES:?}"
@@ -112,7 +113,7 @@ fn main() {
                 locator.locate_into(&image, &points, &mut work, &mut places);
                 min = min.min(begin.elapsed().as_secs_f64() * 1e3);
             }
-            println!("1000 × {name}: {min:.2} ms of one thread");
+            println!("1000 × {name}: {min:.2} ms on one thread");
         }
     }
 }
@@ -146,7 +147,7 @@ impl Tally {
     }
 }
 
-/// The corner that Harris' detector finds nearest to the truth.
+/// The Harris corner nearest to the truth.
 fn harris(image: &Image, scene: &Parameters) -> Option<Keypoint> {
     let truth = Pixel { u: scene[0], v: scene[1] };
     let found = Harris::default().detect(image);
@@ -154,8 +155,9 @@ fn harris(image: &Image, scene: &Parameters) -> Option<Keypoint> {
     near.min_by(|a, b| a.at.distance(&truth).total_cmp(&b.at.distance(&truth)))
 }
 
-/// The variance of a coordinate of the centre (px²) for noise of one grey level, the mean of both, by the
-/// Cramér–Rao bound: that of the inverse information of all seven parameters, or with the blur known.
+/// The Cramér–Rao bound of a coordinate of the centre (px², the mean of both) for noise of one grey level.
+///
+/// It is the inverse information of all seven parameters, or of six with the blur known.
 fn bound(scene: &Parameters, chequer: bool, blur_known: bool) -> f64 {
     let corner = |x: f64| x.round() as usize - WINDOW / 2;
     let (left, top) = (corner(scene[0]), corner(scene[1]));
@@ -176,15 +178,16 @@ fn bound(scene: &Parameters, chequer: bool, blur_known: bool) -> f64 {
         information.set_column(4, &SVector::<f64, 7>::zeros());
         information[(4, 4)] = 1.0;
     }
-    let covariance = information.try_inverse().expect("a corner informs");
+    let covariance = information.try_inverse().expect("a corner determines all parameters");
     0.5 * (covariance[(0, 0)] + covariance[(1, 1)])
 }
 
-/// A square of pixels of the blurred corner: on each line across the Gaussian the lit intervals are
-/// integrated exactly, the lines by the trapezoidal rule.
+/// A square of pixels of the blurred corner.
+///
+/// The bright intervals on each line across the Gaussian are integrated exactly, the lines by the trapezoidal rule.
 fn pixels(scene: &Parameters, chequer: bool, left: usize, top: usize, side: usize) -> Vec<f64> {
     let [cx, cy, first, second, blur, dark, difference] = *scene;
-    // The lines run between the two normals, so that both edges cut them at a good angle.
+    // The lines lie between the two normals, so that both edges intersect them at a large angle.
     let turn = 0.5 * (first + second);
     let normals = [first - turn, second - turn].map(|angle| [angle.cos(), angle.sin()]);
     const LINES: i32 = 60;
@@ -197,7 +200,7 @@ fn pixels(scene: &Parameters, chequer: bool, left: usize, top: usize, side: usiz
         for line in -LINES..=LINES {
             let v = step * f64::from(line);
             let weight = (-0.5 * v * v).exp();
-            // Along the line u: n₀(x + su) + n₁(y + sv) > 0 from, or up to, where the edge cuts it.
+            // Along the line u, n₀(x + su) + n₁(y + sv) > 0 holds from, or up to, the intersection with the edge.
             let cuts = normals.map(|n| -(n[0] * x + n[1] * (y + blur * v)) / (n[0] * blur));
             let side =
                 |k: usize| if normals[k][0] > 0.0 { (cuts[k], f64::INFINITY) } else { (f64::NEG_INFINITY, cuts[k]) };

@@ -1,12 +1,13 @@
-//! How far the alignment between two views errs, beside the Cramér–Rao bound, and whether it says so.
+//! Accuracy of the alignment between two views against the Cramér–Rao bound and against its own covariance.
 //!
 //! `cargo bench -p seafix-vision --bench alignment`
 //!
-//! Scenes blurred by a Gaussian of 0.8 px, contrast ±60 grey levels, noise of 0, 2 or 5 grey levels, rounded to 8 bits;
-//! the left place and the disparity have random fractions. The bound is √2 σ (Σ w g gᵀ)^(−1/2): both images are
-//! noisy, σ² includes rounding (1/12), all pixels of the window count in full and the scene is known.
+//! Scenes are blurred by a Gaussian of 0.8 px, with a contrast of ±60 grey levels and noise of 0, 2 or 5 grey levels,
+//! rounded to 8 bits; the left position and the disparity have random fractions. The bound is √2 σ (Σ w g gᵀ)^(−1/2):
+//! both images are noisy, σ² includes rounding (1/12), all pixels of the window have full weight and the scene is
+//! known.
 
-#![allow(clippy::print_stdout, reason = "a program that prints a table")]
+#![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
 #[path = "common/random.rs"]
 mod random;
@@ -34,16 +35,16 @@ enum Kind {
     Gravel,
 }
 
-/// Brightness around the origin.
+/// The brightness around the origin.
 struct Scene {
     kind: Kind,
     turn: f64,
     stones: Vec<[f64; 4]>,
 }
 
-/// Half of the side of the gravel bed (px).
+/// Half the side of the gravel seabed (px).
 const SEABED: f64 = 34.0;
-/// Spacing of the stones (px).
+/// The spacing of the stones (px).
 const SPACING: f64 = 4.5;
 
 impl Scene {
@@ -86,7 +87,7 @@ impl Scene {
 
 const SIDE: usize = 65;
 
-/// What a camera makes of the scene: the pixel p shows the place map(p).
+/// The image of the scene; pixel p shows the point map(p).
 fn picture(scene: &Scene, map: impl Fn(Vector2<f64>) -> Vector2<f64>, noise: f64, random: &mut Random) -> Image {
     let pixel = |i: usize, random: &mut Random| {
         let place = map(Vector2::new((i % SIDE) as f64, (i / SIDE) as f64));
@@ -96,7 +97,7 @@ fn picture(scene: &Scene, map: impl Fn(Vector2<f64>) -> Vector2<f64>, noise: f64
     Image::new(SIDE, SIDE, (0..SIDE * SIDE).map(|i| pixel(i, random)).collect()).expect("square")
 }
 
-/// Sums over the trials of one row of the table.
+/// The sums over the trials of one row of the table.
 #[derive(Default)]
 struct Sums {
     count: usize,
@@ -114,7 +115,7 @@ fn rig() -> StereoRig {
         .expect("a rig")
 }
 
-/// `trials` pairs, seen with this slope of the disparity along each axis.
+/// The errors of `trials` pairs with this slope of the disparity along each axis.
 fn measure(kind: Kind, slope: f64, noise: f64, refinement: &dyn Refinement, window: usize, trials: usize) -> Sums {
     let (mut sums, rig) = (Sums::default(), rig());
     for trial in 0..trials {
@@ -126,7 +127,7 @@ fn measure(kind: Kind, slope: f64, noise: f64, refinement: &dyn Refinement, wind
         let tilt = 2.0 * PI * random.uniform();
         // right = right_at + shape · (left − left_at)
         let shape = Matrix2::new(1.0 + slope * tilt.cos(), slope * tilt.sin(), 0.0, 1.0);
-        let back = shape.try_inverse().expect("a gentle slope");
+        let back = shape.try_inverse().expect("a slope below one");
         let left = picture(&scene, |p| p - left_at, noise, &mut random);
         let right = picture(&scene, |p| back * (p - right_at), noise, &mut random);
         let start = right_at + Vector2::new(random.uniform() - 0.5, random.uniform() - 0.5);

@@ -1,15 +1,14 @@
-//! Corners of a real chessboard: how many are found and matched, how flat and how large the board comes out, and what a
-//! calibration makes of them, beside OpenCV's corners.
+//! Corners of a real chessboard, compared with OpenCV's: numbers found and matched, 3D error, and calibration residual.
 //!
 //! `SEAFIX_CHESSBOARD=FOLDER cargo bench --workspace --bench chessboard`; the folder holds the stereo pairs of OpenCV's
-//! `samples/data` as `leftNN.jpg`, `rightNN.jpg`, OpenCV's corners in `corners.json` and the calibration by them in
+//! `samples/data` as `leftNN.jpg` and `rightNN.jpg`, OpenCV's corners in `corners.json` and its calibration in
 //! `calibration.json`.
 //!
-//! A corner is found and matched if one point of the cloud lies within 1.5 px of OpenCV's in both images; a match is
-//! wrong if it does so in the left image only. The 3D error is what a rigid fit of the board leaves, RMS. Last, OpenCV
-//! calibrates the rig by each set of corners: what that leaves in the images says which set the cameras can have seen.
+//! A corner counts as matched if one point of the cloud lies within 1.5 px of OpenCV's in both images, and as wrong if
+//! it does so in the left image only. The 3D error is the RMS residual of a rigid fit of the board. Finally OpenCV
+//! calibrates the rig by each set of corners; the residuals in the images show which set is more accurate.
 
-#![allow(clippy::print_stdout, reason = "a bench prints")]
+#![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
 mod common;
 
@@ -20,10 +19,10 @@ use seafix_geometry::{Pinhole, Pixel, StereoPixels, StereoRig, Transform, Uncert
 use seafix_vision::{DESCRIPTORS, DETECTORS, Direct, FrontEnd, FrontEndOutput, LOCATORS, MATCHERS, Optimal, Warp};
 use serde_json::{Value, json};
 
-/// How near to OpenCV's corner ours has to be (px).
+/// The maximum distance from OpenCV's corner (px).
 const NEAR: f64 = 1.5;
 
-/// A board: OpenCV's corners in both images, and ours where there are any.
+/// A board with OpenCV's corners in both images and the matched ones of Seafix.
 struct Board {
     theirs: Vec<StereoPixels>,
     ours: Vec<Option<StereoPixels>>,
@@ -32,11 +31,11 @@ struct Board {
 
 fn main() {
     let Ok(folder) = std::env::var("SEAFIX_CHESSBOARD") else {
-        return println!("skipped: the chessboard; SEAFIX_CHESSBOARD names no folder");
+        return println!("skipped the chessboard: SEAFIX_CHESSBOARD is not set; see crates/vision/benches/README.md");
     };
     let Some(mut opencv) = Peer::from_env(OPENCV, "the chessboard") else { return };
     let read = |name: &str| -> Value {
-        let text = std::fs::read_to_string(format!("{folder}/{name}")).expect("a file of the folder");
+        let text = std::fs::read_to_string(format!("{folder}/{name}")).expect("a readable file in SEAFIX_CHESSBOARD");
         serde_json::from_str(&text).expect("JSON")
     };
     let (corners, calibration) = (read("corners.json"), read("calibration.json"));
@@ -51,9 +50,9 @@ fn main() {
     let pairs = corners.as_object().expect("pairs by name");
     for (name, warp) in [
         ("OpenCV's", None),
-        ("ours, windows that only move", Some(Warp::Translation)),
-        ("ours, slanted windows", Some(Warp::Slanted)),
-        ("ours, windows as seen", Some(Warp::AsSeen)),
+        ("Seafix, translation", Some(Warp::Translation)),
+        ("Seafix, slanted", Some(Warp::Slanted)),
+        ("Seafix, as-seen", Some(Warp::AsSeen)),
     ] {
         let boards: Vec<Board> = pairs
             .iter()
@@ -104,7 +103,7 @@ fn front_end(warp: Warp) -> FrontEnd {
     }
 }
 
-/// Which of the pairs are the corners.
+/// Matches the pairs to OpenCV's corners.
 fn found(theirs: Vec<StereoPixels>, pairs: &[UncertainPixels]) -> Board {
     let (mut ours, mut wrong) = (Vec::new(), 0);
     for corner in &theirs {
@@ -117,12 +116,12 @@ fn found(theirs: Vec<StereoPixels>, pairs: &[UncertainPixels]) -> Board {
     Board { theirs, ours, wrong }
 }
 
-/// Where the corners of the board are (m), row by row.
+/// The position of a corner on the board (m), in row-major order.
 fn place(index: usize, columns: usize, square: f64) -> Vector3<f64> {
     Vector3::new((index % columns) as f64, (index / columns) as f64, 0.0) * square
 }
 
-/// What rigid fits of the board to the triangulated corners leave (mm, RMS).
+/// The RMS residual of rigid fits of the board to the triangulated corners (mm).
 fn spatial(boards: &[Board], rig: &StereoRig, columns: usize, square: f64) -> f64 {
     let (mut squares, mut count) = (0.0, 0);
     for board in boards {
@@ -146,7 +145,7 @@ fn spatial(boards: &[Board], rig: &StereoRig, columns: usize, square: f64) -> f6
     1e3 * (squares / count as f64).sqrt()
 }
 
-/// The rig of OpenCV's numbers.
+/// The rig of OpenCV's calibration.
 fn rig(numbers: &Value) -> StereoRig {
     let flat = |value: &Value| -> Vec<f64> {
         let rows = value.as_array().expect("a matrix").iter();
@@ -174,7 +173,7 @@ fn stereo(left: &Value, right: &Value) -> Vec<StereoPixels> {
     pixels(left).into_iter().zip(pixels(right)).map(|(left, right)| StereoPixels { left, right }).collect()
 }
 
-/// A calibration by these corners.
+/// The request for a calibration by these corners.
 fn request(boards: &[Board], columns: usize, square: f64) -> Value {
     let of = |board: &Board| {
         let corners = board.ours.iter().enumerate().filter_map(|(i, at)| Some((place(i, columns, square), (*at)?)));

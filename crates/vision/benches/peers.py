@@ -1,6 +1,6 @@
-"""OpenCV and scikit-image, asked by the benches: one JSON request a line, one JSON answer a line.
+"""OpenCV and scikit-image as peers of the benches: one JSON request per line, one JSON answer per line.
 
-Runs under CPython 3.7 with opencv-contrib 3.4.2 (the last with SURF) as well as under a present one.
+Runs under CPython 3.7 with opencv-contrib 3.4.2 (the last with SURF) and under recent versions.
 An array is {"shape": [...], "type": "f4" | "u1", "data": base64}. One thread.
 """
 
@@ -40,7 +40,7 @@ def keypoints(rows):
 
 
 def corners(request):
-    """Harris' corners with OpenCV's defaults, as many as asked for."""
+    """Harris corners with OpenCV's defaults, at most the requested number."""
     image = KEPT[request["image"]]
     options = dict(blockSize=request.get("block", 3), useHarrisDetector=request.get("harris", True), k=0.04)
     quality, distance = request.get("quality", 1e-4), request.get("distance", 4)
@@ -62,7 +62,7 @@ SURFS = {}
 
 
 def surf(request):
-    """SURF whose threshold leaves as many as asked for: found once an image, not timed."""
+    """SURF with the threshold that gives the requested number of points; determined once per image, not timed."""
     key = (request["image"], request["count"])
     if key not in SURFS:
         image = KEPT[request["image"]]
@@ -78,7 +78,7 @@ def described(found):
 
 
 def features(request):
-    """Detect and describe with one of OpenCV's own."""
+    """Detection and description by one of OpenCV's methods."""
     image, count, kind = KEPT[request["image"]], request["count"], request["kind"]
     if kind == "surf":
         method = surf(request)
@@ -174,20 +174,20 @@ def keep(request):
 
 
 def photograph(request):
-    """A photograph of scikit-image's wheel, grey, 8 bits; none is fetched from elsewhere."""
+    """A photograph of scikit-image's wheel, grey, 8 bits; nothing is downloaded."""
     import skimage
 
-    path = os.path.join(os.path.dirname(skimage._file), "data", request["name"])
+    path = os.path.join(os.path.dirname(skimage.__file__), "data", request["name"])
     return {"image": encode(cv2.imread(path, cv2.IMREAD_GRAYSCALE))}
 
 
 def picture(request):
-    """A picture from a file, grey, 8 bits."""
+    """An image from a file, grey, 8 bits."""
     return {"image": encode(cv2.imread(request["path"], cv2.IMREAD_GRAYSCALE))}
 
 
 def calibrate(request):
-    """Each camera by itself, then the rig; rows of x, y, z, u left, v left, u right, v right. RMS in pixels."""
+    """Calibration of both cameras, then of the rig; rows of x, y, z, u left, v left, u right, v right. RMS in pixels."""
     boards = [decode(board) for board in request["boards"]]
     space, left, right = ([np.ascontiguousarray(b[:, i:j]) for b in boards] for i, j in [(0, 3), (3, 5), (5, 7)])
     size = tuple(request["size"])
@@ -201,12 +201,12 @@ def calibrate(request):
 
 
 def versions(_):
-    return {"opencv": cv2._version, "python": sys.version.split()[0]}
+    return {"opencv": cv2.__version__, "python": sys.version.split()[0]}
 
 
-TIMED = {f._name: f for f in [
+TIMED = {f.__name__: f for f in [
     clahe, corner_sub_pix, corners, describe, fast, features, lucas_kanade, nearest_two, pair]}
-PLAIN = {f._name: f for f in [calibrate, keep, photograph, picture, versions]}
+PLAIN = {f.__name__: f for f in [calibrate, keep, photograph, picture, versions]}
 
 
 def answer(request):
@@ -226,6 +226,6 @@ def answer(request):
 for line in sys.stdin:
     try:
         reply = answer(json.loads(line))
-    except Exception as error:  # said to the bench, which says it to the person
-        reply = {"error": "%s: %s" % (type(error)._name, error)}
+    except Exception as error:  # reported to the bench, which prints it
+        reply = {"error": "%s: %s" % (type(error).__name__, error)}
     print(json.dumps(reply), flush=True)

@@ -1,24 +1,25 @@
-//! How often the same places are found again, and the right ones paired: ours beside OpenCV's, at equal counts.
+//! Repeatability of detectors and matching accuracy of descriptors, compared with OpenCV at equal numbers of points.
 //!
-//! `cargo bench -p seafix-vision --bench quality [-- PART-OF-A-NAME]`; what it needs is in the README beside.
+//! `cargo bench -p seafix-vision --bench quality [-- PART-OF-A-NAME]`; see the README in this folder for the
+//! requirements.
 //!
-//! Photographs of scikit-image's wheel lie on planes; a second image of each is made through a known
-//! homography (cubic convolution, 8 bits; the smaller image averages the area of its pixels). Every method
-//! gives its 1000 strongest points of each image (our Harris by default spreads them over the image, which costs
-//! repeatability; that row stands for itself). Points that the other image does not show are left out; n is
-//! the smaller number of those that remain. With points taken to the other image by the homography:
+//! Photographs of scikit-image's wheel lie on planes. A second image of each is rendered through a known homography
+//! (cubic convolution, 8 bits; a smaller image averages the area of its pixels). Every method gives its 1000 strongest
+//! points of each image; the default Harris detector, which spreads them over the image at the cost of repeatability,
+//! has a row of its own. Points outside the other image are excluded, and n is the smaller number of the remaining
+//! ones. Points are mapped to the other image by the homography:
 //!
-//! - *repeatability*: pairs of points, one of each image, within 1.5 px, nearest pairs first and no point in
-//!   two, over n (Mikolajczyk et al., *A comparison of affine region detectors*, IJCV 2005, with the distance of
-//!   points in place of the overlap of regions);
-//! - *matching score*: pairs that are each other's nearest by descriptor and within 3 px, over n (ibid.);
-//! - *matching accuracy*: the same, over all pairs that are each other's nearest by descriptor (HPatches;
-//!   Dusmanu et al., D2-Net, CVPR 2019), here at 3 px.
+//! - *repeatability*: the number of pairs of points, one of each image, within 1.5 px over n; nearest pairs first, each
+//!   point once (Mikolajczyk et al., *A comparison of affine region detectors*, IJCV 2005, with the distance of points
+//!   instead of the overlap of regions);
+//! - *matching score*: the number of mutual nearest neighbours by descriptor within 3 px over n (ibid.);
+//! - *matching accuracy*: the same number over that of all mutual nearest neighbours (HPatches; Dusmanu et al., D2-Net,
+//!   CVPR 2019), here at 3 px.
 //!
-//! Each is averaged over the photographs. Distances are Euclidean or Hamming, by one matcher for all methods.
-//! Under all of it stands the cosine between our SURF and OpenCV's at the same key points.
+//! Each is averaged over the photographs. Distances are Euclidean or Hamming, by one matcher for all methods. The last
+//! table gives the cosine between the SURF descriptors of Seafix and OpenCV at the same key points.
 
-#![allow(clippy::print_stdout, reason = "a bench prints")]
+#![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
 mod common;
 
@@ -33,11 +34,11 @@ use seafix_geometry::Pixel;
 use seafix_vision::{DESCRIPTORS, DETECTORS, Image, Keypoint};
 use serde_json::{Value, json};
 
-/// Points an image.
+/// The number of points of an image.
 const COUNT: usize = 1000;
-/// The weakest corner, relative to the strongest.
+/// The minimum response of a corner, relative to the strongest.
 const QUALITY: f64 = 1e-6;
-/// The shortest side of the images (px); smaller photographs are enlarged to it.
+/// The minimum of the images' shorter side (px); smaller photographs are enlarged.
 const SIDE: usize = 768;
 const PHOTOGRAPHS: [&str; 8] = [
     "astronaut.png",
@@ -50,14 +51,14 @@ const PHOTOGRAPHS: [&str; 8] = [
     "rocket.jpg",
 ];
 
-/// A second view.
+/// The generation of a second view.
 struct Change {
     name: &'static str,
-    /// Where it shows a pixel of the first.
+    /// The homography from the first image to the second.
     homography: fn([usize; 2]) -> Matrix3<f64>,
-    /// Places averaged along the side of a pixel.
+    /// The number of samples along the side of a pixel.
     samples: usize,
-    /// What happens to a grey value, with a normal deviate.
+    /// The change of a grey level, given a normal deviate.
     light: fn(f64, f64) -> f64,
 }
 
@@ -78,7 +79,7 @@ fn darker(value: f64, deviate: f64) -> f64 {
     255.0 * (value / 255.0).powf(1.5) + 5.0 * deviate
 }
 
-/// Turned by so many degrees and scaled about the middle.
+/// A rotation and scaling about the middle of the image.
 fn turned(size: [usize; 2], degrees: f64, scale: f64) -> Matrix3<f64> {
     let [cx, cy] = size.map(|n| 0.5 * (n - 1) as f64);
     let (sin, cos) = degrees.to_radians().sin_cos();
@@ -87,18 +88,18 @@ fn turned(size: [usize; 2], degrees: f64, scale: f64) -> Matrix3<f64> {
     middle * turn * Matrix3::new(1.0, 0.0, -cx, 0.0, 1.0, -cy, 0.0, 0.0, 1.0)
 }
 
-/// The plane turned by 40° about the vertical, its centre kept, as a camera of 1 width focal length sees it.
+/// A rotation of the plane by 40° about the vertical through its centre; the focal length is the image width.
 fn perspective(size: [usize; 2]) -> Matrix3<f64> {
     let [cx, cy] = size.map(|n| 0.5 * (n - 1) as f64);
     let f = size[0] as f64;
     let camera = Matrix3::new(f, 0.0, cx, 0.0, f, cy, 0.0, 0.0, 1.0);
     let (sin, cos) = 40.0_f64.to_radians().sin_cos();
-    // Points (x, y, 1) of the first view's plane z = 1, turned about the middle of that plane.
+    // Points (x, y, 1) of the first view's plane z = 1, rotated about the middle of that plane.
     let turn = Matrix3::new(cos, 0.0, 0.0, 0.0, 1.0, 0.0, -sin, 0.0, 1.0);
     camera * turn * camera.try_inverse().expect("a camera")
 }
 
-/// One way to get features.
+/// A source of features.
 enum Method {
     Ours {
         detector: Choice,
@@ -130,7 +131,7 @@ impl Peers {
     fn described(&mut self, keypoints: &[[f32; 5]], upright: bool, extended: bool) -> Value {
         let keypoints = floats(&[keypoints.len(), 5], keypoints.as_flattened());
         let request = json!({"do": "describe", "image": "image", "keypoints": keypoints});
-        let mut request = request.as_object().expect("made above").clone();
+        let mut request = request.as_object().expect("a JSON object").clone();
         request.extend([("upright".to_owned(), upright.into()), ("extended".to_owned(), extended.into())]);
         self.surf.ask(&request.into())
     }
@@ -158,7 +159,7 @@ impl Method {
     }
 }
 
-/// Name, the peer it is held against, and how; peers first, then those of ours that are listed.
+/// The name, the peer of the comparison, and the method; peers first, then the listed components of Seafix.
 fn methods() -> Vec<(&'static str, &'static str, Method)> {
     let peer = |variable, kind: &str, upright: bool| Method::Peer {
         variable,
@@ -169,7 +170,7 @@ fn methods() -> Vec<(&'static str, &'static str, Method)> {
         descriptor,
     };
     let named = Choice::named;
-    // Not the relative threshold but the budget decides, as it does for the peers.
+    // The maximum number limits the points, as in the peers, not the relative threshold.
     let corners = |name: &str| named(name).with("quality", QUALITY).with("selection", "strongest");
     let (own, own_turned) = (named("surf").with("scale", 0.0), named("surf").with("scale", 0.0).with("upright", false));
     let mut list = vec![
@@ -201,7 +202,7 @@ fn methods() -> Vec<(&'static str, &'static str, Method)> {
     list
 }
 
-/// Deviates of a normal distribution, the same in every run.
+/// Normal deviates with a fixed seed.
 struct Deviates(u64);
 
 impl Deviates {
@@ -218,15 +219,15 @@ impl Deviates {
 impl Change {
     fn image(&self, photograph: &Image) -> Image {
         let size = [photograph.width(), photograph.height()];
-        let from = (self.homography)(size).try_inverse().expect("a view of a plane");
+        let from = (self.homography)(size).try_inverse().expect("an invertible homography");
         let seen = render(photograph, size, &from, self.samples);
         let mut deviates = Deviates(1);
         let pixels = seen.pixels().iter().map(|&p| eight_bits((self.light)(f64::from(p), deviates.next())));
-        Image::new(size[0], size[1], pixels.collect()).expect("as many as there were")
+        Image::new(size[0], size[1], pixels.collect()).expect("width × height pixels")
     }
 }
 
-/// Enlarged to a shortest side of [`SIDE`].
+/// The photograph, enlarged to a shorter side of at least [`SIDE`].
 fn enlarged(photograph: Image) -> Image {
     let scale = SIDE as f64 / photograph.width().min(photograph.height()) as f64;
     if scale <= 1.0 {
@@ -241,8 +242,8 @@ fn enlarged(photograph: Image) -> Image {
 
 fn main() {
     let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
-    let Some(opencv) = Peer::from_env(OPENCV, "quality beside OpenCV, on scikit-image's photographs") else { return };
-    let Some(surf) = Peer::from_env(SURF, "quality beside OpenCV's SURF") else { return };
+    let Some(opencv) = Peer::from_env(OPENCV, "the comparison with OpenCV on photographs") else { return };
+    let Some(surf) = Peer::from_env(SURF, "the comparison with OpenCV's SURF") else { return };
     let mut peers = Peers { opencv, surf };
     println!("peers: {}; {}", peers.opencv.version, peers.surf.version);
     println!("{COUNT} points; photographs at least {SIDE} px high: {}", PHOTOGRAPHS.join(", "));
@@ -285,20 +286,20 @@ fn main() {
     cosines(&photographs, &mut peers);
 }
 
-/// Whether ours are within 0.02 of the peer's, or above.
+/// Whether the scores are at most 0.02 below the peer's.
 fn verdict(ours: &[f64; 3], peer: &[f64; 3]) -> String {
     let behind = ours.iter().zip(peer).map(|(ours, peer)| peer - ours).fold(f64::NEG_INFINITY, f64::max);
     if behind <= 0.02 { "met".to_owned() } else { format!("MISSED by {:.3}", behind - 0.02) }
 }
 
-/// One comparison of SURF at the key points that OpenCV finds.
+/// One comparison of SURF descriptors at OpenCV's key points.
 struct Agreement {
     name: &'static str,
     upright: bool,
-    /// Its Harris corners instead of its Hessian points.
+    /// Whether to use OpenCV's Harris corners instead of its Hessian points.
     corners: bool,
     extended: bool,
-    /// Ours stands where OpenCV's window does, which it rounds to whole pixels.
+    /// Whether to use the position of OpenCV's window, which is rounded to integer pixels.
     rounded: bool,
 }
 
@@ -310,15 +311,15 @@ const AGREEMENTS: [Agreement; 6] = {
         Agreement { name: "upright, Harris corners", corners: true, ..PLAIN },
         Agreement { name: "rotated, Hessian points", upright: false, ..PLAIN },
         Agreement { name: "128, upright, Hessian points", extended: true, ..PLAIN },
-        Agreement { name: "128, the same on whole pixels", extended: true, rounded: true, ..PLAIN },
+        Agreement { name: "128, upright, at integer pixels", extended: true, rounded: true, ..PLAIN },
         Agreement { name: "128, rotated, Hessian points", extended: true, upright: false, ..PLAIN },
     ]
 };
 
-/// The cosine between our SURF and OpenCV's at the key points that OpenCV finds.
+/// Prints the cosines between the SURF descriptors of Seafix and OpenCV at OpenCV's key points.
 ///
-/// OpenCV's window is rounded to whole pixels where it stands upright, and its means to whole grey levels. That moves
-/// 64 numbers by little; of 128 it turns the sign of weak derivatives, which then count elsewhere.
+/// OpenCV rounds its upright window to integer pixels and its means to integer grey levels. The effect is small on 64
+/// numbers; with 128 it changes the sign of weak derivatives, which then count in another sum.
 fn cosines(photographs: &[Image], peers: &mut Peers) {
     println!(
         "\n{:<32} {:>13} {:>15} {:>18} {:>9} {:>8}",
@@ -337,7 +338,7 @@ fn cosines(photographs: &[Image], peers: &mut Peers) {
             let (given, theirs) = (rows(&answer), numbers(&answer["descriptors"]));
             let given: Vec<Keypoint> = given.iter().map(|row| keypoint(row, rounded)).collect();
             let described = descriptor.describe(image, &given);
-            let ours = described.numbers().expect("SURF is numbers");
+            let ours = described.numbers().expect("SURF descriptors are numbers");
             let length = ours.length();
             cosines.extend((0..given.len()).map(|i| {
                 let theirs = &theirs[length * i..][..length];
@@ -354,7 +355,7 @@ fn cosines(photographs: &[Image], peers: &mut Peers) {
     }
 }
 
-/// Ours for a row of x, y, size, angle, response; `rounded`: at the middle of OpenCV's upright window.
+/// The key point of a row of x, y, size, angle, response; with `rounded` at the centre of OpenCV's upright window.
 fn keypoint(row: &[f32; 5], rounded: bool) -> Keypoint {
     // A size of 9 px is the filter of scale 1.2.
     let scale = row[2] * 1.2 / 9.0;
@@ -366,7 +367,9 @@ fn keypoint(row: &[f32; 5], rounded: bool) -> Keypoint {
     Keypoint { at: Pixel { u: at[0], v: at[1] }, response: row[4], scale }
 }
 
-/// OpenCV takes its upright window with x down and −y to the right: our row r, column c, dx, dy are its row c,
+/// The permutation of OpenCV's numbers into the order of Seafix.
+///
+/// OpenCV takes its upright window with x down and −y to the right: row r, column c, dx, dy of Seafix are its row c,
 /// column 3 − r, dy, −dx.
 fn as_ours(theirs: &[f32]) -> Vec<f32> {
     let parts = theirs.len() / 16;
@@ -375,7 +378,7 @@ fn as_ours(theirs: &[f32]) -> Vec<f32> {
         let s = &theirs[parts * (4 * c + 3 - r)..][..parts];
         match s {
             [x, y, xs, ys] => vec![*y, -x, *ys, *xs],
-            // By the sign of the other derivative: theirs of y by that of x, which is ours of x by that of −y.
+            // Sums are split by the sign of the other derivative: theirs of y by that of x, ours of x by that of −y.
             s => vec![s[6], s[7], s[4], s[5], -s[0], s[1], -s[2], s[3]],
         }
     };

@@ -1,12 +1,12 @@
-//! Each stage of the front end beside its peer: both programs in one run, in turns, on the same images.
+//! Run time of each stage of the front end, compared with its peer on the same images.
 //!
-//! `cargo bench -p seafix-vision --bench speed [-- PART-OF-A-NAME]`; what it needs is in the README beside.
-//! Times are the least of all turns, with the median in brackets: the machine may be busy, the least is what
-//! the program can do. On one thread they are processor time; on two, by the clock, as is the gain. Ours run
-//! warm, as in a dive; allocations are counted after two frames, on one thread and on two.
-//! Without a peer, ours are timed alone.
+//! `cargo bench -p seafix-vision --bench speed [-- PART-OF-A-NAME]`; see the README in this folder for the
+//! requirements. Both programs run in turns. Times are minima over all turns, with the median in brackets, since other
+//! programs may disturb a turn. One thread is measured in processor time; two threads, and the gain, by the clock.
+//! Seafix runs warm, as in a dive; allocations are counted after two frames, on one thread and on two. Without a peer
+//! Seafix is timed alone.
 
-#![allow(clippy::print_stdout, reason = "a bench prints")]
+#![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
 mod common;
 
@@ -26,29 +26,29 @@ use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 #[global_allocator]
 static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Turns that each program takes.
+/// The number of turns of each program.
 const TURNS: usize = 9;
-/// Least time of a turn (ms).
+/// The minimum time of a turn (ms).
 const TURN_MS: f64 = 30.0;
 
 fn main() {
     let filter = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
-    let mut opencv = Peer::from_env(OPENCV, "all comparisons with OpenCV 5");
-    let mut surf = Peer::from_env(SURF, "all comparisons with OpenCV's SURF");
+    let mut opencv = Peer::from_env(OPENCV, "the comparison with OpenCV 5");
+    let mut surf = Peer::from_env(SURF, "the comparison with OpenCV's SURF");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
 
     for peer in [&opencv, &surf].into_iter().flatten() {
         println!("peer: {}, one thread", peer.version);
     }
     let base = opencv.as_mut().map_or_else(|| stones([512, 512]), |peer| peer.photograph("gravel.png"));
-    let shown = if opencv.is_some() { "scikit-image's gravel.png" } else { "made stones" };
-    println!("images: a tilted plane that carries {shown}, 8 bit, both eyes; load {}", load());
+    let shown = if opencv.is_some() { "scikit-image's gravel.png" } else { "synthetic stones" };
+    println!("images: a tilted plane with {shown}, 8 bit, left and right; load {}", load());
     for size in [[1024, 768], [1600, 1200]] {
         let scene = Scene::new(&base, size, [&mut opencv, &mut surf]);
-        println!("\n{}×{}: least (median) ms", size[0], size[1]);
+        println!("\n{}×{}: minimum (median) ms", size[0], size[1]);
         println!(
             "{:<40} {:>17} {:>17} {:>7} {:>17} {:>5} {:>7}  target",
-            "stage", "peer", "ours, 1 thread", "ratio", "ours, 2 threads", "gain", "allocs"
+            "stage", "peer", "Seafix, 1 thread", "ratio", "Seafix, 2 threads", "gain", "allocs"
         );
         for mut stage in scene.stages().into_iter().filter(|stage| stage.name.contains(&filter)) {
             let peer = match stage.asks {
@@ -61,7 +61,7 @@ fn main() {
     println!("\nload {}", load());
 }
 
-/// Processor time on one thread, of ours on one and on two by the clock (ms).
+/// The processor time on one thread, then Seafix's times on one and on two threads by the clock (ms).
 #[derive(Default)]
 struct Times {
     peer: Vec<f64>,
@@ -79,7 +79,7 @@ fn measure(stage: &mut Stage<'_>, mut peer: Option<&mut Peer>, pool: &rayon::Thr
             change.allocations + change.reallocations
         })
     });
-    // How often to repeat a run in a turn, from its first.
+    // The number of repetitions in a turn, from the time of the first run.
     let repeats = |first: f64| (TURN_MS / first).clamp(1.0, 50.0) as usize;
     let [mut of_peer, mut of_ours] = [1; 2];
     let mut times = Times::default();
@@ -154,7 +154,7 @@ impl std::fmt::Display for Summary {
     }
 }
 
-/// How many processes want a processor, over the last minute.
+/// The load average of the last minute.
 fn load() -> String {
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let processors = std::thread::available_parallelism().map_or(1, usize::from);

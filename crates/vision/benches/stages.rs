@@ -1,7 +1,7 @@
-//! How long each component takes, by the registries: a new one is timed the day it is listed.
+//! Run time of each registered component, with new ones included automatically.
 //!
-//! Images of 1024×768, everything at its defaults, warm, on one thread:
-//! `cargo bench -p seafix-vision --bench stages`.
+//! Images have 1024×768 px, settings are the defaults, and the components run warm on one thread: `cargo bench -p
+//! seafix-vision --bench stages`.
 
 mod common;
 
@@ -14,7 +14,7 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, Descriptors, FILTERS, MATCHERS, View
 
 fn each<T: ?Sized>(registry: &'static Registry<T>, mut work: impl FnMut(&str, &T)) {
     for name in registry.names() {
-        work(name, &registry.build(&Choice::named(name)).expect("the defaults are settings"));
+        work(name, &registry.build(&Choice::named(name)).expect("valid defaults"));
     }
 }
 
@@ -22,13 +22,13 @@ fn stages(criterion: &mut Criterion) {
     let size = [1024, 768];
     let [left, right] = stereo(&stones(size), size, 1.0);
     let rig = rig(size);
-    let detector = DETECTORS.build(&Choice::named("harris")).expect("it is listed");
+    let detector = DETECTORS.build(&Choice::named("harris")).expect("a registered detector");
     let keypoints = [&left, &right].map(|image| detector.detect(image));
 
     let mut group = criterion.benchmark_group("filter");
     each(&FILTERS, |name, filter| {
         let (mut work, mut image) = (Workspace::default(), left.clone());
-        // The same image each time: what a filter leaves would be another one.
+        // The same image each time, since a filter changes its image.
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 image.copy_from(&left);

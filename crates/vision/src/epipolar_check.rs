@@ -1,27 +1,27 @@
-//! Whether two images were taken by the rig that they are said to be.
+//! The check of a rig's calibration against a pair of images.
 
 use seafix_geometry::{StereoPixels, StereoRig};
 
 use crate::{Descriptor, Detector, Harris, Image, Matcher, MutualRatio, Surf, View, Workspace};
 
-/// How far corners that look alike in both images lie off their epipolar lines, matched without the rig.
+/// The distances of matches from the epipolar lines of a rig; the rig takes no part in the matching.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EpipolarCheck {
-    /// Corners that look alike.
+    /// The number of matches.
     pub matches: usize,
-    /// Those of them that lie within [`NEAR`](Self::NEAR) of their epipolar line.
+    /// The number of matches within [`NEAR`](Self::NEAR) of their epipolar lines.
     pub near: usize,
-    /// Root mean square of the distances to the epipolar lines, of the nearer three quarters: some matches are false (px).
+    /// The RMS distance (px) to the epipolar lines of the nearest three quarters of matches; the rest may be false.
     pub rms_px: f64,
 }
 
 impl EpipolarCheck {
-    /// What a good calibration leaves, with room (px).
+    /// The largest distance (px) that a good calibration leaves, with a margin.
     pub const NEAR: f64 = 3.0;
-    /// Fewer matches say nothing.
+    /// The minimum number of matches for a decision.
     const FEW: usize = 30;
 
-    /// What two images say by their corners, found and described with the defaults.
+    /// The check of a pair of images, with the default detector and descriptor.
     pub fn of_images(left: &Image, right: &Image, rig: &StereoRig) -> Self {
         let seen = repeated_patterns(left, right, rig);
         let mut off: Vec<f64> = seen.iter().filter_map(|seen| rig.epipolar_distance(seen)).collect();
@@ -35,13 +35,16 @@ impl EpipolarCheck {
         }
     }
 
-    /// Whether the images contradict the rig: fewer than a quarter of at least thirty matches lie near their epipolar lines.
+    /// Whether the images contradict the rig: fewer than a quarter of at least 30 matches lie near their epipolar
+    /// lines.
     pub fn contradict(&self) -> bool {
         self.matches >= Self::FEW && 4 * self.near < self.matches
     }
 }
 
-/// Corners that look alike in both images, found and described with the defaults; the rig plays no part in which.
+/// The matches of two images by appearance alone, with the default detector and descriptor.
+///
+/// The rig takes no part in the matching.
 pub fn repeated_patterns(left: &Image, right: &Image, rig: &StereoRig) -> Vec<StereoPixels> {
     let corners = [left, right].map(|image| Harris::default().detect(image));
     let described = [(left, &corners[0]), (right, &corners[1])].map(|(image, at)| Surf::default().describe(image, at));

@@ -1,4 +1,4 @@
-//! From two images to a cloud, one line a stage.
+//! The front end, which runs all stages from two images to a cloud.
 
 use std::time::Instant;
 
@@ -9,48 +9,48 @@ use crate::{
     Triangulator, UncertainPixel, View, Workspace,
 };
 
-/// The stages between two images and a cloud.
+/// The stages from a pair of images to a cloud.
 #[derive(Debug)]
 pub struct FrontEnd {
-    /// Prepare the images, one after the other; often none.
+    /// The filters, applied to each image in order; often none.
     pub filters: Vec<Box<dyn Filter>>,
-    /// Finds key points in each image.
+    /// The detector of key points.
     pub detector: Box<dyn Detector>,
-    /// Says where exactly the corners are.
+    /// The locator, which moves key points to exact corners.
     pub locator: Box<dyn Locator>,
-    /// Describes their surroundings, if the matcher compares that.
+    /// The descriptor, for matchers that compare descriptors.
     pub descriptor: Box<dyn Descriptor>,
-    /// Pairs left with right.
+    /// The matcher of left and right key points.
     pub matcher: Box<dyn Matcher>,
-    /// Says more exactly where the right image shows each left place.
+    /// The refinement of each match to a fraction of a pixel.
     pub refinement: Box<dyn Refinement>,
-    /// Turns pairs into points.
+    /// The triangulator of the refined pairs.
     pub triangulator: Box<dyn Triangulator>,
 }
 
-/// What the front end made of one pair of images, and the memory it made it in.
+/// The front end's results for one pair of images, with its working memory.
 ///
-/// Used again for the next pair it allocates nothing that an earlier pair did not need.
+/// Reuse it for the next pair: it then allocates only if that pair needs more memory than all earlier ones.
 #[derive(Debug, Default)]
 pub struct FrontEndOutput {
-    /// Left and right.
+    /// The parts of the left and the right image.
     sides: [SideOutput; 2],
-    /// The images as the filters leave them; where there is no filter the images are looked at themselves.
+    /// The filtered images; `None` without filters, since the stages then read the images themselves.
     filtered: [Option<Image>; 2],
     work: Workspace,
-    /// Left key points and where the right image shows them.
+    /// The matches of left key points and their pixels in the right image.
     pub matches: Vec<Match>,
-    /// The same, with how well each place is known.
+    /// The matches with the covariance of both pixels.
     pub pairs: Vec<Pair>,
-    /// Those of them that are kept, aligned, with their covariance.
+    /// The refined and accepted pairs with their covariance.
     pub pixels: Vec<UncertainPixels>,
-    /// The cloud.
+    /// The triangulated points.
     pub cloud: Vec<MeasuredPoint>,
-    /// How long each stage took.
+    /// The run time of each stage.
     pub times: StageTimes,
 }
 
-/// One image's part.
+/// The part of one image.
 #[derive(Debug, Default)]
 struct SideOutput {
     work: Workspace,
@@ -59,27 +59,27 @@ struct SideOutput {
     descriptors: Descriptors,
 }
 
-/// Milliseconds that each stage took, both images together.
+/// The run times of the stages (ms), both images together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StageTimes {
-    /// Filters.
+    /// The filters' time (ms).
     pub filter_ms: f64,
-    /// Key points.
+    /// The detector's time (ms).
     pub detect_ms: f64,
-    /// Exact corners.
+    /// The locator's time (ms).
     pub locate_ms: f64,
-    /// Descriptors.
+    /// The descriptor's time (ms).
     pub describe_ms: f64,
-    /// Matches.
+    /// The matcher's time (ms).
     pub match_ms: f64,
-    /// Alignment between the views.
+    /// The refinement's time (ms).
     pub refine_ms: f64,
-    /// Triangulation.
+    /// The triangulator's time (ms).
     pub triangulate_ms: f64,
 }
 
 impl StageTimes {
-    /// Each stage by its name, in the order of the work.
+    /// The name and the time (ms) of each stage, in order of execution.
     pub fn stages(&self) -> Vec<(&'static str, f64)> {
         let Self { filter_ms, detect_ms, locate_ms, describe_ms, match_ms, refine_ms, triangulate_ms } = *self;
         vec![
@@ -95,30 +95,30 @@ impl StageTimes {
 }
 
 impl FrontEndOutput {
-    /// An empty one; `threads` says who works.
+    /// An empty output; `threads` states whether the stages share the rayon pool.
     pub fn new(threads: Threads) -> Self {
         let side = || SideOutput { work: Workspace::new(threads), ..SideOutput::default() };
         Self { sides: [side(), side()], work: Workspace::new(threads), ..Self::default() }
     }
 
-    /// The key points of the left and of the right image.
+    /// The key points of the left and the right image.
     pub fn keypoints(&self) -> [&[Keypoint]; 2] {
         [&self.sides[0].keypoints, &self.sides[1].keypoints]
     }
 
-    /// Their descriptors, in the same order; of no meaning where the matcher compares none.
+    /// The descriptors in the order of the key points; meaningless if the matcher compares none.
     pub fn descriptors(&self) -> [&Descriptors; 2] {
         [&self.sides[0].descriptors, &self.sides[1].descriptors]
     }
 
-    /// The images as the filters leave them; `None` where there is no filter.
+    /// The filtered images; `None` without filters.
     pub fn filtered(&self) -> [Option<&Image>; 2] {
         [self.filtered[0].as_ref(), self.filtered[1].as_ref()]
     }
 }
 
 impl FrontEnd {
-    /// Replaces what is in `output` by what these two images show.
+    /// Replaces the contents of `output` by the results for this pair of images.
     pub fn run(&self, left: &Image, right: &Image, rig: &StereoRig, output: &mut FrontEndOutput) {
         let FrontEndOutput { sides: [l, r], filtered, work, matches, pairs, pixels, cloud, times } = output;
         let [clear_left, clear_right] = filtered;
@@ -161,7 +161,7 @@ impl FrontEnd {
             };
             pairs.extend(matches.iter().map(pair));
             self.refinement.refine_into(pairs, left.image, right.image, rig, work, pixels);
-            // Of the pairs, in their order, some are left out.
+            // The refinement keeps the order of the pairs and drops some.
             let mut rest = matches.iter().zip(pairs.iter());
             for seen in pixels.iter_mut() {
                 let own = rest.find(|(_, pair)| pair.left.at == seen.at.left);
@@ -173,8 +173,9 @@ impl FrontEnd {
         times.triangulate_ms = timed(|| self.triangulator.triangulate_into(pixels, rig, cloud));
     }
 
-    /// Moves the key points of `image` to the corners they are near. Key points of one corner are one: the
-    /// strongest, which comes first.
+    /// Moves the key points of `image` to the nearest corners and merges those of one corner.
+    ///
+    /// The strongest key point of a corner comes first and is kept.
     fn locate(&self, image: &Image, side: &mut SideOutput) {
         let SideOutput { work, keypoints, located, .. } = side;
         self.locator.locate_into(image, keypoints, work, located);
@@ -194,7 +195,7 @@ impl FrontEnd {
         located.truncate(kept);
     }
 
-    /// `image` as the filters leave it, in the memory of `kept`.
+    /// The filtered `image`, written into the memory of `kept`.
     fn filter<'a>(&self, image: &Image, kept: &'a mut Option<Image>, work: &mut Workspace) -> &'a Image {
         let kept = match kept {
             Some(kept) => {
@@ -208,7 +209,7 @@ impl FrontEnd {
     }
 }
 
-/// Adds an error of standard deviation `off` (px) that both images share.
+/// Adds an error of standard deviation `off` (px) that is common to both images.
 fn off_alike(seen: &mut UncertainPixels, off: f64) {
     for row in 0..4 {
         seen.covariance[(row, row)] += off * off;
@@ -216,7 +217,7 @@ fn off_alike(seen: &mut UncertainPixels, off: f64) {
     }
 }
 
-/// Corners nearer to each other than this are one (px).
+/// The distance (px) below which two corners are the same.
 const SAME: f64 = 1.0;
 
 fn timed(work: impl FnOnce()) -> f64 {

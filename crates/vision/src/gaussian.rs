@@ -1,18 +1,19 @@
-//! The sampled Gaussian, in the same bits on every platform, and images smoothed with it.
+//! The sampled Gaussian and Gaussian smoothing, bit-identical on every platform.
 
 use multiversion::multiversion;
 
 use crate::Threads;
 
-/// One half of a sampled Gaussian of standard deviation `sigma` (px): the weight of the centre, then
-/// of each step away from it; the whole kernel, both halves, sums to one. It ends at 3 `sigma`.
+/// One half of a sampled Gaussian of standard deviation `sigma` (px), cut off at 3 `sigma`.
+///
+/// The weight of the centre comes first, then one weight for each step outwards. The complete kernel sums to one.
 pub(crate) fn half_kernel(sigma: f64) -> Vec<f32> {
     let mut kernel = Vec::new();
     half_kernel_into(sigma, 3.0, &mut kernel);
     kernel
 }
 
-/// Replaces `kernel` by one half of a sampled Gaussian that ends at `cut` times `sigma`.
+/// Replaces `kernel` by one half of a sampled Gaussian that is cut off at `cut` times `sigma`.
 pub(crate) fn half_kernel_into(sigma: f64, cut: f64, kernel: &mut Vec<f32>) {
     let radius = libm::ceil(cut * sigma.max(0.0)) as usize;
     let weight = |i: usize| {
@@ -24,15 +25,14 @@ pub(crate) fn half_kernel_into(sigma: f64, cut: f64, kernel: &mut Vec<f32>) {
     kernel.extend((0..=radius).map(|i| (weight(i) / sum) as f32));
 }
 
-/// Rows that one thread smooths at a time.
+/// The number of rows that one thread smooths at a time.
 const BAND: usize = 32;
-/// Pixels whose sums are kept in registers at a time.
+/// The number of pixels whose sums are kept in registers at a time.
 const BLOCK: usize = 64;
 
-/// Replaces `out` by `source`, rows of `width` pixels, smoothed along both axes with a symmetric
-/// kernel of which `kernel` is one half. Beyond the border the nearest pixel is repeated.
+/// Replaces `out` by `source` (rows of `width` pixels), smoothed along both axes with a symmetric kernel.
 ///
-/// `rows` is scratch.
+/// `kernel` is one half of it. The nearest pixel is repeated beyond the border. `rows` is scratch.
 pub(crate) fn smooth_into(
     source: &[f32],
     width: usize,
@@ -51,7 +51,7 @@ pub(crate) fn smooth_into(
     });
 }
 
-/// Row `y`: down the columns into `padded`, then along the row.
+/// Smooths row `y`: down the columns into `padded`, then along the row.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn smooth_row(source: &[f32], width: usize, y: usize, kernel: &[f32], padded: &mut [f32], out: &mut [f32]) {
     let reach = kernel.len() - 1;
@@ -80,8 +80,9 @@ fn smooth_row(source: &[f32], width: usize, y: usize, kernel: &[f32], padded: &m
     );
 }
 
-/// Calls `work(x, false)` for blocks from `x` on that cover `width`, the last perhaps again over pixels
-/// of the one before; `work(x, true)` for single pixels where the row is narrower than a block.
+/// Calls `work(x, false)` for blocks that cover `width` from `x` on, and `work(x, true)` for single pixels.
+///
+/// The last block may overlap the one before. Single pixels occur if the row is narrower than a block.
 #[inline(always)]
 fn blocks(width: usize, mut work: impl FnMut(usize, bool)) {
     if width < BLOCK {
@@ -91,7 +92,7 @@ fn blocks(width: usize, mut work: impl FnMut(usize, bool)) {
     }
 }
 
-/// Σ kernel over both sides, for the `N` pixels from `x` on.
+/// The symmetric sum Σ k_i (p_{−i} + p_i) for the `N` pixels from `x` on.
 #[inline(always)]
 fn weigh<'a, const N: usize>(
     kernel: &[f32],
@@ -143,7 +144,7 @@ mod tests {
             let out = smooth(Threads::One);
             assert_eq!(smooth(Threads::Pool), out);
             let weight = |a: usize, b: usize, n: usize| {
-                // Along an axis of one pixel everything stays in that pixel.
+                // An axis of one pixel is not smoothed.
                 if n == 1 { 1.0 } else { kernel.get(a.abs_diff(b)).copied().unwrap_or(0.0) }
             };
             for (i, value) in out.iter().enumerate() {

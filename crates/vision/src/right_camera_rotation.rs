@@ -1,50 +1,57 @@
-//! A rig turned to where its images say that it stands.
+//! The correction of the right camera's rotation from matches.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 use seafix_geometry::{StereoPixels, StereoRig};
 
-/// A rig whose right camera is turned so that what looks alike in both images lies on its epipolar lines.
+/// A rig whose right camera is rotated so that matches lie on their epipolar lines.
 ///
-/// A housing that was opened, a bracket that has bent or a calibration made in the air leave points off their lines by pixels, and a
-/// matcher that seeks along the lines finds nothing. Two angles are found: about the baseline, which moves all points off
-/// their lines alike, and about the right camera's line of sight. The least Σ ρ(e), e the signed Sampson distance
-/// ([`StereoRig::epipolar_offset`]) of each pair and ρ Geman and McClure's loss, whose width shrinks from 32 px to 1 (graduated
-/// non-convexity): false pairs play no part. A turn about the third axis changes depths and hardly moves a point off its
-/// line, nor do a wrong focal length and a wrong baseline: those stay as they were given, and with them an error of scale.
+/// An opened housing, a bent bracket or a calibration in air shifts points off their epipolar lines by pixels; a
+/// matcher that searches along the lines then finds nothing.
 ///
-/// Source: Zhang, *Determining the epipolar geometry and its uncertainty*, IJCV 1998; Black and Rangarajan, *On the unification of
-/// line processes, outlier rejection, and robust statistics*, IJCV 1996 (the loss, and how it is narrowed).
+/// Two angles are estimated: about the baseline, which shifts all points alike, and about the right camera's optical
+/// axis. They minimise Σ ρ(e). e is the signed Sampson distance ([`StereoRig::epipolar_offset`]) of a pair, ρ the loss
+/// of Geman and McClure, whose width shrinks from 32 px to 1 px (graduated non-convexity), so that false pairs have no
+/// influence.
+///
+/// Limits: a rotation about the third axis changes depths and hardly moves a point off its line, and so do a wrong
+/// focal length and a wrong baseline. They keep their given values, and the scale error that they cause remains.
+///
+/// Source: Zhang, *Determining the epipolar geometry and its uncertainty*, IJCV 1998; Black and Rangarajan, *On the
+/// unification of line processes, outlier rejection, and robust statistics*, IJCV 1996 (the loss and its narrowing).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RightCameraRotation {
-    /// The rig as the images have it.
+    /// The corrected rig.
     pub rig: StereoRig,
-    /// By what the right camera was turned: about the baseline and about its line of sight (rad).
+    /// The rotation of the right camera about the baseline and about its optical axis (rad).
     pub turn: [f64; 2],
-    /// Pairs that agree, within [`NEAR`](Self::NEAR) of their lines as they are now.
+    /// The number of pairs within [`NEAR`](Self::NEAR) of their epipolar lines after the correction.
     pub agree: usize,
-    /// Pairs that were given and lie within the lens model.
+    /// The number of given pairs inside the range of the lens model.
     pub pairs: usize,
-    /// The median distance to their epipolar lines of those that agree, with the rig as it was given (px).
+    /// The median distance (px) of the agreeing pairs to their epipolar lines with the given rig.
     pub given_px: f64,
-    /// The same with the turned one (px).
+    /// The median distance (px) of the agreeing pairs to their epipolar lines with the corrected rig.
     pub left_px: f64,
 }
 
-/// From this distance to the lines on a rig is worth turning, a third of what matchers allow: .15° about the line of sight leave .4 px,
-/// and an error of scale of 1.7 % (px).
+/// The minimum median distance (px) for a correction, a third of the matchers' tolerance.
+///
+/// 0.15° about the optical axis cause 0.4 px, and a scale error of 1.7 %.
 const WORTH: f64 = 0.3;
-/// No bracket is bent by more (rad).
+/// The largest plausible rotation of a bent bracket (rad).
 const MAX: f64 = 0.05;
-/// Fewer pairs say nothing.
+/// The minimum number of pairs.
 const FEW: usize = 50;
 
 impl RightCameraRotation {
-    /// A pair this near to its line agrees (px).
+    /// The distance (px) to the epipolar line below which a pair agrees.
     pub const NEAR: f64 = 1.5;
 
-    /// The rig as `seen` has it, pairs that look alike ([`repeated_patterns`](crate::repeated_patterns)), best of several images. `None` where they lie
-    /// on their lines well enough as they are, where no turn brings a third of them there, and where it does not at least
-    /// halve the distance of those that agree.
+    /// The correction of `rig` from matches by appearance ([`repeated_patterns`](crate::repeated_patterns)), best of
+    /// several images.
+    ///
+    /// `None` if the given rig fits well enough, if no rotation brings a third of the pairs to their lines, or if the
+    /// correction does not at least halve the median distance of the agreeing pairs.
     pub fn of(seen: &[StereoPixels], rig: &StereoRig) -> Option<Self> {
         let turned = |turn: &Vector2<f64>| rig.with_right_turned(&(axes(rig)[0] * turn.x + axes(rig)[1] * turn.y));
         let seen: Vec<&StereoPixels> = seen.iter().filter(|seen| rig.epipolar_offset(seen).is_some()).collect();
@@ -80,12 +87,12 @@ impl RightCameraRotation {
     }
 }
 
-/// The baseline and the line of sight, in the right camera's frame.
+/// The directions of the baseline and of the optical axis in the right camera's frame.
 fn axes(rig: &StereoRig) -> [Vector3<f64>; 2] {
     [rig.right_from_left().translation() / rig.baseline(), Vector3::z()]
 }
 
-/// One step of weighted least squares, w = (s² / (s² + e²))² for a loss of width s.
+/// One step of iteratively reweighted least squares, w = (s² / (s² + e²))² for a loss of width s.
 fn step(
     off: &impl Fn(&StereoRig) -> Vec<f64>,
     turned: &impl Fn(&Vector2<f64>) -> StereoRig,
@@ -111,13 +118,13 @@ mod tests {
     use nalgebra::UnitQuaternion;
     use seafix_geometry::{Pinhole, Pixel, Point, Transform};
 
-    /// A rig with a strong lens, its right camera `step` (m) away.
+    /// A rig with strong lens distortion and its right camera displaced by `step` (m).
     fn rig(step: Vector3<f64>) -> StereoRig {
         let camera = Pinhole::new([1360, 1024], [1100.0, 1100.0], [679.5, 511.5], &[-0.25, 0.08, 0.0, 0.0]).unwrap();
         StereoRig::new(camera, camera, Transform::new(UnitQuaternion::identity(), -step)).unwrap()
     }
 
-    /// What `rig` sees of points 1 to 4 m away, a third of a pixel off, and as many pairs again that are none.
+    /// The pixels of points 1 to 4 m away with noise of a third of a pixel, and `false_fraction` false pairs.
     fn seen(rig: &StereoRig, false_fraction: f64) -> Vec<StereoPixels> {
         let mut state = 5_u32;
         let mut next = || {
@@ -137,10 +144,10 @@ mod tests {
         all
     }
 
-    /// A camera turned by a tenth to half a degree is found again, beside the other or above it, half of the pairs false:
-    /// to a hundredth of a degree, and about the third axis, which pairs hardly tell, nothing is made up.
+    /// A rotation of 0.1 to 0.5° is recovered to 0.01°, beside or above the left camera, with half of the pairs false.
     ///
-    /// Seen to fail with squares in place of the loss.
+    /// Nothing is invented about the third axis, which pairs hardly determine. Seen to fail with squares in place of
+    /// the robust loss.
     #[test]
     fn a_turned_camera_is_found_again() {
         for step in [Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.0, -0.2, 0.01)] {
@@ -159,9 +166,9 @@ mod tests {
         }
     }
 
-    /// What lies on its lines is left alone; so is a rig that is another's, and one of which all pairs are false.
+    /// A rig that fits stays unchanged, and so does a rig of other images or with false pairs only.
     ///
-    /// Seen to fail when a turn is taken that mends nothing, and when a twentieth of the pairs is enough.
+    /// Seen to fail if a correction without improvement is accepted, and if a twentieth of the pairs suffices.
     #[test]
     fn a_rig_that_fits_or_does_not_is_left_as_it_is() {
         let fits = rig(Vector3::new(0.1, 0.0, 0.0));

@@ -7,41 +7,42 @@ use crate::{
     gaussian::{half_kernel_into, smooth_into},
 };
 
-/// Levels from one octave to the next: Lowe found the most repeatable extrema with three.
+/// The number of levels from one octave to the next; Lowe found the most repeatable extrema with three.
 pub(crate) const INTERVALS: usize = 3;
-/// Levels kept of an octave: the three and one more either side have differences around them.
+/// The number of levels of an octave: differences are needed one level beyond the three on either side.
 pub(crate) const LEVELS: usize = INTERVALS + 3;
-/// Standard deviation of an octave's first level (px of the octave).
+/// The standard deviation of an octave's first level (px of the octave).
 const SIGMA: f64 = 1.6;
-/// The blur that an image has before anything is done (px).
+/// The assumed blur of an image before any smoothing (px).
 const IMAGE_SIGMA: f64 = 0.5;
-/// Where the Gaussians end (standard deviations).
+/// The cut-off of the Gaussians (standard deviations).
 const CUT: f64 = 4.0;
-/// No octave is smaller (px).
+/// The minimum side of an octave (px).
 const MIN_SIDE: usize = 16;
 
-/// An image under Gaussians of growing width, at half the resolution whenever the width has doubled.
+/// The Gaussian scale space of an image: Gaussians of growing width, at half the resolution after each doubling.
 ///
-/// Level l of octave o has the standard deviation 1.6 · 2^(o + l/3) px of the image. Octave 0 has the
-/// image's pixels, octave −1 twice as many along each side. Pixel (x, y) of octave o lies at
-/// (x, y) · 2^o in the image.
+/// Level l of octave o has the standard deviation 1.6 · 2^(o + l/3) px of the image. Octave 0 has the image's pixels,
+/// octave −1 twice as many along each side. Pixel (x, y) of octave o lies at (x, y) · 2^o in the image.
 ///
-/// Levels are made when they are first asked for and kept: a descriptor that follows the detector on
-/// the same image finds them. They depend on the image alone. Octaves of more than [`MAX_FULL`] pixels are not kept but
-/// made again in strips of rows ([`sweep`](Self::sweep)), so that 64 Mpx take no 7 GB: below, about 32
-/// bytes a pixel are held, 130 with octave −1.
+/// Levels are computed on first use and kept, so a descriptor reuses the levels of the detector on the same image. They
+/// depend on the image alone.
+///
+/// Octaves of more than [`MAX_FULL`] pixels are not kept; they are computed anew in strips of rows
+/// ([`sweep`](Self::sweep)), since 64 Mpx would take 7 GB. Smaller images hold about 32 bytes a pixel, 130 with octave
+/// −1.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.
 #[derive(Debug)]
 pub(crate) struct ScaleSpace {
     image: Option<Image>,
-    /// From octave −1 on; of those that are not kept whole only the first level, from octave 1 on.
+    /// The octaves from −1 on; an octave above the size limit holds its first level alone, from octave 1 on.
     octaves: Vec<Octave>,
     strip: Octave,
     kernel: Vec<f32>,
     rows: Vec<Vec<f32>>,
     doubled: Vec<f32>,
-    /// Pixels of the largest octave that is kept whole.
+    /// The largest number of pixels of an octave that is kept.
     max_full: usize,
 }
 
@@ -51,42 +52,43 @@ impl Default for ScaleSpace {
     }
 }
 
-/// Pixels of the largest octave that is kept whole: 200 MB.
+/// The largest number of pixels of an octave that is kept: 200 MB.
 const MAX_FULL: usize = 8 << 20;
-/// Rows on either side of a strip: those that the edge of the strip changes, up to the last level 48, and those that an
-/// extremum (12) or a descriptor (40) looks at beyond its own.
+/// The number of extra rows on either side of a strip.
+///
+/// The strip's edge affects up to 48 rows in the last level; an extremum reads 12 rows beyond its own, a descriptor 40.
 const MARGIN: usize = 96;
 
-/// An image's levels at one resolution.
+/// The levels of an image at one resolution.
 #[derive(Debug, Default)]
 pub(crate) struct Octave {
     width: usize,
     levels: [Vec<f32>; LEVELS],
-    /// How many levels are made.
+    /// The number of computed levels.
     made: usize,
 }
 
-/// Some rows of an octave with their surroundings.
+/// A strip of rows of an octave with its margins.
 #[derive(Debug, Clone)]
 pub(crate) struct Strip {
-    /// The rows, as the octave counts them.
+    /// The rows, in the octave's numbering.
     pub(crate) rows: Range<usize>,
-    /// The octave's row at which the levels begin.
+    /// The octave's row that is the first row of the levels.
     pub(crate) first: usize,
 }
 
 impl Octave {
-    /// Pixels in a row.
+    /// The width (px).
     pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// The number of rows.
     pub(crate) fn height(&self) -> usize {
         self.levels[0].len() / self.width
     }
 
-    /// The pixels of one level, row by row.
+    /// The pixels of one level in row-major order.
     pub(crate) fn level(&self, level: usize) -> &[f32] {
         &self.levels[level]
     }
@@ -97,7 +99,7 @@ pub(crate) fn sigma(octave: i32, level: f64) -> f64 {
     SIGMA * libm::exp2(f64::from(octave) + level / INTERVALS as f64)
 }
 
-/// How many octaves from 0 on an image of this size has; at least one.
+/// The number of octaves from 0 on for an image of this size; at least one.
 pub(crate) fn octaves(width: usize, height: usize) -> i32 {
     let mut count = 1;
     while width.min(height) >> count >= MIN_SIDE {
@@ -107,7 +109,7 @@ pub(crate) fn octaves(width: usize, height: usize) -> i32 {
 }
 
 impl ScaleSpace {
-    /// The image whose space it is from now on; levels stay if it was the same.
+    /// Sets the image; the levels stay if it is the same image.
     pub(crate) fn look_at(&mut self, image: &Image) {
         match &mut self.image {
             Some(known) if known == image => return,
@@ -117,7 +119,7 @@ impl ScaleSpace {
         self.octaves.iter_mut().for_each(|octave| octave.made = 0);
     }
 
-    /// An empty one that keeps octaves of so many pixels at most.
+    /// An empty scale space that keeps octaves of at most `max_full` pixels.
     pub(crate) fn keeping(max_full: usize) -> Self {
         Self {
             image: None,
@@ -132,21 +134,23 @@ impl ScaleSpace {
 
     /// Width and height of an octave.
     fn size(&self, octave: i32) -> [usize; 2] {
-        let image = self.image.as_ref().expect("an image was looked at");
+        let image = self.image.as_ref().expect("the image is set");
         let side = |n: usize| if octave < 0 { 2 * n } else { n.div_ceil(1 << octave) };
         [image.width(), image.height()].map(side)
     }
 
-    /// Whether an octave is kept whole; of the others there are strips.
+    /// Whether an octave is kept; the others are computed in strips.
     pub(crate) fn keeps(&self, octave: i32) -> bool {
         self.size(octave).iter().product::<usize>() <= self.max_full
     }
 
-    /// Shows `visit` an octave with its levels made up to `level`: whole if it is kept, or else strip by strip, each with
-    /// enough rows around it that nothing in it depends on the strips.
+    /// Calls `visit` with an octave whose levels are computed up to `level`.
+    ///
+    /// An octave that is kept is passed at once. Others are passed strip by strip, with margins so large that results
+    /// do not depend on the strips.
     ///
     /// # Panics
-    /// When there is no image.
+    /// If no image is set.
     pub(crate) fn sweep(&mut self, octave: i32, level: usize, threads: Threads, mut visit: impl FnMut(&Octave, Strip)) {
         let [width, height] = self.size(octave);
         if self.keeps(octave) {
@@ -165,7 +169,7 @@ impl ScaleSpace {
             self.octaves[next].levels[0].clear();
         }
         let level = if begins { level.max(INTERVALS) } else { level };
-        // As many rows as are kept of other octaves, yet not lost among their surroundings; even, as the doubled ones are.
+        // A strip has as many rows as the size limit allows, yet more than its margins; even, as doubled rows are.
         let step = (self.max_full / width).saturating_sub(2 * MARGIN).max(2 * MARGIN) & !1;
         for begin in (0..height).step_by(step) {
             let rows = begin..(begin + step).min(height);
@@ -182,11 +186,11 @@ impl ScaleSpace {
         }
     }
 
-    /// Makes these rows of an octave in the strip.
+    /// Computes these rows of an octave in the strip.
     fn make(&mut self, octave: i32, rows: Range<usize>, level: usize, threads: Threads) {
         let [width, _] = self.size(octave);
         let Self { image, octaves, strip, kernel, rows: scratch, doubled, .. } = self;
-        let image = image.as_ref().expect("an image was looked at");
+        let image = image.as_ref().expect("the image is set");
         strip.width = width;
         let part = rows.start * width..rows.end * width;
         if octave > 0 {
@@ -206,12 +210,12 @@ impl ScaleSpace {
         strip.smooth(level, kernel, threads, scratch);
     }
 
-    /// An octave of the image with its levels made up to `level`.
+    /// An octave of the image with its levels computed up to `level`.
     ///
     /// # Panics
-    /// When there is no image, or the octave is not kept.
+    /// If no image is set, or the octave is not kept.
     pub(crate) fn octave(&mut self, octave: i32, level: usize, threads: Threads) -> &Octave {
-        assert!(self.keeps(octave), "an octave that is not kept has strips");
+        assert!(self.keeps(octave), "octave above the size limit; use sweep");
         let index = index(octave);
         if self.octaves.len() <= index {
             self.octaves.resize_with(index + 1, Octave::default);
@@ -222,7 +226,7 @@ impl ScaleSpace {
         &octaves[index]
     }
 
-    /// Makes the first level of an octave.
+    /// Computes the first level of an octave.
     fn begin(&mut self, octave: i32, threads: Threads) {
         let index = index(octave);
         if self.octaves.get(index).is_some_and(|octave| octave.made > 0) {
@@ -244,7 +248,7 @@ impl ScaleSpace {
             return;
         }
         let Self { image, octaves, kernel, rows, doubled, .. } = self;
-        let image = image.as_ref().expect("an image was looked at");
+        let image = image.as_ref().expect("the image is set");
         let pixels = if octave < 0 {
             double(image, 0..image.height(), doubled);
             &doubled[..]
@@ -260,7 +264,7 @@ impl ScaleSpace {
 }
 
 impl Octave {
-    /// Makes the levels up to `level` from the first.
+    /// Computes the levels up to `level` from the first.
     fn smooth(&mut self, level: usize, kernel: &mut Vec<f32>, threads: Threads, rows: &mut Vec<Vec<f32>>) {
         let Self { width, levels, made } = self;
         while *made <= level {
@@ -273,18 +277,18 @@ impl Octave {
     }
 }
 
-/// What the first level of octave −1 or 0 is smoothed with: an image has some blur before.
+/// The kernel for the first level of octave −1 or 0, less the assumed blur of the image.
 fn first_kernel(octave: i32, kernel: &mut Vec<f32>) {
     let known = IMAGE_SIGMA / if octave < 0 { 0.5 } else { 1.0 };
     half_kernel_into(libm::sqrt(SIGMA * SIGMA - known * known), CUT, kernel);
 }
 
-/// Where an octave is kept.
+/// The index of an octave.
 fn index(octave: i32) -> usize {
     (octave + 1) as usize
 }
 
-/// Adds every second pixel of every second row to `out`; returns the new width.
+/// Appends every second pixel of every second row to `out`; returns the new width.
 fn halve(pixels: &[f32], width: usize, out: &mut Vec<f32>) -> usize {
     for row in pixels.chunks_exact(width).step_by(2) {
         out.extend(row.iter().step_by(2));
@@ -292,7 +296,7 @@ fn halve(pixels: &[f32], width: usize, out: &mut Vec<f32>) -> usize {
     width.div_ceil(2)
 }
 
-/// Twice the pixels of these rows along each side, linear between: pixel (x, y) lies at (x/2, y/2) of the image.
+/// Doubles these rows along each side by linear interpolation: pixel (x, y) lies at (x/2, y/2) of the image.
 fn double(image: &Image, rows: Range<usize>, out: &mut Vec<f32>) {
     let (width, height) = (image.width(), image.height());
     out.resize(4 * width * rows.len(), 0.0);
@@ -324,7 +328,7 @@ mod tests {
 
     #[test]
     fn a_level_has_the_width_and_place_it_should() {
-        // A blob of σ under a Gaussian of t is a blob of √(σ² + t²), its peak σ²/(σ² + t²) as high.
+        // A blob of σ under a Gaussian of t is a blob of √(σ² + t²) with a peak of σ²/(σ² + t²).
         let (width, at) = (6.0, [80.0, 56.0]);
         let image = blob(width, at);
         let mut space = ScaleSpace::default();
@@ -337,7 +341,7 @@ mod tests {
                 let peak = f64::from(found.level(level)[y * found.width() + x]);
                 let added = sigma(octave, level as f64).powi(2) - IMAGE_SIGMA * IMAGE_SIGMA;
                 let expected = 100.0 * width * width / (width * width + added);
-                // Doubling by lines and the image's own pixels widen a little.
+                // Linear interpolation and the pixels of the image widen the blob a little.
                 assert!((peak - expected).abs() < 0.5, "octave {octave} level {level}: {peak}, not {expected}");
             }
         }
@@ -370,7 +374,7 @@ mod tests {
             strips.sweep(octave, level, Threads::One, |found, Strip { rows, first }| {
                 assert_eq!(rows.start, seen);
                 let width = found.width();
-                // What lies this far beyond a strip is still looked at.
+                // Rows up to this distance beyond a strip are still read.
                 let near = rows.start.saturating_sub(48)..(rows.end + 48).min(expected.height());
                 for level in 0..=level {
                     let of = |octave: &Octave, first: usize| {

@@ -1,45 +1,45 @@
-//! Which component each stage of a front end is.
+//! The choice of the component for each stage of the front end.
 
 use seafix_component::{BuildError, Choice, Registry};
 
 use crate::{DESCRIPTORS, DETECTORS, FILTERS, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
 
-/// The choice of each stage, as settings have them under the same names.
+/// The chosen component of each stage; the fields have the names of the settings.
 #[derive(Debug, Clone, Copy)]
 pub struct StageChoices<'a> {
-    /// Prepare each image, one after the other.
+    /// The filters, applied to each image in order.
     pub filters: &'a [Choice],
-    /// Finds key points in each image.
+    /// The detector.
     pub detector: &'a Choice,
-    /// Says where exactly they are.
+    /// The locator.
     pub locator: &'a Choice,
-    /// Describes their surroundings, for the matcher.
+    /// The descriptor.
     pub descriptor: &'a Choice,
-    /// Pairs left with right.
+    /// The matcher.
     pub matcher: &'a Choice,
-    /// Aligns each pair between the cameras.
+    /// The refinement.
     pub refinement: &'a Choice,
-    /// Turns pairs into points.
+    /// The triangulator.
     pub triangulator: &'a Choice,
 }
 
-/// A stage that cannot be built.
+/// A stage with an invalid choice.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{error}")]
 pub struct InvalidStage {
-    /// Its field of [`StageChoices`].
+    /// The stage's field of [`StageChoices`].
     pub stage: &'static str,
-    /// Of a filter, its place in the list.
+    /// The position of a filter in its list.
     pub place: Option<usize>,
-    /// Why.
+    /// The cause.
     pub error: BuildError,
 }
 
 impl FrontEnd {
-    /// The stages of these choices, ready to work.
+    /// The front end of these choices.
     ///
     /// # Errors
-    /// [`InvalidStage`]: the first that cannot be built.
+    /// [`InvalidStage`]: the first stage with an invalid choice.
     pub fn build(choices: &StageChoices<'_>) -> Result<Self, InvalidStage> {
         let filter = |(place, choice)| {
             FILTERS.build(choice).map_err(|error| InvalidStage { stage: "filters", place: Some(place), error })

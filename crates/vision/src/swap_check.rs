@@ -1,39 +1,39 @@
-//! Whether the left and the right image have changed places.
+//! The check for exchanged left and right images.
 
 use seafix_geometry::StereoRig;
 
 use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Surf, View, Workspace};
 
-/// How many matches two images have as they came and with their places exchanged.
+/// The numbers of matches of two images in the given and in the exchanged order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Sides {
-    /// The left image seen by the left camera.
+    /// The number of matches in the given order.
     pub given: usize,
-    /// The left image seen by the right camera.
+    /// The number of matches in the exchanged order.
     pub exchanged: usize,
-    /// Key points of whichever image has fewer: with many of them a pair of images has matches.
+    /// The number of key points of the image that has fewer; many key points without matches mean unrelated images.
     pub keypoints: usize,
 }
 
-/// Fewer matches say nothing about the order of the images.
+/// The minimum number of matches for a decision.
 const FEW: usize = 20;
 
 impl Sides {
-    /// What these two views of one frame say, matched along the epipolar band in both orders.
+    /// The counts of a pair of views, matched along the epipolar band in both orders.
     ///
-    /// Points lie in front of the cameras, so a rig allows the true order's matches and few of the other: with
-    /// exchanged images of a rectified rig every depth is negative, and of any other rig the points are off their
-    /// epipolar lines besides. It takes as long as matching twice; a data set's first frames are enough, their
-    /// counts added up.
+    /// Points lie in front of the cameras, so a rig admits matches of the true order and few of the other. Exchanged
+    /// images of a rectified rig give negative depths; those of any other rig also lie off their epipolar lines.
+    ///
+    /// The check costs two matchings. A data set's first frames suffice, with their counts added.
     pub fn of(left: &View<'_>, right: &View<'_>, rig: &StereoRig, work: &mut Workspace) -> Self {
         let mut find = |rig: &StereoRig| {
             let mut found = Vec::new();
-            // A pattern fits in either order: left out of one alone it would speak for the other.
+            // Repeated patterns match in either order; ambiguous ones are kept in both so that neither order gains.
             EpipolarBand::default().find([left, right], rig, true, work, &mut found);
             found
         };
         let (given, exchanged) = (find(rig), find(&rig.exchanged()));
-        // A left key point that found something in either order speaks for the one that looks more alike.
+        // A left key point with matches in both orders counts for the one of smaller descriptor distance.
         let better = |found: &[Match], other: &[Match]| {
             let beaten = |m: &&Match| other.iter().any(|o| o.left == m.left && o.distance < m.distance);
             found.iter().filter(|m| !beaten(m)).count()
@@ -45,7 +45,7 @@ impl Sides {
         }
     }
 
-    /// What two images say by their corners, found and described with the defaults.
+    /// The counts of a pair of images, with the default detector and descriptor.
     pub fn of_images(left: &Image, right: &Image, rig: &StereoRig) -> Self {
         let corners = [left, right].map(|image| Harris::default().detect(image));
         let described =
@@ -54,17 +54,17 @@ impl Sides {
         Self::of(&view(left, 0), &view(right, 1), rig, &mut Workspace::default())
     }
 
-    /// Whether there are enough matches to say anything.
+    /// Whether there are enough matches for a decision.
     pub fn is_decisive(&self) -> bool {
         self.given + self.exchanged >= FEW
     }
 
-    /// Whether key points found no, or hardly any, partners: too few matches to tell, and fewer than one key point in twenty has one.
+    /// Whether the images are unrelated: too few matches for a decision, and fewer than one for 20 key points.
     pub fn are_strangers(&self) -> bool {
         self.keypoints > 0 && !self.is_decisive() && 20 * self.given < self.keypoints
     }
 
-    /// Whether the images have changed places: more than nine in ten of at least twenty matches say so.
+    /// Whether the images are exchanged: by more than nine tenths of at least 20 matches.
     pub fn are_swapped(&self) -> bool {
         self.is_decisive() && 10 * self.exchanged > 9 * (self.given + self.exchanged)
     }

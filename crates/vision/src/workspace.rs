@@ -1,41 +1,41 @@
-//! What the stages keep from frame to frame.
+//! The working memory that the stages keep between frames.
 
 use std::any::Any;
 
 use rayon::prelude::*;
 
-/// The memory that components keep between frames, so that a warm front end allocates nothing, and
-/// whether they may share their work among threads.
+/// The working memory of components and their use of threads.
 ///
-/// Each component keeps what it likes under a type of its own; what is in it never changes a result.
+/// Components keep buffers between frames, so that a warm front end allocates nothing. Each component keeps its own
+/// type here; the contents never change a result.
 #[derive(Debug, Default)]
 pub struct Workspace {
     threads: Threads,
     kept: Vec<Box<dyn Any + Send>>,
 }
 
-/// Who works.
+/// The threads that execute the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Threads {
     /// The calling thread alone.
     #[default]
     One,
-    /// All threads of the rayon pool that the call is made in; the results are the same.
+    /// All threads of the current rayon pool; the results are the same as on one thread.
     Pool,
 }
 
 impl Workspace {
-    /// An empty one.
+    /// An empty workspace.
     pub fn new(threads: Threads) -> Self {
         Self { threads, kept: Vec::new() }
     }
 
-    /// Who works.
+    /// The threads that execute the work.
     pub fn threads(&self) -> Threads {
         self.threads
     }
 
-    /// What was kept under this type; its default the first time.
+    /// The value kept under type `T`, or its default on first use.
     pub fn get<T: Any + Send + Default>(&mut self) -> &mut T {
         let index = self.kept.iter().position(|kept| kept.is::<T>()).unwrap_or_else(|| {
             self.kept.push(Box::new(T::default()));
@@ -46,9 +46,9 @@ impl Workspace {
 }
 
 impl Threads {
-    /// `work(index, piece)` for every piece of `size` of `items`, with one scratch for each piece.
+    /// Calls `work(index, piece, scratch)` for each piece of `size` items, with one scratch per piece.
     ///
-    /// What a piece holds does not depend on the threads, so neither does the result.
+    /// The pieces do not depend on the number of threads, so neither does the result.
     pub fn pieces<T: Send, S: Send + Default>(
         self,
         items: &mut [T],
@@ -70,8 +70,9 @@ impl Threads {
         }
     }
 
-    /// How many of `rows` rows make a band, where each row's result depends on its surroundings alone:
-    /// few bands, for every band repeats work at its edges, yet enough to keep all threads busy.
+    /// The number of `rows` per band, for results that depend on a row's surroundings alone.
+    ///
+    /// Each band repeats work at its edges, so bands are few, yet enough to keep all threads busy.
     pub(crate) fn rows_a_band(self, rows: usize) -> usize {
         match self {
             Self::One => rows.max(1),
@@ -79,7 +80,7 @@ impl Threads {
         }
     }
 
-    /// Both, one after the other or side by side.
+    /// Both results, computed in sequence or in parallel.
     pub fn join<A: Send, B: Send>(self, a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {
         match self {
             Self::One => (a(), b()),

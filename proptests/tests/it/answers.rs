@@ -70,7 +70,7 @@ fn no_order_of_the_points_changes_an_answer() {
 fn in_other_orders(problems: usize, max_points: usize, orders: usize) {
     let mut rng = ChaCha8Rng::seed_from_u64(24);
     let mut outcomes = BTreeMap::new();
-    for family in "abcdefg".chars().map(|name| name.to_string().parse::<Family>().expect("a family")) {
+    for family in Family::ALL {
         for presence in [Presence::Present, Presence::Absent] {
             let generated = (0..40).map(|number| Generated::new(family, 24, number, presence).problem.problem());
             for problem in generated.filter(|problem| problem.cloud.len() <= max_points).take(problems) {

@@ -112,7 +112,7 @@ fn log(path: &Path) -> Result<Option<Fault>, LogError> {
     let mut reader = Reader::open(path)?;
     reader.by_ref().try_for_each(|frame| frame.map(|_| ()))?;
     Ok(reader.recovered().map(|lost| {
-        let fault = Fault::new(format!("recovered log with losses ({lost})"), path);
+        let fault = Fault::new(format!("a log recovered from an incomplete one ({lost})"), path);
         fault.remedy("results lack the lost frames")
     }))
 }

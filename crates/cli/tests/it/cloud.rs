@@ -110,7 +110,7 @@ fn images_that_changed_places_are_refused() {
     let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
     command.arg("cloud").args([sample(pair[1]), sample(pair[0])]).arg("--rig").arg(sample("dataset.toml"));
     let said = ended_with(3, &mut command).error;
-    assert!(said.contains("left and right images that have changed places") && said.lines().count() == 1, "{said}");
+    assert!(said.contains("exchanged left and right images") && said.lines().count() == 1, "{said}");
 }
 
 /// The standard error of `cloud` for two of the sample's images with a changed rig.
@@ -126,10 +126,10 @@ fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String 
 #[test]
 fn one_image_twice_is_refused() {
     let said = said(["left000.png", "left000.png"], |rig| rig, 3);
-    assert!(said.contains("left and right images that are the same") && said.lines().count() == 1, "{said}");
+    assert!(said.contains("identical left and right images") && said.lines().count() == 1, "{said}");
 }
 
-/// Images of another rig are detected by their epipolar distances, and a rig that is falsely called rectified by its
+/// A wrong rig is detected by the epipolar distances of its images, a rig falsely marked as rectified by its
 /// parameters.
 #[test]
 fn rows_that_do_not_correspond_are_reported() {
@@ -141,7 +141,7 @@ fn rows_that_do_not_correspond_are_reported() {
         format!("{left}[rig.right]{}", right.replace("cy = 383.5", "cy = 403.5"))
     };
     let reported = said(images, lower, 0);
-    assert!(reported.contains("warning: a rig that is called rectified and is not in "), "{reported}");
+    assert!(reported.contains("warning: a rig marked as rectified that is not in "), "{reported}");
     // The same, with a calibration of equal rows.
     let upright =
         |rig: String| rig.replace("-0.25]", "0.0]").replacen("0.0, 1.0, 0.0, 0.0]", "0.0, 1.0, 0.0, -0.25]", 1);
@@ -162,7 +162,7 @@ fn key_points_that_come_to_nothing_are_reported() {
         // Too few corners for the swap check.
         ended(command.arg("cloud").args(images).arg("--rig").arg(sample("dataset.toml"))).error
     };
-    assert!(run(&images).contains("changed places"));
+    assert!(run(&images).contains("exchanged left and right"));
     let folder = TempDir::new().unwrap();
     let few = images.map(|image| {
         // The image is dark except for a small part.
@@ -193,6 +193,6 @@ fn what_cannot_be_is_refused_in_one_line() {
         let image = sample("frames.csv");
         ended_with(3, command.arg("cloud").args([&image, &image]).arg("--rig").arg(&rig)).error
     };
-    assert!(refused(&text).contains("no image that can be decoded"));
+    assert!(refused(&text).contains("an image that cannot be decoded"));
     assert!(refused(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));
 }

@@ -36,7 +36,7 @@ fn a_stretched_walk_has_the_drift_of_its_scale_error() {
     let (code, out, _) = eval(folder.path(), &["truth.tum", "odometry.tum", "--json"]);
     let value: Value = serde_json::from_str(&out).unwrap();
     let number = |pointer: &str| value.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("{pointer}"));
-    assert_eq!((code, number("/ape/pairs"), number("/rpe/pairs"), number("/matched/share")), (0, 50.0, 49.0, 1.0));
+    assert_eq!((code, number("/ape/pairs"), number("/rpe/pairs"), number("/matched/fraction")), (0, 50.0, 49.0, 1.0));
     let chord = (2.0 * 3.0 * 0.1_f64.sin()).hypot(0.3);
     assert!((number("/rpe/mean") - 0.01 * chord).abs() < 1e-12);
     assert!((number("/end_m") / number("/path_m")) < 0.01);
@@ -82,8 +82,8 @@ fn what_cannot_be_compared_is_refused_in_one_line() {
     fs::write(folder.path().join("empty.tum"), "# nothing\n").unwrap();
     for (arguments, code, words) in [
         (&["truth.tum", "later.tum"][..], 3, "only 0 of 50 and 50 poses are associated"),
-        (&["truth.tum", "line.tum", "-a"], 3, "one point, or one line"),
-        (&["truth.tum", "short.tum", "-a"], 3, "2 poses; an alignment takes 3"),
+        (&["truth.tum", "line.tum", "-a"], 3, "a point or a line"),
+        (&["truth.tum", "short.tum", "-a"], 3, "2 poses; an alignment needs at least 3"),
         (&["truth.tum", "few.kitti"], 3, "without stamps"),
         (&["truth.tum", "seven.tum"], 3, "7 columns in seven.tum:1"),
         (&["truth.tum", "empty.tum"], 3, "without poses in empty.tum"),

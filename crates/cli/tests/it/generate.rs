@@ -56,7 +56,7 @@ fn what_cannot_be_generated_is_refused() {
     let out = folder.path().join("out");
     let out_name = out.to_str().unwrap();
     for (arguments, states) in [
-        (&["generate", "h", "--out", out_name][..], "no family is called `h`"),
+        (&["generate", "h", "--out", out_name][..], "unknown family `h`"),
         (&["generate", "paper-scale", "--count", "0", "--out", out_name], "0 is not in 1..=1000000"),
         (&["generate", "paper-scale", "--count", "2000000", "--out", out_name], "2000000 is not in 1..=1000000"),
         (&["generate", "paper-scale", "--first", "99999999999", "--out", out_name], "99999999999 is not in"),

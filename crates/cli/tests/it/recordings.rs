@@ -98,7 +98,7 @@ impl Bag {
         let at = |name: &str| folder.path().join(name);
         fs::copy(sample().join("site.toml"), at("site.toml")).unwrap();
         let experiment = "question = 'Where?'\n[source]\nname = 'mcap'\npath = 'bag.mcap'\nsite = 'site.toml'\n\
-                          prior = '/odom'\nprior-position = 0.1\nprior-attitude-deg = 0.5\ntruth = '/odom'\nmost-gap = 0.0\n";
+                          prior = '/odom'\nprior-position = 0.1\nprior-attitude-deg = 0.5\ntruth = '/odom'\nmax-gap = 0.0\n";
         fs::write(at("e.toml"), experiment).unwrap();
         let mut mcap = WriteOptions::new().create(File::create(at("bag.mcap")).unwrap()).unwrap();
         let mut channel = |topic: &str, kind: &str, definition: &str| {
@@ -213,7 +213,7 @@ fn a_sound_recording_is_reported_and_run() {
 #[test]
 fn baselines_that_contradict_each_other() {
     let with = |tf: [f64; 3]| Bag { tf: Some(tf), ..Bag::sound() };
-    let parts = ["P and the transforms contradict each other", "P says 0.2500 m at [-0.250, 0.000, 0.000]"];
+    let parts = ["P and the transforms give different poses", "P gives 0.2500 m at [-0.250, 0.000, 0.000]"];
     with([0.5, 0.0, 0.0]).refused(
         &[&parts[..], &["/tf 0.5000 m", "`right` from `left`", "correct /cam/right/camera_info or the transform"]]
             .concat(),
@@ -237,7 +237,7 @@ fn a_fisheye_lens_is_no_pinhole() {
     for model in ["equidistant", "fisheye"] {
         let bag = Bag { model, rectified: false, ..Bag::sound() };
         bag.refused(&[
-            &format!("the distortion model `{model}` is not read"),
+            &format!("the distortion model `{model}` is not supported"),
             "/cam/left/camera_info",
             "rectify the images",
         ]);
@@ -251,15 +251,15 @@ fn a_fisheye_lens_is_no_pinhole() {
 fn cameras_that_have_changed_places() {
     let mut bag = Bag::sound();
     bag.images.iter_mut().for_each(|pair| pair.reverse());
-    bag.refused(&["left and right images that have changed places", "lie behind the cameras", "`left-info`"]);
+    bag.refused(&["exchanged left and right images", "lie behind the cameras", "`left-info`"]);
     // With calibrations exchanged too they are a valid rig, which is reported.
     bag.p.iter_mut().for_each(|p| p.reverse());
     bag.tf = Some([-0.25, 0.0, 0.0]);
     let (code, said) = bag.checked();
-    assert!(code == 0 && said.contains("warning: a left camera that stands to the right of the other"), "{said}");
+    assert!(code == 0 && said.contains("warning: a left camera to the right of the right camera"), "{said}");
     let mut bag = Bag::sound();
     bag.images[3][1] = bag.images[3][0].clone();
-    bag.refused(&["left and right images that are the same", "1 of 5 pairs", "one image twice has no depth"]);
+    bag.refused(&["identical left and right images", "1 of 5 pairs", "one image twice has no depth"]);
 }
 
 #[test]
@@ -270,14 +270,14 @@ fn an_image_that_cannot_be_read_costs_its_pair() {
     let (frames, fixed, warnings) = ran(folder.path());
     assert!(frames == 4 && fixed >= 2, "{frames} {fixed}");
     assert!(
-        matches!(&warnings[..], [one] if one.contains("/cam/right/image_rect/compressed at 1700000000100000000 ns") && one.contains("its pair is left out")),
+        matches!(&warnings[..], [one] if one.contains("/cam/right/image_rect/compressed at 1700000000100000000 ns") && one.contains("its pair is skipped")),
         "{warnings:?}"
     );
     let (code, said) = bag.checked();
     assert!(code == 0 && said.contains("warning: ") && said.contains("note: 4 pairs"), "{said}");
     bag.images[2][0].clear();
     bag.images[4][0] = b"no image".to_vec();
-    bag.refused(&["/cam/right/image_rect", "so are 3 of 5 pairs; at least half must be readable"]);
+    bag.refused(&["/cam/right/image_rect", "3 of 5 pairs are unreadable; at least half must be readable"]);
 }
 
 #[test]
@@ -288,7 +288,7 @@ fn a_calibration_that_changes() {
         "a calibration that changes within the recording",
         "/cam/left/camera_info",
         "1700000000300000000 ns",
-        "cut the recording there",
+        "split the recording there",
     ]);
 }
 

@@ -77,13 +77,13 @@ fn a_run_is_checked_by_what_it_wrote() {
     let bytes = fs::read(&table).unwrap();
     fs::write(&table, &bytes[..bytes.len() - 1]).unwrap();
     let (code, out, _) = seafix(folder, &["check", "a"]);
-    assert!(code == 1 && out.contains("not the file that the run wrote in a/results.csv"), "{out}");
+    assert!(code == 1 && out.contains("a changed file of the run in a/results.csv"), "{out}");
     fs::write(&table, bytes).unwrap();
     let manifest = folder.join("a/manifest.json");
     let text = fs::read_to_string(&manifest).unwrap();
     fs::write(&manifest, text.replace("\"finished\"", "\"running\"")).unwrap();
     let (code, out, _) = seafix(folder, &["check", "a"]);
-    assert!(code == 1 && out.contains("a run that has not ended in a: running") && out.contains("--resume"), "{out}");
+    assert!(code == 1 && out.contains("an unfinished run in a: running") && out.contains("--resume"), "{out}");
 
     for k in ["1/2", "2/2"] {
         assert_eq!(seafix(folder, &["run", "e.toml", "--untimed", "--shard", k, "--out", &k[..1]]).0, 0);
@@ -129,7 +129,7 @@ fn reports_are_verified_and_runs_compared() {
         assert!(code == 1 && out.contains(&format!("b/{name}: another SHA-256")), "{out}");
         fs::remove_file(&table).unwrap();
         let (code, out, _) = seafix(folder, &["report", "b", "--out", "reports/b", "--verify"]);
-        assert!(code == 1 && out.contains("a file of the run that is gone"), "{out}");
+        assert!(code == 1 && out.contains("a missing file of the run"), "{out}");
         fs::write(&table, bytes).unwrap();
     }
 
@@ -231,8 +231,8 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     let first = files(&folder.join("reports"));
     assert!(first.contains_key("b/main.svg"), "{:?}", first.keys());
     let text = |name: &str| String::from_utf8(first[name].clone()).unwrap();
-    assert!(text("a/report.html").contains("Not the experiment as its file says"));
-    assert!(!text("b/report.html").contains("Not the experiment as its file says"));
+    assert!(text("a/report.html").contains("This run departs from its experiment file"));
+    assert!(!text("b/report.html").contains("This run departs from its experiment file"));
     assert!(text("README.md").contains("[![The main figure of b](b/main.svg)](b/report.html)"));
     assert!(text("README.md").contains(&format!("Made by seafix {}.", env!("CARGO_PKG_VERSION"))));
     // The page omits the version of the program: a kept run serves every version with its results.
@@ -310,14 +310,14 @@ fn a_kept_run_is_made_again_when_its_results_may_differ() {
     let cases: [(&[(&str, &str)], &str); 3] = [
         (&[version, (&own, "00000000")], "solver triad 0 → 1"),
         (&[(&own, "00000000")], "another configuration, input or experiment file"),
-        (&[state, ("\"commit\": ", "\"commit\": \"0\", \"was\": ")], "it did not end"),
+        (&[state, ("\"commit\": ", "\"commit\": \"0\", \"was\": ")], "it was not finished"),
     ];
     for (changes, reason) in cases {
         changes.iter().for_each(|(from, to)| change(from, to));
         let (code, _, error) = publish(&[]);
         assert!(code == 0 && error.contains("a: kept run") && error.contains("b: new run"), "{error}");
         // Without git the commit is unknown, and the program uses the kept run.
-        assert!(error.contains(reason) || reason == "it did not end", "no `{reason}` in {error}");
+        assert!(error.contains(reason) || reason == "it was not finished", "no `{reason}` in {error}");
         assert!(bytes() == first, "{reason}");
     }
     fs::remove_file(run.join("results.csv")).unwrap();
@@ -344,7 +344,7 @@ fn a_kept_run_is_made_again_when_its_results_may_differ() {
     assert!(code == 4 && error.contains("notes.txt"), "{error}");
     assert!(run.join("notes.txt").exists() && run.join("results.csv").exists());
     let (code, out, error) = publish(&["--check", "5"]);
-    assert!(code == 3 && error.contains("not the run that would be made now"), "{out}{error}");
+    assert!(code == 3 && error.contains("the stored run is outdated"), "{out}{error}");
     fs::remove_file(run.join("notes.txt")).unwrap();
     change("\"timed\": false", "\"timed\": true");
     let (code, _, error) = publish(&[]);

@@ -272,17 +272,17 @@ fn a_recovered_log_counts_as_what_it_is() {
         "{text}"
     );
     let (code, text) = said(&["check", "saved/a.mcap"]);
-    assert!(code == Some(0) && text.contains("warning: recovered log with losses"), "{text}");
+    assert!(code == Some(0) && text.contains("warning: a log recovered from an incomplete one"), "{text}");
     let (code, text) = said(&["report", "saved"]);
-    assert!(code == Some(0) && text.contains("warning: a.mcap was saved of a log that was not whole"), "{text}");
+    assert!(code == Some(0) && text.contains("warning: a.mcap: recovered from an incomplete log"), "{text}");
     let page = fs::read_to_string(folder.join("saved/report/report.html")).unwrap();
-    assert!(page.contains("What is lost is in no number here"));
+    assert!(page.contains("No number here includes the lost part"));
     for command in [&["diff", "whole", "saved"][..], &["merge", "saved", "--out", "merged"]] {
         let (code, text) = said(command);
-        assert!(code == Some(3) && text.contains("logs that were saved of a run that is not whole"), "{text}");
+        assert!(code == Some(3) && text.contains("logs recovered from an incomplete run"), "{text}");
     }
     let (code, text) = said(&["replay", "saved/a.mcap", "--untimed", "--out", "again"]);
-    assert!(code == Some(0) && text.contains("recovered log with losses"), "{text}");
+    assert!(code == Some(0) && text.contains("a log recovered from an incomplete one"), "{text}");
     // A record with a damaged head may declare any length.
     let mut broken = bytes.clone();
     let middle = bytes.len() / 2;
@@ -328,7 +328,7 @@ fn a_shard_that_is_missing_is_named() {
     let piece = fs::read_dir(folder.join("2/pieces")).unwrap().next().unwrap().unwrap().path();
     fs::write(piece.join("rows.csv"), "nothing").unwrap();
     let (code, error) = ended(&seafix(folder, &["merge", "1", "2", "3", "--out", "all"]).output().unwrap());
-    assert!(code == Some(3) && error.contains("a piece that is damaged in 2/pieces/"), "{error}");
+    assert!(code == Some(3) && error.contains("a damaged piece in 2/pieces/"), "{error}");
 }
 
 #[test]
@@ -336,7 +336,7 @@ fn a_folder_that_cannot_be_written() {
     let folder = experiment(4);
     fs::write(folder.path().join("file"), "").unwrap();
     let (_, error) = ended(&run(folder.path(), "file", &[]).output().unwrap());
-    assert!(error.contains("a file is there: name a new folder with --out"), "{error}");
+    assert!(error.contains("a file has this name; give a new folder with --out"), "{error}");
     for out in ["/proc/nowhere", "file/below", "/dev/null", "file"] {
         let (code, error) = ended(&run(folder.path(), out, &[]).output().unwrap());
         assert!(code == Some(4) && error.starts_with("error: "), "{error}");

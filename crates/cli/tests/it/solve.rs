@@ -37,7 +37,7 @@ fn a_fix_states_what_supports_it() {
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(answer["outcome"], "fix");
     let integrity = &answer["integrity"];
-    assert_eq!((&integrity["redundancy"], &integrity["freedom"]), (&json!("excludable"), &json!(15)));
+    assert_eq!((&integrity["redundancy"], &integrity["dof"]), (&json!("excludable"), &json!(15)));
     assert!(integrity["chi2"].as_f64().unwrap() < 1e-9 && integrity["chi2_limit"].as_f64().unwrap() > 15.0);
     let level = integrity["protection"]["position"].as_f64().unwrap();
     assert!(level > 0.002 && level < 0.1, "{level}");

@@ -1,4 +1,4 @@
-//! Everything that is wrong with a data set, images included.
+//! A complete check of a data set, images included.
 
 use std::{
     io::Read,
@@ -16,8 +16,8 @@ use seafix_io::{ImageLimits, image::regular};
 
 use super::{Dataset, SAME_INSTANT_NS, folder::inside};
 
-/// Reads the data set in `folder` and every file it names: decodes the images, compares their sizes
-/// with the calibration and, where hashes are given, every file with its hash.
+/// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
+/// calibration, and compares every file with its hash if there is one.
 ///
 /// Returns the faults and the warnings.
 pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
@@ -39,7 +39,7 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
 }
 
 impl Dataset {
-    /// What is odd about the times of the pairs: a leap of more than a year, and pairs so near that a camera takes none such.
+    /// Warnings about the stamps of the pairs: gaps of more than a year, and pairs closer than a camera can take them.
     pub fn odd_times(&self) -> Vec<Fault> {
         const YEAR_NS: u64 = 31_557_600_000_000_000;
         let table = self.folder.join(&self.table);
@@ -51,20 +51,20 @@ impl Dataset {
             Some(Fault::new(what, &table).value(value).remedy(remedy))
         };
         let leap =
-            reported("stamps that leap by more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
-        let remedy = "a camera takes no two pairs within a millisecond: are they nanoseconds?";
-        leap.into_iter().chain(reported("pairs too near in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
+            reported("stamps with a gap of more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
+        let remedy = "two pairs within a millisecond; check that stamps are nanoseconds";
+        leap.into_iter().chain(reported("pairs too close in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
     }
 }
 
-/// Pairs whose two images are the same, pixel by pixel.
+/// The pairs whose two images are identical, pixel by pixel.
 #[derive(Debug, Default)]
 pub struct IdenticalImages {
     count: usize,
     first: Option<(PathBuf, PathBuf)>,
 }
 
-/// Decodes all images of the data set: what is wrong with them, and which pairs are one image twice.
+/// Decodes all images of the data set. The result is their faults and the pairs with identical images.
 pub fn inspect_images(dataset: &Dataset) -> (Vec<Fault>, IdenticalImages) {
     let seen: Vec<(Option<Fault>, bool)> = dataset
         .frames
@@ -83,15 +83,15 @@ pub fn inspect_images(dataset: &Dataset) -> (Vec<Fault>, IdenticalImages) {
     (faults, identical)
 }
 
-/// Whether two images are one: cameras apart never see the same, unless there is nothing to see.
+/// Whether two images are identical and not uniform. Two cameras never see the same unless there is nothing to see.
 pub fn are_identical(left: &Image, right: &Image) -> bool {
     let flat = || left.pixels().iter().all(|pixel| *pixel == left.pixels()[0]);
     left == right && !flat()
 }
 
-/// What is wrong with the pair of these two files where they hold one image.
+/// The fault of a pair of files with identical images.
 pub fn identical_images_fault(left: &Path, right: &Path) -> Fault {
-    Fault::new("left and right images that are the same", left)
+    Fault::new("identical left and right images", left)
         .value(format!("the pixels of {}", right.display()))
         .remedy("give the image of the other camera; one image twice has no depth")
 }
@@ -105,17 +105,17 @@ impl IdenticalImages {
     }
 }
 
-/// Frames whose images are looked at for their order.
+/// The number of frames for the swap check.
 pub const INSPECTED_PAIRS: usize = 3;
-/// Pairs that are asked where the rig stands.
+/// The number of pairs for the estimate of the right camera's rotation.
 const ASKED: usize = 8;
 
-/// Left and right images that have changed places, as three frames from the whole length of the set show.
+/// The fault of exchanged left and right images, by a swap check on three frames over the complete data set.
 pub fn swapped(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides(dataset), &dataset.folder.join(&dataset.table))
 }
 
-/// What three frames from the whole length of the set say of the order of their images.
+/// The result of the swap check on three frames over the complete data set.
 fn sides(dataset: &Dataset) -> Sides {
     let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
     let pairs = dataset.frames.iter().step_by(step).filter_map(|frame| dataset.pair(frame).ok());
@@ -123,7 +123,8 @@ fn sides(dataset: &Dataset) -> Sides {
     sides.fold(Sides::default(), Sides::add)
 }
 
-/// The same by the first pairs that can tell, for a set whose images need not all be good: the first that speaks for
+/// The swap check on the first conclusive pairs, for a data set with some bad images. One pair in favour of the order
+/// ends it; three pairs against it decide.
 /// their places ends the search, three that speak against it decide.
 pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
     let (mut sides, mut reported) = (Sides::default(), 0);
@@ -137,8 +138,8 @@ pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides, &dataset.folder.join(&dataset.table))
 }
 
-/// The rig of `dataset` turned to where pairs of its images say that it stands, of so many of them, evenly over the set; `None`
-/// where they do not contradict it. Images that cannot be read say nothing.
+/// The rig of `dataset` with an estimated rotation of the right camera. The estimate uses a sample of pairs, evenly
+/// over the data set; `None` if the images agree with the rig. Unreadable images are ignored.
 pub fn right_camera_rotation(dataset: &Dataset) -> Option<RightCameraRotation> {
     let apart = dataset.frames.len().div_ceil(ASKED).max(1);
     let some = dataset.frames.iter().step_by(apart).filter_map(|frame| dataset.pair(frame).ok());
@@ -147,36 +148,36 @@ pub fn right_camera_rotation(dataset: &Dataset) -> Option<RightCameraRotation> {
     RightCameraRotation::of(&seen, &dataset.rig)
 }
 
-/// What is wrong with the images of `file` if left and right have changed places.
+/// The fault of `file` if its left and right images are exchanged.
 pub fn swap_fault(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_swapped().then(|| {
-        Fault::new("left and right images that have changed places", file)
+        Fault::new("exchanged left and right images", file)
             .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))
             .remedy("exchange the images, or the cameras of the rig")
     })
 }
 
-/// A word where key points have hardly any partners, and what the exchanged images would give.
+/// A warning about many key points with few matches, with the number of matches after exchange.
 pub fn strangers(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_strangers().then(|| {
         let Sides { given, exchanged, keypoints } = sides;
-        Fault::new("images with key points and hardly a match", file)
+        Fault::new("images with key points but hardly any match", file)
             .value(format!("{keypoints} key points, {given} matches; {exchanged} with left and right exchanged"))
             .remedy(partners_remedy(exchanged, exchanged > 3 * given))
     })
 }
 
-/// What to do about images whose key points have no partners: exchange them if that gives more than a handful.
+/// The remedy for images whose key points do not match: exchange them if that gives more than a few matches.
 pub fn partners_remedy(exchanged: usize, clearly: bool) -> &'static str {
     const HANDFUL: usize = 10;
     if exchanged >= HANDFUL && clearly {
-        "exchange the images if they have changed places"
+        "exchange the left and right images if they are in the wrong order"
     } else {
-        "see whether both show one scene, and whether the rig is theirs"
+        "check that both images show one scene and belong to this rig"
     }
 }
 
-/// Files that are not those whose hashes the description has.
+/// The files whose hash differs from the description.
 pub fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
     let file = dataset.folder.join("dataset.toml");
     let mut faults = Vec::new();
@@ -184,7 +185,7 @@ pub fn hash_faults(dataset: &Dataset) -> Vec<Fault> {
         match inside(&dataset.folder, name, &file).and_then(|path| sha256(&path)) {
             Err(fault) => faults.push(fault),
             Ok(found) if !found.eq_ignore_ascii_case(expected) => faults.push(
-                Fault::new("a file that is not the one described", &dataset.folder.join(name))
+                Fault::new("a file whose hash differs from the description", &dataset.folder.join(name))
                     .value(format!("sha256 {found}"))
                     .remedy(format!("[hashes] has {expected}: restore the file or correct the hash")),
             ),
@@ -207,12 +208,13 @@ pub fn sha256(path: &Path) -> Result<String, Fault> {
     }
 }
 
-/// Bytes in hexadecimal.
+/// The bytes in hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// All files of a data set's folder and their SHA-256, in order of name, paths with `/` relative to it.
+/// All files below a data set's folder with their SHA-256. They are in order of name, with relative paths joined by
+/// `/`.
 pub fn input_hashes(folder: &Path) -> Result<Vec<(String, String)>, Fault> {
     let mut files = Vec::new();
     gather(folder, PathBuf::new(), &mut files)?;
@@ -226,7 +228,7 @@ fn gather(folder: &Path, below: PathBuf, files: &mut Vec<String>) -> Result<(), 
     for entry in std::fs::read_dir(&here).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
         let path = below.join(entry.file_name());
-        // Links are not followed: they may lead out of the folder or back into it.
+        // Links are not followed, because they may leave the folder or form a cycle.
         let kind = entry.file_type().map_err(unreadable)?;
         if kind.is_dir() {
             gather(folder, path, files)?;

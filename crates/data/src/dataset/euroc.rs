@@ -1,7 +1,8 @@
-//! Folders in the layout of the EuRoC data sets (ASL): `mav0/cam0`, `mav0/cam1`, each with a `sensor.yaml`, a `data.csv`
-//! and its images in `data`; the truth in `mav0/state_groundtruth_estimate0`.
+//! EuRoC data sets (ASL format): `mav0/cam0`, `mav0/cam1`, each with a `sensor.yaml`, a `data.csv` and its images in
+//! `data`; the truth in `mav0/state_groundtruth_estimate0`.
 //!
-//! `T_BS` of a sensor is `body_from_sensor`; a line of the truth is the pose of its own sensor in the reference frame.
+//! The matrix `T_BS` of a sensor is `body_from_sensor`. A line of the truth is the pose of its own sensor in the
+//! reference frame.
 
 use std::path::{Path, PathBuf};
 
@@ -18,17 +19,17 @@ use super::{
 };
 use crate::trajectory::Trajectory;
 
-/// Lines of the truth farther apart than this (ns) say nothing of what is between them.
+/// The maximum gap between lines of the truth for interpolation (ns).
 const MAX_GAP_NS: u64 = 50_000_000;
 const CAMERAS: [&str; 2] = ["cam0", "cam1"];
 const TRUTH: &str = "state_groundtruth_estimate0";
 
-/// The folder with the sensors, where `folder` is such a data set or its `mav0`.
+/// The folder with the sensors, if `folder` is an EuRoC data set or its `mav0`.
 pub(super) fn home(folder: &Path) -> Option<PathBuf> {
     [folder.join("mav0"), folder.to_owned()].into_iter().find(|home| home.join("cam0").is_dir())
 }
 
-/// The data set whose sensors are in `home`.
+/// Reads the data set whose sensors are in `home`.
 pub(super) fn read(folder: &Path, home: &Path, pairs_only: bool) -> Result<Dataset, Vec<Fault>> {
     let below = home.strip_prefix(folder).unwrap_or(Path::new(""));
     let mut faults = Vec::new();
@@ -68,7 +69,7 @@ pub(super) fn read(folder: &Path, home: &Path, pairs_only: bool) -> Result<Datas
     if !truth.is_empty() && frames.iter().any(|frame| frame.truth.is_none()) {
         let without = frames.iter().filter(|frame| frame.truth.is_none()).count();
         let fault = Fault::new("stereo pairs without a truth", &home.join(TRUTH).join("data.csv"));
-        warnings.push(fault.value(format!("{without} of {}", frames.len())).remedy("it begins later or ends earlier"));
+        warnings.push(fault.value(format!("{without} of {}", frames.len())).remedy("these pairs are not evaluated"));
     }
     if !faults.is_empty() {
         return Err(faults);
@@ -78,7 +79,7 @@ pub(super) fn read(folder: &Path, home: &Path, pairs_only: bool) -> Result<Datas
     Ok(Foreign { folder: folder.to_owned(), rig, body_from_camera, frames, table, warnings }.into())
 }
 
-/// A camera and where it sits in the body.
+/// A camera with its pose in the body.
 struct Sensor<F> {
     camera: Pinhole,
     body_from_sensor: Transform<Body, F>,
@@ -97,7 +98,7 @@ fn camera(folder: &Path) -> Result<Sensor<Camera>, Fault> {
     Ok(Sensor { camera, body_from_sensor: yaml.body_from_sensor()? })
 }
 
-/// Stamp, line and file of each image.
+/// The stamp, line and file of each image.
 fn images(folder: &Path) -> Result<Vec<(u64, usize, String)>, Fault> {
     let file = folder.join("data.csv");
     let mut images: Vec<(u64, usize, String)> = Vec::new();
@@ -110,9 +111,9 @@ fn images(folder: &Path) -> Result<Vec<(u64, usize, String)>, Fault> {
         let Some((stamp, name)) = line.split_once(',').map(|(stamp, name)| (stamp.trim(), name.trim())) else {
             return Err(fault("a line without a file", "a line is `nanoseconds,file`"));
         };
-        let stamp = stamp.parse().map_err(|_| fault("a stamp that is no time", "give whole nanoseconds"))?;
+        let stamp = stamp.parse().map_err(|_| fault("an invalid stamp", "give whole nanoseconds"))?;
         if images.last().is_some_and(|(last, ..)| *last >= stamp) {
-            return Err(fault("a stamp that is not after the one before", "sort the lines by time"));
+            return Err(fault("a stamp not later than the previous one", "sort the lines by time"));
         }
         images.push((stamp, index + 1, name.to_owned()));
     }
@@ -122,9 +123,9 @@ fn images(folder: &Path) -> Result<Vec<(u64, usize, String)>, Fault> {
     Ok(images)
 }
 
-/// The true poses of the left camera; none where the set has no truth.
+/// The true poses of the left camera; empty without truth.
 fn truth(home: &Path, body_from_camera: &Transform<Body, Camera>) -> Result<Vec<Stamped<World, Camera>>, Fault> {
-    /// What the truth is the pose of.
+    /// The sensor whose pose the truth is.
     #[derive(Debug, Clone, Copy, PartialEq)]
     struct Marker;
     impl Frame for Marker {}
@@ -147,7 +148,7 @@ fn truth(home: &Path, body_from_camera: &Transform<Body, Camera>) -> Result<Vec<
     Ok(read.stamps.unwrap_or_default().into_iter().zip(poses).collect())
 }
 
-/// A `sensor.yaml`.
+/// A `sensor.yaml` file.
 struct Sheet {
     file: PathBuf,
     text: String,
@@ -157,12 +158,15 @@ struct Sheet {
 impl Sheet {
     fn read(file: PathBuf) -> Result<Self, Fault> {
         let text = read_text(&file)?;
-        // What OpenCV writes above its files is no YAML.
+        // The first line of OpenCV's files is not valid YAML.
         let body = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { &text };
         let content = YamlLoader::load_from_str(body)
             .map_err(|error| {
                 let line = error.marker().line() + usize::from(text.len() > body.len());
-                Fault::new("no YAML", &file).on_line(line).value(error.info()).remedy("give a sensor.yaml of EuRoC")
+                Fault::new("invalid YAML", &file)
+                    .on_line(line)
+                    .value(error.info())
+                    .remedy("give a sensor.yaml of EuRoC")
             })?
             .into_iter()
             .next()
@@ -170,7 +174,7 @@ impl Sheet {
         Ok(Self { file, content, text })
     }
 
-    /// What is wrong about `key`, on its line.
+    /// The fault of `key`, with its line.
     fn fault(&self, key: &str, what: impl Into<String>) -> Fault {
         let line = self.text.lines().position(|line| line.trim_start().starts_with(key)).map(|index| index + 1);
         Fault::new(what, &self.file).on_line(line)
@@ -184,7 +188,7 @@ impl Sheet {
         let number = |value: &Yaml| value.as_f64().or_else(|| value.as_i64().map(|full| full as f64));
         let numbers = value.as_vec().and_then(|list| list.iter().map(number).collect::<Option<Vec<f64>>>());
         numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite())).ok_or_else(|| {
-            self.fault(key, format!("`{key}` is no list of numbers")).remedy("give a sensor.yaml of EuRoC")
+            self.fault(key, format!("`{key}` is not a list of numbers")).remedy("give a sensor.yaml of EuRoC")
         })
     }
 
@@ -196,14 +200,14 @@ impl Sheet {
             .map_err(|_| self.fault(key, format!("`{key}` has {count} numbers")).remedy(format!("give {N}")))
     }
 
-    /// The word of a key that knows only some.
+    /// The value of a key with a fixed set of words.
     fn word(&self, key: &str, known: &[&str]) -> Result<(), Fault> {
         match self.content[key].as_str() {
             Some(word) if known.contains(&word) => Ok(()),
             other => Err(self
                 .fault(key, format!("an unknown `{key}`"))
                 .value(other.unwrap_or_default())
-                .remedy(format!("there is {}", known.join(", ")))),
+                .remedy(format!("give {}", known.join(", ")))),
         }
     }
 

@@ -1,4 +1,4 @@
-//! What the data sets of others have in common.
+//! Common parts of foreign data set formats.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::source::SensorBuffer;
 
-/// A data set in the layout of others: no site, no prior.
+/// A data set in a foreign format, without site and prior.
 pub(super) struct Foreign {
     pub(super) folder: PathBuf,
     pub(super) rig: StereoRig,
@@ -27,7 +27,7 @@ pub(super) struct Foreign {
 impl From<Foreign> for Dataset {
     fn from(foreign: Foreign) -> Self {
         let Foreign { folder, rig, body_from_camera, frames, table, warnings } = foreign;
-        // A name even for `.`.
+        // The canonical path has a name even for `.`.
         let real = folder.canonicalize().unwrap_or_else(|_| folder.clone());
         Self {
             name: real.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned()),
@@ -49,7 +49,7 @@ impl From<Foreign> for Dataset {
     }
 }
 
-/// The image `name` of `folder` that `table` lists; one that is missing is a fault unless `pairs_only`.
+/// The image `name` of `folder`, listed in `table`. A missing file is a fault unless `pairs_only`.
 pub(super) fn image(folder: &Path, name: &str, table: &Path, pairs_only: bool) -> Result<PathBuf, Fault> {
     if pairs_only && is_absent(folder, name) { Ok(folder.join(name)) } else { inside(folder, name, table) }
 }

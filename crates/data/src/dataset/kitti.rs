@@ -1,8 +1,8 @@
-//! Folders in the layout of KITTI's odometry sequences: `calib.txt`, `times.txt`, `image_0` and `image_1` (grey) or
-//! `image_2` and `image_3` (colour), and the truth in `poses.txt` or, as the benchmark has it, `../../poses/NAME.txt`.
+//! KITTI odometry sequences: `calib.txt`, `times.txt`, `image_0` and `image_1` (grey) or `image_2` and `image_3`
+//! (colour), and the truth in `poses.txt` or, as in the benchmark, `../../poses/NAME.txt`.
 //!
-//! `Pi = K [I | t]`: rectified cameras, shifted by t against camera 0; a line of the truth is the pose of camera 0 in the
-//! world.
+//! The projection matrices are `Pi = K [I | t]`: rectified cameras, shifted by t from camera 0. A line of the truth is
+//! the pose of camera 0 in the world.
 
 use std::path::{Path, PathBuf};
 
@@ -20,16 +20,16 @@ use super::{
 };
 use crate::trajectory::Trajectory;
 
-/// Which two of the four cameras.
+/// The pair of cameras to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cameras {
-    /// The grey ones where they are there, else the coloured.
+    /// The grey cameras if present, otherwise the colour ones.
     #[default]
     Any,
-    /// `image_0` and `image_1`.
+    /// The grey cameras `image_0` and `image_1`.
     Grey,
-    /// `image_2` and `image_3`.
+    /// The colour cameras `image_2` and `image_3`.
     Colour,
 }
 
@@ -43,12 +43,12 @@ impl Cameras {
     }
 }
 
-/// Whether `folder` is such a sequence.
+/// Whether `folder` is a KITTI sequence.
 pub(super) fn is_one(folder: &Path) -> bool {
     folder.join("calib.txt").is_file() && [0, 2].iter().any(|k| folder.join(format!("image_{k}")).is_dir())
 }
 
-/// The sequence in `folder`.
+/// Reads the sequence in `folder`.
 pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<Dataset, Vec<Fault>> {
     let cameras = cameras.of(folder);
     let stamps = times(folder).map_err(|fault| vec![fault])?;
@@ -64,14 +64,14 @@ pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<
         frames.push(DatasetFrame { stamp_ns, left, right, truth: None, prior: None, visible: Vec::new() });
     }
     let Some(size) = frames.first().and_then(|frame| declared_size(&frame.left)) else {
-        let fault = Fault::new("no image to tell the cameras' size", &folder.join(format!("image_{}", cameras[0])));
-        return Err(faults.into_iter().chain([fault.remedy("images are called 000000.png, …")]).collect());
+        let fault = Fault::new("no image that gives the cameras' size", &folder.join(format!("image_{}", cameras[0])));
+        return Err(faults.into_iter().chain([fault.remedy("name the images 000000.png, …")]).collect());
     };
     let (rig, shift) = rig(folder, cameras, size).map_err(|fault| vec![fault])?;
     if !pairs_only && faults.is_empty() {
         match truth(folder, stamps.len()) {
             Ok(poses) => {
-                // Camera 0 sees a point at x − t where the left camera has it at x.
+                // A point at x in the left camera is at x − t in camera 0.
                 let zero_from_left = Transform::<Camera, Camera>::new(UnitQuaternion::identity(), -shift);
                 for (frame, pose) in frames.iter_mut().zip(poses) {
                     frame.truth = Some(pose * zero_from_left);
@@ -96,7 +96,7 @@ pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<
     .into())
 }
 
-/// Images beyond the last stamp: a warning, or, of more than half of them, a fault.
+/// The images beyond the last stamp: a warning, or a fault if they are more than half.
 fn without_stamps(folder: &Path, cameras: [usize; 2], stamps: usize) -> Result<Option<Fault>, Fault> {
     let count = |camera: usize| {
         let entries = std::fs::read_dir(folder.join(format!("image_{camera}"))).into_iter().flatten();
@@ -108,8 +108,10 @@ fn without_stamps(folder: &Path, cameras: [usize; 2], stamps: usize) -> Result<O
         .value(format!("{stamps} stamps, {left} left and {right} right images"));
     match () {
         () if images <= stamps => Ok(None),
-        () if images > 2 * stamps => Err(fault.remedy("at least half must have one: a line a stereo pair, seconds")),
-        () => Ok(Some(fault.remedy("give one line a stereo pair; images beyond the last line are left out"))),
+        () if images > 2 * stamps => {
+            Err(fault.remedy("give one line a stereo pair (seconds); at least half of the images need one"))
+        }
+        () => Ok(Some(fault.remedy("give one line a stereo pair; images beyond the last line are skipped"))),
     }
 }
 
@@ -119,9 +121,9 @@ fn times(folder: &Path) -> Result<Vec<u64>, Fault> {
     let mut stamps: Vec<u64> = Vec::new();
     for (index, line) in read_text(&file)?.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let fault = |what: &str, remedy: &str| Fault::new(what, &file).on_line(index + 1).value(line).remedy(remedy);
-        let stamp = nanoseconds(line.trim()).ok_or_else(|| fault("a stamp that is no time", "give seconds"))?;
+        let stamp = nanoseconds(line.trim()).ok_or_else(|| fault("an invalid stamp", "give seconds"))?;
         if stamps.last().is_some_and(|last| *last >= stamp) {
-            return Err(fault("a stamp that is not after the one before", "sort the lines by time"));
+            return Err(fault("a stamp not later than the previous one", "sort the lines by time"));
         }
         stamps.push(stamp);
     }
@@ -131,7 +133,7 @@ fn times(folder: &Path) -> Result<Vec<u64>, Fault> {
     Ok(stamps)
 }
 
-/// The rig, and where camera 0 is seen from its left camera.
+/// The rig, and the pose of camera 0 in the left camera's frame.
 fn rig(folder: &Path, cameras: [usize; 2], size: [u32; 2]) -> Result<(StereoRig, Vector3<f64>), Fault> {
     let file = folder.join("calib.txt");
     let text = read_text(&file)?;
@@ -150,7 +152,9 @@ fn rig(folder: &Path, cameras: [usize; 2], size: [u32; 2]) -> Result<(StereoRig,
             .ok_or_else(|| fault(format!("`{name}` without 12 numbers")).value(line))?;
         let [fx, skew, cx, tx, zero, fy, cy, ty, a, b, c, tz] = p;
         if [skew, zero, a, b] != [0.0; 4] || c != 1.0 {
-            return Err(fault(format!("`{name}` is no K [I | t]")).value(line).remedy("give rectified cameras"));
+            return Err(fault(format!("`{name}` is not of the form K [I | t]"))
+                .value(line)
+                .remedy("give rectified cameras"));
         }
         let pinhole = Pinhole::new(size, [fx, fy], [cx, cy], &[]).map_err(|error| fault(error.to_string()))?;
         Ok((pinhole, Vector3::new((tx - cx * tz) / fx, (ty - cy * tz) / fy, tz)))
@@ -161,7 +165,7 @@ fn rig(folder: &Path, cameras: [usize; 2], size: [u32; 2]) -> Result<(StereoRig,
     Ok((rig, t_left))
 }
 
-/// The true poses of camera 0, as many as there are frames; none where the set has no truth.
+/// The true poses of camera 0, one a frame; empty without truth.
 fn truth(folder: &Path, frames: usize) -> Result<Vec<Transform<World, Camera>>, Fault> {
     let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let name = real.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
@@ -170,8 +174,8 @@ fn truth(folder: &Path, frames: usize) -> Result<Vec<Transform<World, Camera>>, 
     let poses = Trajectory::read(file)?.poses;
     if poses.len() != frames {
         let fault =
-            Fault::new("as many poses as stamps are needed", file).value(format!("{} of {frames}", poses.len()));
-        return Err(fault.remedy("give one line a line of times.txt"));
+            Fault::new("the numbers of poses and stamps differ", file).value(format!("{} of {frames}", poses.len()));
+        return Err(fault.remedy("give one pose for each line of times.txt"));
     }
     let rigid = |pose: &seafix_evaluation::trajectory::Pose| {
         let mut rotation = nalgebra::Rotation3::from_matrix_unchecked(pose.rotation);

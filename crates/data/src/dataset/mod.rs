@@ -1,5 +1,5 @@
-//! Data sets: folders with stereo pairs, their rig, and what is known about them. Our own are `seafix-dataset/1`; those
-//! of EuRoC and KITTI are read as they are.
+//! Data sets: folders with stereo pairs, their rig, truth and prior. The native format is `seafix-dataset/1`; EuRoC and
+//! KITTI are read directly.
 
 mod check;
 mod euroc;

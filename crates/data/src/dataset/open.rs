@@ -24,72 +24,70 @@ use super::{
 };
 use crate::source::SensorBuffer;
 
-/// A data set whose description, tables and paths are in order. Its images are
-/// read frame by frame.
+/// A data set with valid description, tables and paths. Its images are read frame by frame.
 #[derive(Debug)]
 pub struct Dataset {
-    /// Its name.
+    /// The name.
     pub name: String,
     /// The folder.
     pub folder: PathBuf,
-    /// The rig that took it.
+    /// The stereo rig.
     pub rig: StereoRig,
-    /// The ports that its cameras stand behind; the rig's numbers were found in the water behind them.
+    /// The ports in front of the cameras; the rig was calibrated in water behind them.
     pub ports: [Option<CalibratedPort>; 2],
-    /// What there is to see, where that is known.
+    /// The site, if known.
     pub site: Option<Site>,
-    /// Where the left camera sits in the vehicle; the identity where the set does not say.
+    /// The pose of the left camera in the vehicle; the identity if the description has none.
     pub body_from_camera: Transform<Body, Camera>,
     /// The stereo pairs, in order of time.
     pub frames: Vec<DatasetFrame>,
-    /// True poses of displaced objects, by id; the others are where the survey says.
+    /// The true poses of displaced objects by id; the others are as surveyed.
     pub objects: Vec<(String, Transform<World, Object>)>,
-    /// Whether the set says which feature points are visible.
+    /// Whether the data set lists the visible feature points.
     pub has_visibility: bool,
-    /// What its Doppler log and gyro told.
+    /// The readings of its Doppler log and gyro.
     pub sensor_buffer: SensorBuffer,
-    /// Depth of the pixels in images of 16 bits.
+    /// The number of significant bits of a pixel in images of 16 bits.
     pub bits: u8,
-    /// How large an image may be; the reader's, not the data set's, to say.
+    /// The limits of image sizes, set by the reader rather than the data set.
     pub limits: ImageLimits,
     /// The table of the frames, relative to the folder.
     pub(super) table: String,
     pub(super) hashes: Vec<(String, String)>,
-    /// What is odd but not wrong.
+    /// The warnings.
     pub warnings: Vec<Fault>,
 }
 
-/// One stereo pair of a data set and what is known about it.
+/// A stereo pair of a data set with its truth and its prior.
 #[derive(Debug, Clone)]
 pub struct DatasetFrame {
-    /// When it was taken (ns).
+    /// The time (ns).
     pub stamp_ns: u64,
-    /// The left image's file.
+    /// The file of the left image.
     pub left: PathBuf,
-    /// The right image's file.
+    /// The file of the right image.
     pub right: PathBuf,
-    /// The true pose of the left camera.
+    /// The ground truth pose of the left camera.
     pub truth: Option<Transform<World, Camera>>,
-    /// The rough pose a method may use, and its covariance.
+    /// The prior pose with its covariance.
     pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
-    /// Feature points that both cameras see: (object, point).
+    /// The feature points in view of both cameras: (object, point).
     pub visible: Vec<(String, String)>,
 }
 
 impl Dataset {
-    /// Reads the data set in `folder`: a `seafix-dataset/1`, a folder of EuRoC, or a sequence of KITTI.
+    /// Reads the data set in `folder`: `seafix-dataset/1`, EuRoC or KITTI.
     ///
     /// # Errors
-    /// Everything that is wrong with it, at once.
+    /// All faults of the data set.
     pub fn open(folder: &Path) -> Result<Self, Vec<Fault>> {
         Self::read(folder, false, false)
     }
 
-    /// The same, of our own format also where its pairs are not in order of time: they are sorted, and of each stamp the first
-    /// is kept.
+    /// Reads a data set and sorts its pairs by time. The first pair of each stamp is kept (`seafix-dataset/1` only).
     ///
     /// # Errors
-    /// Everything else that is wrong with it, at once.
+    /// All other faults of the data set.
     pub fn open_repaired(folder: &Path) -> Result<Self, Vec<Fault>> {
         Self::read(folder, false, true)
     }
@@ -97,7 +95,7 @@ impl Dataset {
     /// Reads the KITTI sequence in `folder` with two of its cameras.
     ///
     /// # Errors
-    /// Everything that is wrong with it, at once.
+    /// All faults of the sequence.
     pub fn open_kitti(folder: &Path, cameras: Cameras) -> Result<Self, Vec<Fault>> {
         kitti::read(folder, cameras, false)
     }
@@ -105,21 +103,22 @@ impl Dataset {
     /// Reads the EuRoC data set in `folder`.
     ///
     /// # Errors
-    /// Everything that is wrong with it, at once.
+    /// All faults of the data set.
     pub fn open_euroc(folder: &Path) -> Result<Self, Vec<Fault>> {
         let Some(home) = euroc::home(folder) else {
-            let fault = Fault::new("a folder that is no data set of EuRoC", folder);
+            let fault = Fault::new("a folder without an EuRoC data set", folder);
             return Err(vec![fault.remedy("name the folder that has mav0/cam0")]);
         };
         euroc::read(folder, &home, false)
     }
 
-    /// Reads what odometry may know of the data set in `folder`: rig, stereo pairs and readings. Site, truth and prior are
-    /// not looked at. An image file that does not exist is no fault here but one of its [`pair`](Self::pair). `sort_stamps` as in
-    /// [`open_repaired`](Self::open_repaired).
+    /// Reads the part of a data set that odometry may use: rig, stereo pairs and readings.
+    ///
+    /// Site, truth and prior are ignored. A missing image file is a fault of its [`pair`](Self::pair) only.
+    /// `sort_stamps` is explained at [`open_repaired`](Self::open_repaired).
     ///
     /// # Errors
-    /// Everything else that is wrong with it, at once.
+    /// All other faults of the data set.
     pub fn open_pairs(folder: &Path, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
         Self::read(folder, true, sort_stamps)
     }
@@ -127,7 +126,7 @@ impl Dataset {
     fn read(folder: &Path, pairs_only: bool, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
         let file = folder.join("dataset.toml");
         if !folder.is_dir() {
-            return Err(vec![Fault::new("no such folder", folder).remedy("name a folder with a dataset.toml")]);
+            return Err(vec![Fault::new("no such folder", folder).remedy("give a folder with a dataset.toml")]);
         }
         if !file.exists() {
             if let Some(home) = euroc::home(folder) {
@@ -136,8 +135,9 @@ impl Dataset {
             if kitti::is_one(folder) {
                 return kitti::read(folder, Cameras::Any, pairs_only);
             }
-            let fault = Fault::new("a folder that is no data set", folder);
-            let remedy = "it has neither a dataset.toml, nor EuRoC's mav0/cam0, nor KITTI's calib.txt and image_0";
+            let fault = Fault::new("a folder without a data set", folder);
+            let remedy =
+                "give a folder with dataset.toml, with EuRoC's mav0/cam0, or with KITTI's calib.txt and image_0";
             return Err(vec![fault.remedy(remedy)]);
         }
         let source = read_text(&file).map_err(|fault| vec![fault])?;
@@ -161,24 +161,24 @@ impl Dataset {
     }
 }
 
-/// Whether `folder` holds a data set, ours or others'.
+/// Whether `folder` holds a data set in a supported format.
 pub fn is_one(folder: &Path) -> bool {
     folder.join("dataset.toml").exists() || euroc::home(folder).is_some() || kitti::is_one(folder)
 }
 
 impl Dataset {
-    /// The same, its images held to other limits.
+    /// The same data set with other limits for its images.
     #[must_use]
     pub fn within(self, limits: ImageLimits) -> Self {
         Self { limits, ..self }
     }
 
-    /// Whether both its Doppler log and its gyro are heard.
+    /// Whether there are readings of both the Doppler log and the gyro.
     pub fn has_readings(&self) -> bool {
         self.sensor_buffer.is_complete()
     }
 
-    /// What Doppler log and gyro told up to `now` (ns), up to `before` left out.
+    /// The readings of Doppler log and gyro after `before` and up to `now` (ns).
     pub fn readings(&self, before: Option<u64>, now: u64) -> Vec<Reading> {
         self.sensor_buffer.between(before, now)
     }
@@ -186,15 +186,15 @@ impl Dataset {
     /// The two images of `frame`.
     ///
     /// # Errors
-    /// As [`read_image`].
+    /// As for [`read_image`].
     pub fn pair(&self, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
         let left = read_image(&frame.left, self.rig.left().size(), self.bits, self.limits)?;
         Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits, self.limits)?))
     }
 
-    /// Leaves out the pairs with an image of another size than its camera was calibrated for, as a set recorded in two
-    /// modes has them, and warns of them. If more than half of the pairs would go, all stay: then it is the
-    /// calibration that belongs elsewhere, and reading them says so.
+    /// Skips, with a warning, the pairs with an image of another size than its camera's calibration; a data set
+    /// recorded in two modes has some. If these are more than half of the pairs, none is skipped: the calibration is
+    /// wrong then, and the fault occurs when the images are read.
     pub fn leave_out_mismatches(&mut self) {
         let sizes = [self.rig.left().size(), self.rig.right().size()];
         let faults: Vec<Option<Fault>> = self
@@ -207,8 +207,8 @@ impl Dataset {
         let (all, mismatches) = (faults.len(), faults.iter().flatten().count());
         let Some(first) = faults.iter().flatten().next().filter(|_| 2 * mismatches <= all) else { return };
         self.warnings.push(Fault {
-            what: format!("{mismatches} of {all} pairs left out: {}", first.what),
-            remedy: "`reject-mismatched-images = true` of the source refuses them".to_owned(),
+            what: format!("{mismatches} of {all} pairs skipped: {}", first.what),
+            remedy: "`reject-mismatched-images = true` of the source rejects the data set".to_owned(),
             ..first.clone()
         });
         let mut fits = faults.iter().map(Option::is_none);
@@ -216,7 +216,7 @@ impl Dataset {
     }
 }
 
-/// Reads one description and gathers its faults.
+/// A reader of one description that collects its faults.
 struct Reader<'a> {
     folder: &'a Path,
     file: &'a Path,
@@ -232,7 +232,7 @@ impl Reader<'_> {
     fn read(mut self) -> Result<Dataset, Vec<Fault>> {
         let d = self.described;
         if !FORMATS.contains(&d.format.as_str()) {
-            let remedy = format!("this program reads {}", FORMATS.join(" and "));
+            let remedy = format!("supported are {}", FORMATS.join(" and "));
             self.fault(&["format"], "an unknown format", &d.format, &remedy);
         }
         let bits = d.depth(self.file, self.source).map_err(|fault| self.faults.push(fault));
@@ -335,7 +335,7 @@ impl Reader<'_> {
         self.faults.push(Fault::new(what, self.file).on_line(line_of(self.source, key)).value(value).remedy(remedy));
     }
 
-    /// The content of a file the description names, or a fault.
+    /// The content of a file in the description, or a fault.
     fn content(&mut self, name: &str) -> Option<(PathBuf, String)> {
         let read =
             inside(self.folder, name, self.file).and_then(|path| read_text(&path).map(|content| (path, content)));
@@ -351,7 +351,7 @@ impl Reader<'_> {
         parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()
     }
 
-    /// A trajectory; a quaternion that had to be normalised is a warning, one a table.
+    /// A trajectory. Each table with a quaternion that needed normalisation has one warning.
     fn poses(&mut self, name: &str) -> Option<Vec<tum::Stamped<World, Camera>>> {
         let (path, content) = self.content(name)?;
         let poses = tum::parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()?;
@@ -391,7 +391,7 @@ impl Reader<'_> {
         Some(Covariance6::isotropic(sigma.attitude_deg.to_radians(), sigma.position))
     }
 
-    /// Objects and points that the tables name exist in the site.
+    /// Checks that the site has the objects and points in the tables.
     fn names(
         &mut self,
         site: Option<&Site>,
@@ -403,7 +403,7 @@ impl Reader<'_> {
         for line in visibility {
             if points(&line.object).is_some_and(|points| points.iter().all(|point| point.id != line.point)) {
                 let table = self.folder.join(self.described.visibility.as_deref().unwrap_or_default());
-                let fault = Fault::new("a point that its object does not have", &table).on_line(line.line);
+                let fault = Fault::new("an unknown point of an object", &table).on_line(line.line);
                 self.faults
                     .push(fault.value(format!("{}/{}", line.object, line.point)).remedy("name a point of the site"));
             }
@@ -416,7 +416,7 @@ impl Reader<'_> {
         for id in unknown {
             let remedy = nearest(id, ids.iter().copied())
                 .map_or_else(|| format!("there are {}", ids.join(", ")), |near| format!("did you mean `{near}`?"));
-            self.fault(&["site"], "an object that the site does not have", id, &remedy);
+            self.fault(&["site"], "an object that is not in the site", id, &remedy);
         }
     }
 }

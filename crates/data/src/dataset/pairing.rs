@@ -1,13 +1,13 @@
-//! Which left image belongs to which right one.
+//! Pairing of left and right images.
 
 use std::path::Path;
 
 use seafix_component::Fault;
 
-/// Images of one instant: stamps within this (ns) of each other.
+/// The maximum difference of the stamps of a pair (ns).
 pub const SAME_INSTANT_NS: u64 = 1_000_000;
 
-/// The pairs (left, right) of indices whose stamps are within `tolerance` (ns) of each other, nearest first come; both
+/// The pairs (left, right) of indices whose stamps are within `tolerance` (ns) of each other, closest pairs first. Both
 /// lists are in order of time.
 pub fn pairs(left: &[u64], right: &[u64], tolerance: u64) -> Vec<(usize, usize)> {
     let (mut pairs, mut j) = (Vec::new(), 0);
@@ -25,18 +25,16 @@ pub fn pairs(left: &[u64], right: &[u64], tolerance: u64) -> Vec<(usize, usize)>
     pairs
 }
 
-/// What of the images is left out because it has no partner: nothing, a warning, or, of more than half, a fault.
+/// The images without a partner: nothing, a warning, or a fault if they are more than half.
 pub fn left_out(pairs: usize, [left, right]: [usize; 2], file: &Path) -> Result<Option<Fault>, Fault> {
     let all = left.max(right);
     let fault = Fault::new("images without a partner in the other camera", file)
         .value(format!("{pairs} pairs of {left} left and {right} right images"));
     match () {
         () if 2 * pairs < all => {
-            Err(fault.remedy("at least half must be paired; are these the two cameras of one rig?"))
+            Err(fault.remedy("at least half must be paired; check that these are the cameras of one rig"))
         }
-        () if pairs < all => {
-            Ok(Some(fault.remedy("images of a pair are taken at one instant; the others are left out")))
-        }
+        () if pairs < all => Ok(Some(fault.remedy("images of a pair have equal stamps; the others are skipped"))),
         () => Ok(None),
     }
 }
@@ -50,7 +48,7 @@ mod tests {
         assert_eq!(pairs(&[0, 10, 20], &[0, 10, 20], 1), [(0, 0), (1, 1), (2, 2)]);
         assert_eq!(pairs(&[0, 10, 20, 30], &[9, 31], 2), [(1, 0), (3, 1)]);
         assert_eq!(pairs(&[0, 10, 20], &[15, 16, 17], 2), []);
-        // Two left images within reach of one right image: the nearer takes it.
+        // The closer of two left images takes a right image.
         assert_eq!(pairs(&[8, 10], &[10], 5), [(1, 0)]);
         assert_eq!(pairs(&[10, 12], &[10], 5), [(0, 0)]);
         assert_eq!(pairs(&[], &[1], 5), []);

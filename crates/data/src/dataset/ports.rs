@@ -1,4 +1,4 @@
-//! The ports of a data set's cameras, as the simulation models them.
+//! Ports of a data set's cameras, in the model of the simulation.
 
 use std::path::Path;
 
@@ -6,17 +6,17 @@ use seafix_component::Fault;
 use seafix_io::dataset::{Description, PortKind, PortNumbers, rig_fault};
 use seafix_simulation::optics::{self, Port};
 
-/// A port, and the distance at which the camera behind it was calibrated in the water.
+/// A port and the distance of the camera's calibration in water.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratedPort {
     /// The port.
     pub port: Port,
-    /// Distance of the calibration (m): the camera's numbers hold there, and only nearly elsewhere.
+    /// The distance of the calibration (m); the camera parameters are exact there and approximate elsewhere.
     pub range: f64,
 }
 
 impl CalibratedPort {
-    /// Its numbers in a description.
+    /// The parameters of the port in a description.
     pub(super) fn numbers(&self) -> PortNumbers {
         let Port { kind, distance, thickness, radius, offset, glass, water } = self.port;
         let kind = match kind {
@@ -27,10 +27,10 @@ impl CalibratedPort {
         PortNumbers { kind, calibrated_at: Some(self.range), distance, thickness, radius, offset, glass, water }
     }
 
-    /// The port that the numbers describe.
+    /// The port with these parameters.
     ///
     /// # Errors
-    /// A number outside its range: `value; remedy`.
+    /// An invalid parameter, as `value; remedy`.
     fn of(numbers: &PortNumbers) -> Result<Self, String> {
         let PortNumbers { kind, distance, thickness, radius, offset, glass, water, .. } = *numbers;
         let kind = match kind {
@@ -39,7 +39,7 @@ impl CalibratedPort {
             PortKind::Dome => optics::PortKind::Dome,
         };
         let port = Port { kind, distance, thickness, radius, offset, glass, water };
-        // A flat port has no radius to be wrong.
+        // A flat port has no radius to check.
         let checked = if kind == optics::PortKind::Flat { Port { radius: 1.0, ..port.clone() } } else { port.clone() };
         checked.check()?;
         Ok(Self { port, range: numbers.calibrated_in_water()? })
@@ -49,7 +49,7 @@ impl CalibratedPort {
 /// The ports of the left and the right camera.
 ///
 /// # Errors
-/// The first number of a port that is outside its range.
+/// The first invalid parameter of a port.
 pub(super) fn ports(
     description: &Description,
     file: &Path,

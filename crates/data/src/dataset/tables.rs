@@ -1,4 +1,4 @@
-//! The small CSV tables of a data set: a header line, then values without quotes.
+//! The CSV tables of a data set: a header line, then values without quotes.
 
 use std::path::Path;
 
@@ -7,10 +7,10 @@ use seafix_component::Fault;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 use seafix_navigation::{Device, Reading};
 
-/// What a table holds, or the first line that is wrong.
+/// The content of a table, or its first fault.
 type Table<T> = Result<Vec<T>, Fault>;
 
-/// One line of `frames.csv`: the stamp and the two image files of a stereo pair.
+/// A line of `frames.csv`: the stamp and the two image files of a stereo pair.
 pub(super) struct FrameLine {
     pub(super) line: usize,
     pub(super) stamp_ns: u64,
@@ -18,7 +18,7 @@ pub(super) struct FrameLine {
     pub(super) right: String,
 }
 
-/// One line of the visibility table: a feature point that both cameras see.
+/// A line of the visibility table: a feature point in view of both cameras.
 pub(super) struct VisibleLine {
     pub(super) line: usize,
     pub(super) stamp_ns: u64,
@@ -26,19 +26,16 @@ pub(super) struct VisibleLine {
     pub(super) point: String,
 }
 
-/// `stamp_ns,left,right`, in order of time; those that are not are refused, or, with `sort_stamps`, sorted, of each stamp the first
-/// kept.
+/// Reads `stamp_ns,left,right` in order of time. Lines out of order are rejected, or with `sort_stamps` sorted, keeping
+/// the first of each stamp.
 pub(super) fn frames(text: &str, file: &Path, sort_stamps: bool) -> Table<FrameLine> {
     let mut frames: Vec<FrameLine> = Vec::new();
     for (line, [stamp, left, right]) in rows(text, file, ["stamp_ns", "left", "right"])? {
         let stamp_ns = number(stamp, line, file)?;
         if !sort_stamps && frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
-            return Err(Fault::new("a stamp that is not after the one before", file)
-                .on_line(line)
-                .value(stamp)
-                .remedy(
-                    "sort the lines by time, one a stereo pair; `sort-stamps` does it and keeps the first of each stamp",
-                ));
+            return Err(Fault::new("a stamp not later than the previous one", file).on_line(line).value(stamp).remedy(
+                "sort the lines by time, one a stereo pair; `sort-stamps` does it and keeps the first of each stamp",
+            ));
         }
         frames.push(FrameLine { line, stamp_ns, left: left.to_owned(), right: right.to_owned() });
     }
@@ -52,7 +49,7 @@ pub(super) fn frames(text: &str, file: &Path, sort_stamps: bool) -> Table<FrameL
     Ok(frames)
 }
 
-/// `stamp_ns,object,point`.
+/// Reads `stamp_ns,object,point`.
 pub(super) fn visibility(text: &str, file: &Path) -> Table<VisibleLine> {
     rows(text, file, ["stamp_ns", "object", "point"])?
         .into_iter()
@@ -63,7 +60,7 @@ pub(super) fn visibility(text: &str, file: &Path) -> Table<VisibleLine> {
         .collect()
 }
 
-/// `object,m00,…,m33`: the true `world_from_object`, row by row.
+/// Reads `object,m00,…,m33`: the true `world_from_object`, row by row.
 pub(super) fn objects(text: &str, file: &Path) -> Table<(String, Transform<World, Object>)> {
     wide_rows(text, file, "object", 16)?
         .into_iter()
@@ -75,7 +72,7 @@ pub(super) fn objects(text: &str, file: &Path) -> Table<(String, Transform<World
         .collect()
 }
 
-/// `stamp_ns,c00,…,c55`: the covariance of the prior (rotation first, camera frame), row by row.
+/// Reads `stamp_ns,c00,…,c55`: the covariance of the prior (rotation first, camera frame), row by row.
 pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<World, Camera>)> {
     wide_rows(text, file, "stamp_ns", 36)?
         .into_iter()
@@ -93,7 +90,8 @@ pub(super) fn covariances(text: &str, file: &Path) -> Table<(u64, Covariance6<Wo
         .collect()
 }
 
-/// `stamp_ns,arrival_ns,vx,vy,vz,sigma`, of a gyro `wx,wy,wz`: readings and when each is there to be used.
+/// Reads `stamp_ns,arrival_ns,vx,vy,vz,sigma` of a Doppler log, or `wx,wy,wz` of a gyro: readings with their times of
+/// arrival.
 pub(super) fn readings(text: &str, file: &Path, device: Device) -> Table<(u64, Reading)> {
     let axes = match device {
         Device::Doppler => ["vx", "vy", "vz"],
@@ -109,18 +107,22 @@ pub(super) fn readings(text: &str, file: &Path, device: Device) -> Table<(u64, R
             };
             let spread = real(sigma)?;
             if !(spread >= 0.0 && spread.is_finite()) {
-                return fault("a standard deviation that cannot be", sigma, "give one of each axis, zero or more");
+                return fault("an invalid standard deviation", sigma, "give one number for each axis, zero or more");
             }
             if !value.iter().all(|x| x.is_finite()) {
                 return fault(
                     "a reading that is not finite",
                     &value.map(|x| x.to_string()).as_slice().join(","),
-                    "leave the line out",
+                    "remove the line",
                 );
             }
             let (stamp_ns, arrival_ns) = (number(stamp, line, file)?, number(arrival, line, file)?);
             if arrival_ns < stamp_ns {
-                return fault("a reading that arrives before it is made", arrival, "arrival_ns is the later one");
+                return fault(
+                    "a reading that arrives before its measurement",
+                    arrival,
+                    "arrival_ns must be the later time",
+                );
             }
             let covariance = Matrix3::identity() * (spread * spread);
             Ok((arrival_ns, Reading { device, stamp_ns, value, covariance }))
@@ -128,7 +130,7 @@ pub(super) fn readings(text: &str, file: &Path, device: Device) -> Table<(u64, R
         .collect()
 }
 
-/// Data lines with exactly the columns of `header`, and their line numbers.
+/// The data lines with exactly the columns of `header`, and their line numbers.
 pub fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Table<(usize, [&'a str; N])> {
     let expected = header.join(",");
     let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
@@ -156,7 +158,7 @@ pub fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -
         .collect()
 }
 
-/// Data lines of a key and `count` numbers, below a header line that begins with `head`.
+/// The data lines of a key and `count` numbers, below a header that begins with `head`.
 fn wide_rows<'a>(text: &'a str, file: &Path, head: &str, count: usize) -> Table<(usize, &'a str, Vec<f64>)> {
     let first = text.lines().next().unwrap_or_default();
     if first.split(',').map(str::trim).next() != Some(head) || first.split(',').count() != count + 1 {
@@ -184,10 +186,10 @@ fn wide_rows<'a>(text: &'a str, file: &Path, head: &str, count: usize) -> Table<
         .collect()
 }
 
-/// The number that `word` stands for.
+/// Parses a number.
 ///
 /// # Errors
-/// A word that is no number, with its line.
+/// A word that is not a number, with its line.
 pub fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
     word.parse()
         .map_err(|_| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
@@ -215,9 +217,10 @@ mod tests {
         assert_eq!((arrival, reading.stamp_ns, reading.value.x, reading.covariance[(2, 2)]), (7, 5, 0.4, 1.6e-5));
         let said = |line: &str| table(line).unwrap_err().to_string();
         assert!(
-            said("5,4,0.4,0,0,0.004").contains("doppler.csv:2") && said("5,4,0,0,0,0").contains("before it is made")
+            said("5,4,0.4,0,0,0.004").contains("doppler.csv:2")
+                && said("5,4,0,0,0,0").contains("before its measurement")
         );
-        assert!(said("5,7,nan,0,0,0.004").contains("not finite") && said("5,7,0,0,0,-1").contains("cannot be"));
+        assert!(said("5,7,nan,0,0,0.004").contains("not finite") && said("5,7,0,0,0,-1").contains("invalid standard"));
         assert!(readings("stamp_ns,arrival_ns,wx,wy,wz,sigma\n", file, Device::Gyro).unwrap().is_empty());
     }
 

@@ -6,20 +6,20 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use seafix_component::Fault;
 use seafix_geometry::{Frame, Transform};
 
-/// A stamp in nanoseconds and the pose at it.
+/// A stamp (ns) and the pose at it.
 pub type Stamped<A, B> = (u64, Transform<A, B>);
 
 /// Reads the poses of a TUM text; `file` is named in faults. Lines that begin with `#` are comments.
 ///
 /// # Errors
-/// The first line that is not eight numbers, has a quaternion off unit length by more than 1e-3, or
-/// a stamp not after the one before; or a comment that names w first.
+/// The first line that is not eight numbers, has a quaternion off unit length by more than 1e-3, or has a stamp not
+/// later than the previous one; a comment that names w first.
 pub fn parse<A: Frame, B: Frame>(text: &str, file: &Path) -> Result<Vec<Stamped<A, B>>, Fault> {
     Ok(lines_of(text.lines().enumerate().map(|(index, line)| (index + 1, line)), file)?.0)
 }
 
-/// As [`parse`], of lines with their numbers, of a file that anybody may have written: that its quaternions seem to have w
-/// first is refused as well. A data set says by its format what its files hold, and is not doubted.
+/// Reads numbered TUM lines of any origin. Quaternions that seem to have w first are rejected too; the format of a data
+/// set excludes them, so that [`parse`] does not test it.
 pub fn parse_lines<'a, A: Frame, B: Frame>(
     lines: impl Iterator<Item = (usize, &'a str)>,
     file: &Path,
@@ -29,14 +29,14 @@ pub fn parse_lines<'a, A: Frame, B: Frame>(
         None => Ok(poses),
         Some((number, line)) => {
             Err(Fault::new("quaternions that seem to have w first", file).on_line(number).value(line).remedy(
-                "the order is qx qy qz qw: reorder the columns, or, if it is that, say so in a comment above, \
+                "the order is qx qy qz qw: reorder the columns, or, if they have this order, name them in a comment above, \
                  `# seconds tx ty tz qx qy qz qw`",
             ))
         }
     }
 }
 
-/// The poses, and what their lines say of the order of their quaternions.
+/// The poses, and indications of the order of the quaternions.
 fn lines_of<'a, A: Frame, B: Frame>(
     lines: impl Iterator<Item = (usize, &'a str)>,
     file: &Path,
@@ -63,9 +63,8 @@ fn lines_of<'a, A: Frame, B: Frame>(
             };
             return Err(fault(&format!("{} columns", words.len()), line, remedy));
         }
-        let stamp = nanoseconds(words[0]).ok_or_else(|| {
-            fault("a stamp that is no time", words[0], "give seconds, not negative, as a decimal number")
-        })?;
+        let stamp = nanoseconds(words[0])
+            .ok_or_else(|| fault("an invalid stamp", words[0], "give seconds, not negative, as a decimal number"))?;
         let mut numbers = [0.0; 7];
         for (number, word) in numbers.iter_mut().zip(&words[1..]) {
             *number = word
@@ -84,7 +83,7 @@ fn lines_of<'a, A: Frame, B: Frame>(
             ));
         }
         if poses.last().is_some_and(|(last, _)| *last >= stamp) {
-            return Err(fault("a stamp that is not after the one before", words[0], "sort the lines by time"));
+            return Err(fault("a stamp not later than the previous one", words[0], "sort the lines by time"));
         }
         order.see(number, line, [qx, qy, qz, qw]);
         poses.push((stamp, Transform::new(UnitQuaternion::new_normalize(quaternion), Vector3::new(tx, ty, tz))));
@@ -92,11 +91,12 @@ fn lines_of<'a, A: Frame, B: Frame>(
     Ok((poses, order))
 }
 
-/// Whether quaternions seem to be written w first: in every line the first of the four is near one, and nobody says that it is
-/// x. A camera that looks down and keeps its heading may have such numbers in the right order too; its file says so in a comment.
+/// Indications that quaternions have w first: the first of the four numbers is close to one in every line, and no
+/// comment names it x. A camera that looks down with a constant heading may have such numbers in the right order too;
+/// the file then needs a comment.
 #[derive(Default)]
 struct Order<'a> {
-    /// Whether a comment names the columns, in the order of TUM.
+    /// Whether a comment names the columns in the order of TUM.
     named: bool,
     /// The first line and its number.
     first: Option<(usize, &'a str)>,
@@ -104,11 +104,11 @@ struct Order<'a> {
     other: bool,
 }
 
-/// Turned by no more than fifty degrees, were it w.
+/// The minimum of |w| for a rotation of at most 50°.
 const NEAR_ONE: f64 = 0.9;
-/// So few lines say nothing of an order.
+/// The minimum number of lines for a decision.
 const FEW: usize = 3;
-/// What names the columns.
+/// The comment that names the columns.
 pub const COLUMNS: &str = "# seconds tx ty tz qx qy qz qw\n";
 
 impl<'a> Order<'a> {
@@ -123,8 +123,8 @@ impl<'a> Order<'a> {
     }
 }
 
-/// The first line of a TUM text that [`parse`] reads whose quaternion is off unit length by more than the rounding of
-/// six decimals, and that length: it is normalised, and someone may want to know.
+/// The first line with a quaternion off unit length, and that length. Rounding to six decimals is tolerated. [`parse`]
+/// normalises such a quaternion, and a warning states it.
 pub(super) fn normalised(text: &str) -> Option<(usize, f64)> {
     const ROUNDING: f64 = 1e-5;
     text.lines().enumerate().find_map(|(index, line)| {
@@ -134,8 +134,8 @@ pub(super) fn normalised(text: &str) -> Option<(usize, f64)> {
     })
 }
 
-/// The TUM text of these poses; reading it back gives the same poses to the last bit but rounding. It names its columns where
-/// their order could be doubted.
+/// The TUM text of these poses. Reading it returns the same poses except for rounding of the last bit. It names its
+/// columns if their order could be doubted.
 pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
     let doubtful = poses.len() >= FEW && poses.iter().all(|(_, pose)| pose.rotation().i.abs() >= NEAR_ONE);
     let columns = if doubtful { COLUMNS } else { "" };
@@ -160,7 +160,7 @@ pub fn print<A: Frame, B: Frame>(poses: &[Stamped<A, B>]) -> String {
     columns.to_owned() + &lines
 }
 
-/// The pose nearest in time to `stamp`, if one is within a millisecond.
+/// The pose closest in time to `stamp`, within a millisecond.
 pub fn at<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64) -> Option<Transform<A, B>> {
     const TOLERANCE_NS: u64 = 1_000_000;
     let after = poses.partition_point(|(time, _)| *time < stamp);
@@ -171,8 +171,8 @@ pub fn at<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64) -> Option<Tra
         .map(|(_, pose)| *pose)
 }
 
-/// The pose at `stamp`: that within a millisecond of it, else between its neighbours, if they are no more than `max_gap`
-/// (ns) apart; the position in proportion to time, the attitude by the shortest turn.
+/// The pose within a millisecond of `stamp`, otherwise one interpolated between neighbours at most `max_gap` (ns)
+/// apart: linear in position, along the shortest rotation in attitude.
 pub fn between<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64, max_gap: u64) -> Option<Transform<A, B>> {
     let after = poses.partition_point(|(time, _)| *time < stamp);
     at(poses, stamp).or_else(|| {
@@ -184,7 +184,7 @@ pub fn between<A: Frame, B: Frame>(poses: &[Stamped<A, B>], stamp: u64, max_gap:
     })
 }
 
-/// Decimal seconds as nanoseconds, digit by digit: a float would lose them from 2004 on.
+/// Decimal seconds as nanoseconds, digit by digit: a double has a resolution of 238 ns for current times.
 pub fn nanoseconds(word: &str) -> Option<u64> {
     if word.contains(['e', 'E']) {
         let seconds: f64 = word.parse().ok()?;
@@ -227,7 +227,7 @@ mod tests {
         assert!(message("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n").contains("sort the lines"));
     }
 
-    /// Seen to fail when nobody looks at the order.
+    /// Seen to fail without the test of the order.
     #[test]
     fn w_first_is_suspected_where_no_one_states_otherwise() {
         let read = |text: &str| -> Result<Vec<Stamped<World, Camera>>, Fault> {
@@ -238,7 +238,7 @@ mod tests {
         assert!(said.starts_with("quaternions that seem to have w first in truth.tum:1"), "{said}");
         assert!(read(&walk("1 0 0 0")).is_err());
         let of_a_data_set = parse::<World, Camera>(&walk("1 0 0 0"), Path::new("truth.tum"));
-        assert_eq!(of_a_data_set.unwrap().len(), 4, "a data set is not doubted");
+        assert_eq!(of_a_data_set.unwrap().len(), 4, "a data set is not tested");
         let down = read(&(COLUMNS.to_owned() + &walk("1 0 0 0"))).unwrap();
         assert_eq!(read(&print(&down)).unwrap(), down);
         assert!(read(&(walk("1 0 0 0") + "9 0 0 0 0.5 0.5 0.5 0.5\n")).is_ok());

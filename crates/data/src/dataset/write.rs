@@ -1,4 +1,4 @@
-//! A passage as a data set folder.
+//! Export of a sequence as a data set folder.
 
 use std::{
     collections::BTreeMap,
@@ -14,17 +14,16 @@ use seafix_io::dataset::{Description, FORMATS, PriorSigma, RigNumbers};
 use super::{check::input_hashes, png::write_png, tum};
 use crate::source::{FrameData, Sequence};
 
-/// Writes every frame of `sequence` as a data set in `folder`, which must not exist: images, frames,
-/// site, truth, prior and visibility where they are known, and what sensors said, with the hash of every file. The folder
-/// has its name only when it is complete. `done` is called after every frame.
+/// Writes every frame of `sequence` as a data set in `folder`, which must not exist.
+///
+/// The folder holds images and frames, site, truth, prior and visibility if known, the sensor readings, and the hash of
+/// every file. It receives its name when it is complete. `done` is called after every frame.
 ///
 /// # Errors
-/// A passage without images, a folder that exists, or a file that cannot be written.
+/// A sequence without images, an existing folder, or a file that cannot be written.
 pub fn write(sequence: &dyn Sequence, folder: &Path, licence: &str, done: &dyn Fn()) -> Result<(), Fault> {
     if !sequence.images() {
-        return Err(
-            Fault::new("a source without images", folder).remedy("choose one that renders or reads stereo pairs")
-        );
+        return Err(Fault::new("a source without images", folder).remedy("choose a source of stereo pairs"));
     }
     if folder.exists() {
         return Err(Fault::new("the folder exists", folder).remedy("choose a new one with --out"));
@@ -33,7 +32,7 @@ pub fn write(sequence: &dyn Sequence, folder: &Path, licence: &str, done: &dyn F
     partial.push(".partial");
     let partial = PathBuf::from(partial);
     if partial.exists() {
-        return Err(Fault::new("an interrupted export is in the way", &partial).remedy("delete it"));
+        return Err(Fault::new("the remains of an interrupted export", &partial).remedy("delete it"));
     }
     fs::create_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
     let name = folder.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned());
@@ -81,7 +80,7 @@ fn fill(sequence: &dyn Sequence, folder: &Path, [name, licence]: [&str; 2], done
     if !priors.is_empty() {
         put("prior.tum", &tum::print(&priors))?;
     }
-    // One covariance for all is told by its standard deviations.
+    // A covariance common to all poses is written as its standard deviations.
     let varied = covariances.windows(2).any(|pair| pair[0].1 != pair[1].1);
     if varied {
         put("prior_covariance.csv", &table_of_covariances(&covariances))?;
@@ -118,10 +117,10 @@ fn fill(sequence: &dyn Sequence, folder: &Path, [name, licence]: [&str; 2], done
         rig: RigNumbers::of(sequence.rig(), sequence.ports().map(|port| port.map(|port| port.numbers()))),
         hashes: input_hashes(folder)?.into_iter().collect::<BTreeMap<_, _>>(),
     };
-    put("dataset.toml", &toml::to_string(&description).expect("a description is plain values"))
+    put("dataset.toml", &toml::to_string(&description).expect("a description has plain values"))
 }
 
-/// `stamp_ns,c00,…`: the covariance of each prior.
+/// The table `stamp_ns,c00,…` of the prior's covariances.
 fn table_of_covariances(all: &[(u64, Covariance6<World, Camera>)]) -> String {
     let columns: Vec<String> = (0..36).map(|i| format!("c{}{}", i / 6, i % 6)).collect();
     let mut text = format!("stamp_ns,{}\n", columns.join(","));
@@ -132,7 +131,7 @@ fn table_of_covariances(all: &[(u64, Covariance6<World, Camera>)]) -> String {
     text
 }
 
-/// `object,m00,…`: where each object truly is.
+/// The table `object,m00,…` of the objects' true poses.
 fn table_of_objects(sequence: &dyn Sequence, places: &[Option<Transform<World, seafix_geometry::Object>>]) -> String {
     let columns: Vec<String> = (0..16).map(|i| format!("m{}{}", i / 4, i % 4)).collect();
     let mut text = format!("object,{}\n", columns.join(","));
@@ -146,5 +145,5 @@ fn table_of_objects(sequence: &dyn Sequence, places: &[Option<Transform<World, s
 }
 
 fn failed(path: &Path, error: &std::io::Error) -> Fault {
-    Fault::new(format!("cannot write ({error})"), path).remedy("check space and permissions")
+    Fault::new(format!("cannot write ({error})"), path).remedy("check free space and permissions")
 }

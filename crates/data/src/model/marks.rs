@@ -1,4 +1,4 @@
-//! What an operator marked in a stereo pair: `id,left_u,left_v,right_u,right_v`.
+//! Marks of an operator in a stereo pair: `id,left_u,left_v,right_u,right_v`.
 
 use std::{collections::HashMap, path::Path};
 
@@ -7,23 +7,23 @@ use seafix_geometry::Pixel;
 
 use crate::dataset::tables::{number, rows};
 
-/// A feature point that an operator marked.
+/// A feature point marked by an operator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mark {
-    /// The line of the file.
+    /// The line in the file.
     pub line: usize,
-    /// The point's name.
+    /// The name of the point.
     pub id: String,
-    /// Where the left image shows it, to a few pixels.
+    /// The position in the left image, to a few pixels.
     pub left: Pixel,
-    /// Where the right image shows it; `None`: it is to be sought.
+    /// The position in the right image; `None` to match it automatically.
     pub right: Option<Pixel>,
 }
 
-/// The marks of `text`, the content of `file`, in images of these sizes (px).
+/// Reads the marks of `text`, the content of `file`, in images of these sizes (px).
 ///
 /// # Errors
-/// The first line that is wrong.
+/// The first invalid line.
 pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<Mark>, Fault> {
     let mut marks: Vec<Mark> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
@@ -35,9 +35,9 @@ pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<
             return Err(fault("a mark without a name").remedy("give every point its id"));
         }
         if let Some(first) = known.insert(id.to_owned(), line) {
-            return Err(fault("a point is marked twice")
+            return Err(fault("a point marked twice")
                 .value(format!("`{id}`"))
-                .remedy(format!("it is already on line {first}; give each its own id")));
+                .remedy(format!("it is already on line {first}; give each point its own id")));
         }
         let pixel = |u: &str, v: &str, [width, height]: [u32; 2], side: &str| {
             let at = Pixel { u: number(u, line, file)?, v: number(v, line, file)? };
@@ -79,7 +79,7 @@ mod tests {
         let marks = read(text, Path::new("clicks.csv"), [[640, 480]; 2]).unwrap();
         assert_eq!(marks[0].right, Some(Pixel { u: 3.0, v: 4.5 }));
         assert_eq!((marks[1].line, marks[1].right), (3, None));
-        assert!(message("A,1,2,3,4\nA,1,2,3,4\n").starts_with("a point is marked twice in clicks.csv:3: `A`"));
+        assert!(message("A,1,2,3,4\nA,1,2,3,4\n").starts_with("a point marked twice in clicks.csv:3: `A`"));
         assert!(message("A,640,2,3,4\n").starts_with("a mark outside the left image in clicks.csv:2: `A` at 640, 2"));
         assert!(message("A,1,2,3,NaN\n").starts_with("a mark outside the right image"));
         assert!(message("A,1,2,3,\n").starts_with("not a number in clicks.csv:2"));

@@ -1,8 +1,8 @@
-//! A model by hand: feature points that an operator marked in one stereo pair, as the paper measured its laboratory.
+//! Object models from the marks of an operator in one stereo pair, as the paper measured its laboratory objects.
 //!
-//! A hand hits a corner to a pixel or two; the images know it to hundredths. Each left mark moves to the corner near it
-//! where the locator finds one, the right place is aligned to the left window, and both are triangulated with their
-//! covariance. The object's frame is that of three of the points by the Fig. 2 rule.
+//! A mark has an error of a pixel or two; the images locate a corner to hundredths. Each left mark moves to a corner
+//! close to it if the locator finds one. The right position is aligned to the left window, and both are triangulated
+//! with their covariance. Three of the points define the object's frame by the rule of Fig. 2.
 
 mod marks;
 
@@ -18,75 +18,75 @@ use seafix_vision::{
 
 pub use marks::Mark;
 
-/// How marks become a model.
+/// The settings for a model from marks.
 #[derive(Debug)]
 pub struct ModelByHand<'a> {
-    /// Detector, locator, alignment and triangulation.
+    /// The front end: detector, locator, refinement and triangulator.
     pub front_end: &'a FrontEnd,
-    /// How far a mark may be off (px): the radius within which its corner is sought, and how far the right place may
-    /// move along the epipolar line.
+    /// The maximum error of a mark (px): the radius within which a corner is searched, and the maximum displacement of
+    /// the right position along the epipolar line.
     pub reach: f64,
-    /// Standard deviation of a mark that no corner was found for (px).
+    /// The standard deviation of a mark without a corner (px).
     pub mark_sigma: f64,
     /// The name of the object.
     pub object: String,
-    /// P1, P2, P3 of the Fig. 2 rule; `None`: the widest triangle, for how well its corners are
-    /// known, in the order of the marks.
+    /// The base points P1, P2, P3 of the Fig. 2 rule, by name. `None` selects the triangle with the largest ratio of
+    /// area to the points' errors, in the order of the marks.
     pub base: Option<[String; 3]>,
 }
 
-/// A model, and how each of its points came about.
+/// An object model with the details of each point.
 #[derive(Debug)]
 pub struct HandModel {
-    /// One object that stands nowhere in the world.
+    /// The object, without a pose in the world.
     pub site: Site,
-    /// Where the object was, seen from the left camera.
+    /// The pose of the object relative to the left camera.
     pub object_from_camera: Transform<Object, Camera>,
     /// The points, in the order of the marks.
     pub points: Vec<HandPoint>,
-    /// Right marks that the images contradict, a line each. An error along the epipolar line leaves no other trace: any two places
-    /// on it are some point before the cameras.
+    /// One warning for each right mark that contradicts the images. An error along the epipolar line shows in no other
+    /// way, because any two positions on it triangulate to a point.
     pub warnings: Vec<Fault>,
 }
 
-/// How one point of a model by hand came about.
+/// A model point with its marks and its measurement.
 #[derive(Debug)]
 pub struct HandPoint {
-    /// What the operator marked.
+    /// The mark of the operator.
     pub mark: Mark,
-    /// Whether a corner was found at the left mark; else the mark itself counts.
+    /// Whether a corner was found at the left mark; otherwise the mark itself is used.
     pub corner: bool,
-    /// Whether the right window could be aligned to the left one; else the mark itself counts.
+    /// Whether the right window was aligned to the left one; otherwise the mark itself is used.
     pub aligned: bool,
-    /// The point, camera frame.
+    /// The point in the camera frame.
     pub measured: MeasuredPoint,
-    /// Where it is in the object's frame.
+    /// The position in the object's frame.
     pub at: Point<Object>,
-    /// Its covariance there (m²). The frame is taken as given: the errors of the three base points, which make it, are
-    /// not taken off.
+    /// The covariance in the object's frame (m²). The frame is taken as exact, without the errors of the base points
+    /// that define it.
     pub covariance: Matrix3<f64>,
 }
 
 impl HandPoint {
-    /// The root mean square of the three standard deviations (m): what `seafix-site/1` keeps.
+    /// The RMS of the three standard deviations (m), the `sigma` of `seafix-site/1`.
     pub fn sigma(&self) -> f64 {
         (self.covariance.trace() / 3.0).sqrt()
     }
 }
 
-/// Points nearer to each other than this (m) are one: two marks that mean one corner.
+/// The distance (m) below which two marks denote the same corner.
 const ONE_POINT: f64 = 1e-3;
 
-/// The least sine of the angle at P1 that a base by hand should have.
+/// The minimum sine of the angle at P1 of a base that an operator chooses.
 const MIN_SINE: f64 = 0.1;
-/// Model coordinates are written to this (m).
+/// The resolution of written model coordinates (m).
 const GRAIN: f64 = 1e-7;
 
 impl ModelByHand<'_> {
-    /// The model of the marks in `text`, the content of `file`.
+    /// Builds a model from the marks in `text`, the content of `file`.
     ///
     /// # Errors
-    /// The first line that is wrong, names no place in the images, or marks two things as one.
+    /// The first invalid line, a mark outside the images, or two marks of one corner.
     pub fn model(&self, images: [&Image; 2], rig: &StereoRig, text: &str, file: &Path) -> Result<HandModel, Fault> {
         let sizes = [rig.left(), rig.right()].map(seafix_geometry::Pinhole::size);
         let marks = marks::read(text, file, sizes)?;
@@ -151,7 +151,7 @@ impl ModelByHand<'_> {
                 .unwrap_or_else(|| UncertainPixel::independent(marked, self.mark_sigma)),
             None => {
                 let sought = seek([left, right], place.at, rig).ok_or_else(|| {
-                    fault("the point is not found in the right image".to_owned())
+                    fault("the point has no match in the right image".to_owned())
                         .remedy("mark it there too: right_u, right_v")
                 })?;
                 UncertainPixel::independent(sought, 1.0)
@@ -166,28 +166,26 @@ impl ModelByHand<'_> {
         self.front_end.triangulator.triangulate_into(&[pixels], rig, &mut cloud);
         let Some(&measured) = cloud.first() else {
             let off = rig.epipolar_distance(&pixels.at).unwrap_or(f64::INFINITY);
-            return Err(fault(format!(
-                "the two marks are no single point before the cameras, {off:.1} px off the epipolar line"
-            ))
-            .remedy("mark the same corner in both images, or leave the right one empty and it is sought"));
+            return Err(fault(format!("the two marks do not triangulate, {off:.1} px off the epipolar line"))
+                .remedy("mark the same corner in both images, or leave the right mark empty to match it"));
         };
         let contradicted = sought.map(|sought| (sought, sought.distance(&pixels.at.right)));
         Ok(Seen { corner: corner.is_some(), aligned: aligned.is_some(), measured, contradicted, mark })
     }
 
-    /// What the images say against a right mark: what is like the left place is further away than a hand errs.
+    /// A warning for a right mark far from the best match of the left position. The limit is the error of an operator.
     fn doubt(&self, seen: &Seen, file: &Path) -> Option<Fault> {
         let (sought, off) = seen.contradicted.filter(|(_, off)| *off > self.reach)?;
-        let unaligned = if seen.aligned { "" } else { ", and the windows at the two marks are not alike" };
+        let unaligned = if seen.aligned { "" } else { ", and the windows at the two marks differ" };
         let what = format!(
-            "a right mark {off:.1} px from where the right image shows the left one best, {:.1}, {:.1}{unaligned}",
+            "a right mark {off:.1} px from the best match of the left mark, {:.1}, {:.1}{unaligned}",
             sought.u, sought.v
         );
         let fault = Fault::new(what, file).on_line(seen.mark.line).value(format!("`{}`", seen.mark.id));
-        Some(fault.remedy("look at it again; left empty, the right place is sought"))
+        Some(fault.remedy("check the mark; an empty right mark is matched"))
     }
 
-    /// The corner that a mark means: of those within reach the nearest.
+    /// The corner nearest to a mark, within the mark's error.
     fn corner(&self, image: &Image, keypoints: &[Keypoint], mark: Pixel) -> Option<UncertainPixel> {
         let by_hand = Keypoint { at: mark, response: 0.0, scale: keypoints.first().map_or(1.0, |one| one.scale) };
         let near = keypoints.iter().filter(|keypoint| keypoint.at.distance(&mark) <= self.reach);
@@ -197,7 +195,7 @@ impl ModelByHand<'_> {
         places.filter(|place| off(place) <= self.reach).min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
-    /// The places of P1, P2, P3 among the points.
+    /// The indices of P1, P2, P3 among the points.
     fn base(&self, seen: &[Seen], file: &Path) -> Result<[usize; 3], Fault> {
         let at = |index: usize| seen[index].measured.position.at;
         let base = match &self.base {
@@ -235,19 +233,19 @@ impl ModelByHand<'_> {
     }
 }
 
-/// A mark, and the point it means.
+/// A mark and its measured point.
 struct Seen {
     mark: Mark,
     corner: bool,
     aligned: bool,
     measured: MeasuredPoint,
-    /// Where the right place would be sought had none been marked, and how far that is from the one that was taken (px).
+    /// The best match of the left position, and its distance (px) from the one used.
     contradicted: Option<(Pixel, f64)>,
 }
 
-/// Where the right image shows a place of the left one.
+/// The match of a left position in the right image.
 fn seek([left, right]: [&Image; 2], at: Pixel, rig: &StereoRig) -> Option<Pixel> {
-    // Nothing tells it from its neighbours but the operator: the best place counts, clear or not.
+    // The operator decides in place of the ratio test: the best match counts, ambiguous or not.
     let matcher = MATCHERS.build(&Choice::named("zncc-band").with("ratio", 1.0)).expect("its settings are in range");
     let (keypoints, none) = ([Keypoint { at, response: 1.0, scale: 1.0 }], Descriptors::default());
     let view = |image, keypoints| View { image, keypoints, descriptors: &none };

@@ -1,34 +1,34 @@
-//! Bytes of a CDR message, one value after the other.
+//! A reader of CDR messages, value by value.
 
-/// Reads values; every length is held against what is left.
+/// A reader of values that checks every length against the rest of the message.
 #[derive(Debug)]
 pub(super) struct Cdr<'a> {
-    /// What stands behind the header.
+    /// The message after its header.
     bytes: &'a [u8],
     at: usize,
 }
 
-/// What is wrong, and at which byte of the message.
+/// The fault, with its byte in the message.
 pub(super) type Read<T> = Result<T, String>;
 
-/// Bytes of the header.
+/// The size of the header (bytes).
 const HEADER: usize = 4;
 
 impl<'a> Cdr<'a> {
-    /// A message, behind its header.
+    /// A reader of a message, positioned after its header.
     pub(super) fn new(message: &'a [u8]) -> Read<Self> {
         let Some((header, bytes)) = message.split_at_checked(HEADER) else {
             return Err(format!("{} bytes, less than a header, at byte 0", message.len()));
         };
         let kind = match [header[0], header[1]] {
             [0, 1] => return Ok(Self { bytes, at: 0 }),
-            [0, 0] => "CDR with the big end first",
+            [0, 0] => "big-endian CDR",
             [0, 2 | 3] => "a parameter list (PL_CDR)",
             [0, 6..=11] => "XCDR2",
             _ => "unknown",
         };
         Err(format!(
-            "the header {:02x}{:02x} at byte 0 is {kind}; CDR with the little end first is read",
+            "the header {:02x}{:02x} at byte 0 is {kind}; only little-endian CDR is supported",
             header[0], header[1]
         ))
     }
@@ -43,10 +43,10 @@ impl<'a> Cdr<'a> {
         Ok(taken)
     }
 
-    /// The next number, on a multiple of its size.
+    /// The next number, aligned to a multiple of its size.
     fn number<const N: usize>(&mut self) -> Read<[u8; N]> {
         self.at = self.at.next_multiple_of(N);
-        self.take(N).map(|bytes| bytes.try_into().expect("as many as were asked for"))
+        self.take(N).map(|bytes| bytes.try_into().expect("take returns N bytes"))
     }
 
     pub(super) fn u8(&mut self) -> Read<u8> {
@@ -73,7 +73,7 @@ impl<'a> Cdr<'a> {
         Ok(numbers)
     }
 
-    /// The length of a sequence of things that take `min` bytes each.
+    /// The length of a sequence whose elements have at least `min` bytes each.
     pub(super) fn length(&mut self, min: usize) -> Read<usize> {
         let length = self.u32()? as usize;
         let left = self.bytes.len().saturating_sub(self.at);
@@ -88,7 +88,7 @@ impl<'a> Cdr<'a> {
         self.take(length)
     }
 
-    /// Text, with the zero behind it.
+    /// A string, with its final zero.
     pub(super) fn string(&mut self) -> Read<String> {
         let at = self.at.next_multiple_of(4) + HEADER;
         let bytes = self.bytes()?;
@@ -96,7 +96,7 @@ impl<'a> Cdr<'a> {
         String::from_utf8(text.to_vec()).map_err(|_| format!("text at byte {at} that is not UTF-8"))
     }
 
-    /// The end of the message: nothing is left but filling.
+    /// Checks the end of the message: only padding may follow.
     pub(super) fn end(self) -> Read<()> {
         match self.bytes.get(self.at..).unwrap_or_default() {
             left if left.len() < 4 && left.iter().all(|&byte| byte == 0) => Ok(()),
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn what_is_not_there_is_named_with_its_byte() {
-        assert!(Cdr::new(&[0, 0, 0, 0]).unwrap_err().contains("big end"));
+        assert!(Cdr::new(&[0, 0, 0, 0]).unwrap_err().contains("big-endian"));
         assert!(Cdr::new(&[0, 7, 0, 0]).unwrap_err().contains("XCDR2"));
         assert!(Cdr::new(&[0]).unwrap_err().contains("less than a header"));
         let mut cdr = Cdr::new(&[0, 1, 0, 0, 255, 255, 255, 255]).unwrap();

@@ -1,8 +1,8 @@
-//! Whether a recording's schema is the one that is decoded.
+//! Comparison of a recording's schema with the supported definition.
 
 use super::idl;
 
-/// The types that are read, and those they are made of: name, then type and name of each field.
+/// The supported types and their parts: name, then type and name of each field.
 const KNOWN: [(&str, &[(&str, &str)]); 17] = [
     (
         "sensor_msgs/Image",
@@ -69,16 +69,16 @@ const KNOWN: [(&str, &[(&str, &str)]); 17] = [
     ("geometry_msgs/Transform", &[("Vector3", "translation"), ("Quaternion", "rotation")]),
 ];
 
-/// A type by its package and name: `sensor_msgs/msg/Image` is `sensor_msgs/Image`.
+/// The name of a type without the `msg` part: `sensor_msgs/msg/Image` is `sensor_msgs/Image`.
 pub(crate) fn plain(name: &str) -> String {
     name.replace("::", "/").replace("/msg/", "/")
 }
 
-/// A type and its fields: type without package, and name.
+/// A type with its fields: type without package, and name.
 pub(super) type Definition = (String, Vec<(String, String)>);
 
-/// The first field in which the schema `definition` of the type `name`, written in `encoding`, differs from what is
-/// decoded; `None` if it does not, or says nothing.
+/// The first difference of a schema from the supported definition of type `name`; `None` if they agree or the schema is
+/// empty. `encoding` is the language of the schema `definition`.
 pub(crate) fn differs(name: &str, encoding: &str, definition: &str) -> Option<String> {
     let found = if encoding == "ros2idl" { idl::definitions(definition) } else { messages(name, definition) };
     found.iter().find_map(|(name, fields)| {
@@ -90,12 +90,12 @@ pub(crate) fn differs(name: &str, encoding: &str, definition: &str) -> Option<St
             let said =
                 |field: &Option<String>| field.as_deref().map_or("nothing".to_owned(), |field| format!("`{field}`"));
             (found != known)
-                .then(|| format!("field {} of {name} is {}, and {} is decoded", index + 1, said(&found), said(&known)))
+                .then(|| format!("field {} of {name} is {}, expected {}", index + 1, said(&found), said(&known)))
         })
     })
 }
 
-/// The types of a `ros2msg` schema: that of its name, then each behind a line `MSG: package/Type`.
+/// The types of a `ros2msg` schema: the first has its name, each other follows a line `MSG: package/Type`.
 fn messages(name: &str, text: &str) -> Vec<Definition> {
     let mut all: Vec<Definition> = vec![(plain(name), Vec::new())];
     for line in text.lines() {
@@ -106,7 +106,7 @@ fn messages(name: &str, text: &str) -> Vec<Definition> {
         }
         let mut words = line.split_whitespace();
         let (Some(kind), Some(field)) = (words.next(), words.next()) else { continue };
-        // A constant is no field.
+        // A constant is not a field.
         if field.contains('=') || words.next().is_some_and(|word| word.starts_with('=')) || kind.starts_with("===") {
             continue;
         }
@@ -135,11 +135,11 @@ mod tests {
         assert_eq!(of(IMAGE), None);
         assert_eq!(
             of(&IMAGE.replace("uint32 width", "uint64 width")).unwrap(),
-            "field 3 of sensor_msgs/Image is `uint64 width`, and `uint32 width` is decoded"
+            "field 3 of sensor_msgs/Image is `uint64 width`, expected `uint32 width`"
         );
         assert_eq!(
             of(&IMAGE.replace("uint8[] data\n", "")).unwrap(),
-            "field 7 of sensor_msgs/Image is nothing, and `uint8[] data` is decoded"
+            "field 7 of sensor_msgs/Image is nothing, expected `uint8[] data`"
         );
         assert!(of(&IMAGE.replace("uint32 nanosec", "uint32 nsec")).unwrap().contains("builtin_interfaces/Time"));
         assert_eq!(of(&IMAGE.replace("uint32 height", "uint8 MONO=1\nuint8 RGB = 2\nuint32 height")), None);

@@ -1,8 +1,8 @@
-//! Schemas in OMG's interface definition language, as ROS 2 writes them.
+//! Schemas in OMG's interface definition language (IDL), as ROS 2 writes them.
 
 use super::definition::Definition;
 
-/// The structures of a text, by package and name, in the words of `ros2msg`.
+/// The structures of a text by package and name, in `ros2msg` notation.
 pub(super) fn definitions(text: &str) -> Vec<Definition> {
     let words = words(text);
     let (mut all, mut modules, mut at) = (Vec::new(), Vec::<&str>::new(), 0);
@@ -37,7 +37,7 @@ fn fields(words: &[String]) -> Vec<(String, String)> {
     words.split(|word| word == ";").filter_map(one).collect()
 }
 
-/// A type in the words of `ros2msg`.
+/// A type in `ros2msg` notation.
 fn kind_of(words: &[String]) -> String {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match &words[..] {
@@ -54,7 +54,7 @@ fn kind_of(words: &[String]) -> String {
         ["long"] => "int32".to_owned(),
         ["unsigned", "long"] => "uint32".to_owned(),
         [array] if array.contains("__") => {
-            // `double__9` stands for double[9].
+            // The name `double__9` denotes double[9].
             let (kind, count) = array.split_once("__").unwrap_or((array, ""));
             format!("{}[{count}]", kind_of(&[kind.to_owned()]))
         }
@@ -63,7 +63,7 @@ fn kind_of(words: &[String]) -> String {
     }
 }
 
-/// Words and signs, without comments, directives and annotations.
+/// The words and signs of a text, without comments, directives and annotations.
 fn words(text: &str) -> Vec<String> {
     let mut words = Vec::new();
     let mut rest = text;
@@ -89,7 +89,7 @@ fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// What follows an annotation, `@name` or `@name (…)` with text in quotes.
+/// The text after an annotation, `@name` or `@name (…)` with quoted strings.
 fn behind_annotation(text: &str) -> &str {
     let end = text[1..].find(|c: char| !(c.is_alphanumeric() || c == '_')).map_or(text.len(), |end| end + 1);
     let rest = text[end..].trim_start();
@@ -145,6 +145,6 @@ module sensor_msgs { module msg {
         let of = |text: &str| differs("sensor_msgs/msg/CameraInfo", "ros2idl", text);
         assert_eq!(of(INFO), None);
         let said = of(&INFO.replace("sequence<double> d", "sequence<float> d")).unwrap();
-        assert_eq!(said, "field 5 of sensor_msgs/CameraInfo is `float32[] d`, and `float64[] d` is decoded");
+        assert_eq!(said, "field 5 of sensor_msgs/CameraInfo is `float32[] d`, expected `float64[] d`");
     }
 }

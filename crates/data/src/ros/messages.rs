@@ -1,18 +1,18 @@
-//! The messages that are read.
+//! The supported ROS 2 messages.
 
 use nalgebra::{Matrix6, Quaternion, UnitQuaternion, Vector3};
 use seafix_geometry::{Frame, Transform};
 
 use super::cdr::{Cdr, Read};
 
-/// Time of capture (ns) and coordinate frame.
+/// The time of capture (ns) and the coordinate frame of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Stamped {
     pub stamp_ns: u64,
     pub frame: String,
 }
 
-/// A rigid motion by its parts, as ROS has it: parent from child.
+/// A rigid motion as ROS writes it, `parent_from_child`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pose {
     pub translation: Vector3<f64>,
@@ -20,7 +20,7 @@ pub(crate) struct Pose {
 }
 
 impl Pose {
-    /// The same, typed.
+    /// The rigid motion as a typed transform.
     pub(crate) fn transform<A: Frame, B: Frame>(&self) -> Transform<A, B> {
         Transform::new(self.rotation, self.translation)
     }
@@ -54,12 +54,12 @@ pub(crate) struct CameraInfo {
     pub r: [f64; 9],
     pub p: [f64; 12],
     pub binning: [u32; 2],
-    /// Offset x, y, height, width of the part of the sensor that was read.
+    /// The offset x, y, height and width of the part of the sensor that was read.
     pub region: [u32; 4],
 }
 
 impl CameraInfo {
-    /// Whether both tell the same of the camera, whatever their stamps.
+    /// Whether both describe the same camera, regardless of their stamps.
     pub(crate) fn is_of_one_camera_with(&self, other: &Self) -> bool {
         let bits = |info: &Self| -> Vec<u64> {
             info.d.iter().chain(&info.k).chain(&info.r).chain(&info.p).map(|number| number.to_bits()).collect()
@@ -75,11 +75,11 @@ pub(crate) struct Odometry {
     pub header: Stamped,
     pub child: String,
     pub pose: Pose,
-    /// Of position, then rotation about the axes of the header's frame.
+    /// The covariance of the position, then of the rotation about the axes of the header's frame.
     pub covariance: Matrix6<f64>,
 }
 
-/// One transform of `tf2_msgs/TFMessage`.
+/// A transform of `tf2_msgs/TFMessage`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ChildPose {
     pub header: Stamped,
@@ -95,7 +95,7 @@ fn header(cdr: &mut Cdr<'_>) -> Read<Stamped> {
     Ok(Stamped { stamp_ns: seconds as u64 * 1_000_000_000 + u64::from(nanos), frame: cdr.string()? })
 }
 
-/// The header that every message but tf's begins with.
+/// The header at the beginning of every message except tf's.
 pub(crate) fn stamp(message: &[u8]) -> Read<Stamped> {
     header(&mut Cdr::new(message)?)
 }
@@ -164,7 +164,7 @@ impl Odometry {
 
 /// The transforms of a `tf2_msgs/TFMessage`.
 pub(crate) fn transforms(message: &[u8]) -> Read<Vec<ChildPose>> {
-    /// A header with an empty name, a child without one, and seven numbers.
+    /// The minimum size: a header with an empty name, an empty child name, and seven numbers.
     const MIN: usize = 8 + 5 + 5 + 56;
     let mut cdr = Cdr::new(message)?;
     let count = cdr.length(MIN)?;

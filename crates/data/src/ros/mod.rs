@@ -1,8 +1,7 @@
-//! ROS 2's messages, out of recordings: five types, decoded without ROS.
+//! ROS 2 messages of recordings: five types, decoded without ROS.
 //!
-//! A message is CDR, little end first, behind a header of four bytes; every number stands on a multiple of its size,
-//! counted from behind the header. The schema beside it, `ros2msg` or `ros2idl`, is held against the definition that is
-//! decoded.
+//! A message is little-endian CDR after a header of four bytes. Every number is aligned to its size, counted from the
+//! end of the header. The schema in the recording, `ros2msg` or `ros2idl`, is compared with the supported definition.
 
 mod cdr;
 mod definition;

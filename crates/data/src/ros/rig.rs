@@ -1,4 +1,4 @@
-//! Two `CameraInfo`s as a rig.
+//! A stereo rig from two `CameraInfo` messages.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, Pinhole, RightCamera, Transform};
@@ -6,16 +6,16 @@ use serde::{Deserialize, Serialize};
 
 use super::CameraInfo;
 
-/// Which images the recording has.
+/// The kind of the images in a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Views {
-    /// Rectified where the topic's name says so (`image_rect`), else as the camera gave them.
+    /// Rectified if the topic's name says so (`image_rect`), otherwise raw.
     #[default]
     ByName,
-    /// As the camera gave them: K and D hold.
+    /// Raw images: K and D apply.
     Raw,
-    /// Rectified: P holds.
+    /// Rectified images: P applies.
     Rectified,
 }
 
@@ -30,12 +30,12 @@ impl Views {
     }
 }
 
-/// The camera that took the images.
+/// The camera model of the images.
 pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, String> {
     if info.binning.iter().any(|&binning| binning > 1)
         || info.region != [0; 4] && info.region[2..] != [info.size[1], info.size[0]]
     {
-        return Err("images of a part of the sensor, or binned, are not read".to_owned());
+        return Err("a region of interest or binning is not supported; record full images".to_owned());
     }
     let [fx, _, cx, _, fy, cy, ..] = info.k;
     let [px, _, pcx, _, _, py, pcy, ..] = info.p;
@@ -43,18 +43,18 @@ pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, Stri
     let built = match (rectified, info.model.as_str()) {
         (true, _) => Pinhole::new(info.size, [px, py], [pcx, pcy], &[]),
         (false, "plumb_bob" | "rational_polynomial" | "") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
-        // Whatever its D: a fisheye lens without coefficients (r = f·θ) is no pinhole (r = f·tan θ).
+        // This holds for any D: a fisheye lens without coefficients (r = f·θ) is not a pinhole (r = f·tan θ).
         (false, other) => {
-            let read = "plumb_bob and rational_polynomial are";
-            let remedy = "rectify the images and set images = \"rectified\"";
-            return Err(format!("the distortion model `{other}` is not read, {read}: {remedy}"));
+            let read = "use plumb_bob or rational_polynomial";
+            let remedy = "or rectify the images and set images = \"rectified\"";
+            return Err(format!("the distortion model `{other}` is not supported; {read}, {remedy}"));
         }
     };
     built.map_err(|error| error.to_string())
 }
 
-/// Where the cameras stand, as their calibration has it: `P = K [I | t]` in the frames that R turns them into;
-/// `None` where it says nothing.
+/// The transform between the cameras by calibration: `P = K [I | t]` in the frames that R rotates them into; `None` if
+/// P has no baseline.
 pub(crate) fn right_from_left(
     left: &CameraInfo,
     right: &CameraInfo,
@@ -68,7 +68,7 @@ pub(crate) fn right_from_left(
     Ok(Some(raw(&left, &right, &between)))
 }
 
-/// Where the left camera's centre is in the rectified right view (m), by P = K [I | t]; `None` where both are one.
+/// The left camera's centre in the rectified right view (m), from P = K [I | t]; `None` if both centres coincide.
 fn baseline(left: &CameraInfo, right: &CameraInfo) -> Option<Vector3<f64>> {
     let shift = |info: &CameraInfo| {
         let [fx, _, cx, tx, _, fy, cy, ty, _, _, _, tz] = info.p;
@@ -85,18 +85,18 @@ fn turn(info: &CameraInfo) -> Result<Matrix3<f64>, String> {
     if off > 1e-6 { Err(format!("R is off orthonormal by {off:.1e}")) } else { Ok(r) }
 }
 
-/// The cameras as they are mounted: the right one sees the left one's x_rect at x_rect + t.
+/// The transform between the mounted cameras: the right one sees the left one's x_rect at x_rect + t.
 fn raw(left: &Matrix3<f64>, right: &Matrix3<f64>, between: &Vector3<f64>) -> Transform<RightCamera, Camera> {
     Transform::from_axes(&(right.transpose() * left), right.transpose() * between)
 }
 
-/// A calibration and a drawing of one rig agree about its baseline to this share,
+/// The relative tolerance of the baseline between a calibration and a drawing of one rig.
 const SAME_LENGTH: f64 = 0.01;
-/// and about directions to this angle (rad).
+/// The tolerance of directions (rad).
 const SAME_DIRECTION: f64 = 0.1;
 
-/// Where the transforms have the right camera elsewhere than P: what each of them says. The frames of the transforms may
-/// be those of the cameras as they are mounted, or of the rectified views.
+/// The contradiction between the transforms and P about the right camera's pose; `None` if they agree. The frames of
+/// the transforms may be those of the mounted cameras or of the rectified views.
 pub(crate) fn contradiction(
     left: &CameraInfo,
     right: &CameraInfo,
@@ -104,7 +104,7 @@ pub(crate) fn contradiction(
 ) -> Result<Option<String>, String> {
     let Some(between) = baseline(left, right) else { return Ok(None) };
     let rectified = Transform::new(UnitQuaternion::identity(), between);
-    // An R of zeros is that of a camera nobody has rectified.
+    // An R of zeros belongs to a camera that was not rectified.
     let mounted = turn(left).and_then(|l| Ok(raw(&l, &turn(right)?, &between))).ok();
     let agrees = |p: &Transform<RightCamera, Camera>| {
         let (a, b) = (p.translation(), stands.translation());
@@ -121,5 +121,5 @@ pub(crate) fn contradiction(
     };
     let p = mounted.unwrap_or(rectified);
     let of = |which: &Transform<RightCamera, Camera>| said(&which.translation(), which.rotation().angle());
-    Ok(Some(format!("P says {}, /tf {}", of(&p), of(stands))))
+    Ok(Some(format!("P gives {}, /tf {}", of(&p), of(stands))))
 }

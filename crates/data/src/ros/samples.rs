@@ -1,12 +1,12 @@
-//! The pixels of a `sensor_msgs/Image`.
+//! Pixels of a `sensor_msgs/Image`.
 
 use super::Image;
 
 impl Image<'_> {
-    /// Its samples row by row, grey or red, green and blue, and the greatest that a sample can be; images of 16 bits
-    /// hold `bits`.
+    /// The samples row by row, grey or RGB, and the maximum of a sample; images of 16 bits have `bits` significant
+    /// bits.
     pub(crate) fn samples(&self, bits: u8) -> Result<(Vec<u16>, u16), String> {
-        // Bytes a sample, samples a pixel, and which of them are red, green and blue.
+        // The bytes of a sample, the samples of a pixel, and the indices of red, green and blue.
         let (bytes, channels, colours): (usize, usize, &[usize]) = match self.encoding.as_str() {
             "mono8" | "8UC1" => (1, 1, &[0]),
             "mono16" | "16UC1" => (2, 1, &[0]),
@@ -16,7 +16,7 @@ impl Image<'_> {
             "bgra8" | "8UC4" => (1, 4, &[2, 1, 0]),
             other => {
                 let read = "mono8, mono16, rgb8, bgr8, rgba8, bgra8, 8UC1, 16UC1, 8UC3, 8UC4";
-                return Err(format!("pixels in `{other}`; {read} are read"));
+                return Err(format!("the pixel format `{other}` is not supported; give {read}"));
             }
         };
         let [width, height] = self.size.map(|length| length as usize);

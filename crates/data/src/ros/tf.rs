@@ -7,7 +7,7 @@ use seafix_geometry::{Frame, Transform};
 use super::messages::ChildPose;
 use crate::dataset::tum::{Stamped, between};
 
-/// Poses of a child in its parent over time, in order of time; of one that never moves only one.
+/// The poses of a child in its parent in order of time; a static transform has one.
 #[derive(Debug, Clone, Default)]
 struct Edge {
     parent: String,
@@ -15,17 +15,17 @@ struct Edge {
     poses: Vec<Stamped<AnyFrame, AnyFrame>>,
 }
 
-/// What `/tf` and `/tf_static` say.
+/// The transforms of `/tf` and `/tf_static`.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tree {
     edges: HashMap<String, Edge>,
 }
 
-/// More frames than this on the way to the root are a circle.
+/// The maximum depth of the tree; a longer path to the root is a cycle.
 const DEEPEST: usize = 64;
 
 impl Tree {
-    /// Adds a transform; a second parent of a frame takes the place of the first.
+    /// Adds a transform; a second parent of a frame replaces the first.
     pub(crate) fn add(&mut self, given: ChildPose, is_static: bool) {
         let name = |frame: &str| frame.trim_start_matches('/').to_owned();
         let edge = self.edges.entry(name(&given.child)).or_default();
@@ -36,12 +36,12 @@ impl Tree {
         edge.poses.push((given.header.stamp_ns, given.pose.transform()));
     }
 
-    /// Puts all poses in order of time.
+    /// Sorts all poses by time.
     pub(crate) fn sort(&mut self) {
         self.edges.values_mut().for_each(|edge| edge.poses.sort_by_key(|(stamp, _)| *stamp));
     }
 
-    /// The pose of `from` in `to` at `stamp`: between two poses no more than `max_gap` (ns) apart.
+    /// The pose of `from` in `to` at `stamp`, interpolated between two poses at most `max_gap` (ns) apart.
     pub(crate) fn look_up<A: Frame, B: Frame>(
         &self,
         to: &str,
@@ -54,12 +54,12 @@ impl Tree {
         let (from_up, to_up) = from_root
             .iter()
             .find_map(|(frame, up)| Some((up, &to_root.iter().find(|(other, _)| other == frame)?.1)))?;
-        // From the child up to the first common frame, and down again.
+        // The path leads from the child up to the first common frame and down again.
         let full = to_up.inverse() * *from_up;
         Some(full.relabel())
     }
 
-    /// A frame and those above it, each with the pose of the first in it, as far as they are known at `stamp`.
+    /// A frame and its ancestors as far as they are known at `stamp`, each with the first frame's pose in it.
     fn to_root(&self, frame: String, stamp: u64, max_gap: u64) -> Vec<(String, Transform<AnyFrame, AnyFrame>)> {
         let mut chain = vec![(frame, Transform::identity())];
         while let Some((here, up)) = chain.last().filter(|_| chain.len() < DEEPEST) {
@@ -72,7 +72,7 @@ impl Tree {
     }
 }
 
-/// Some frame of the tree.
+/// A coordinate frame of the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct AnyFrame;
 impl Frame for AnyFrame {}

@@ -1,20 +1,21 @@
-//! The covariance of an odometry's pose, in our terms.
+//! Conversion of the covariance of a ROS odometry pose.
 
 use nalgebra::Matrix6;
 use seafix_geometry::{Camera, Covariance6, Frame, Transform, World};
 
 use super::Odometry;
 
-/// The covariance of the camera's pose; `None` where the message says nothing.
+/// The covariance of the camera's pose; `None` if the message has none.
 ///
-/// ROS has the position's error δp and the rotation's δθ, both along the axes of the parent: p = p̂ + δp,
-/// R = Exp(δθ) R̂. On the right that is ξ = (R̂ᵀδθ, R̂ᵀδp), carried to the camera by the adjoint of camera_from_child.
+/// ROS defines the position error δp and the rotation error δθ along the axes of the parent: p = p̂ + δp, R = Exp(δθ)
+/// R̂. As a right perturbation this is ξ = (R̂ᵀδθ, R̂ᵀδp), transferred to the camera by the adjoint of
+/// `camera_from_child`.
 pub(crate) fn covariance<C: Frame>(
     message: &Odometry,
     child_from_camera: &Transform<C, Camera>,
 ) -> Option<Covariance6<World, Camera>> {
     let turn = message.pose.rotation.inverse().to_rotation_matrix().into_inner();
-    // From (δp, δθ) to (φ, ρ).
+    // The permutation from (δp, δθ) to (φ, ρ).
     let mut swap = Matrix6::zeros();
     swap.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
     swap.fixed_view_mut::<3, 3>(3, 0).copy_from(&turn);
@@ -33,7 +34,8 @@ mod tests {
     use super::super::messages::{Pose, Stamped};
     use super::*;
 
-    /// By hand: the vehicle is turned by 90° about z; its position errs by 1 along the world's x, which is its own −y.
+    /// A case by hand: the vehicle is turned by 90° about z, and its position has an error of 1 along the world's x,
+    /// which is the vehicle's −y.
     #[test]
     fn the_axes_are_the_child_s_and_rotation_comes_first() {
         let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);

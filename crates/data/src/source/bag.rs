@@ -1,4 +1,4 @@
-//! The stereo rig and the stereo pairs of a recording of ROS 2, looked through.
+//! The stereo rig and the stereo pairs in a ROS 2 recording.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ use crate::{
     ros::{self, CameraInfo, CompressedImage, Odometry, Tree},
 };
 
-/// What a recording holds of a stereo rig: every pair in it has been decoded once.
+/// The stereo rig and pairs of a recording; every image has been decoded once.
 pub(super) struct Bag {
     path: PathBuf,
     recording: Recording,
@@ -28,29 +28,29 @@ pub(super) struct Bag {
     /// The coordinate frames of the cameras.
     frames: [String; 2],
     pub(super) rig: StereoRig,
-    /// Stamp and messages of each pair.
+    /// The stamp and the two messages of each pair.
     pub(super) pairs: Vec<(u64, [Entry; 2])>,
     pub(super) warnings: Vec<Fault>,
 }
 
-/// Some frame that ROS names.
+/// A coordinate frame named by ROS.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Child;
 impl Frame for Child {}
 
-/// Poses of the left camera, and their covariances where they have any.
+/// Poses of the left camera, with covariances if the topic has any.
 pub(super) type Poses = (Vec<Stamped<World, Camera>>, Option<Vec<Covariance6<World, Camera>>>);
 
 impl Bag {
-    /// Reads `path` through, decodes every image, and checks rig and images against each other. Pairs with an image that
-    /// cannot be read are left out, each with a warning, as long as at least half of the pairs stay.
+    /// Reads `path`, decodes every image, and checks rig and images for consistency. A pair with an unreadable image is
+    /// skipped with a warning; at least half of the pairs must be readable.
     pub(super) fn open(path: &Path, settings: &Mcap) -> Result<Self, Fault> {
         let recording =
             Recording::open(path, |topic: &Topic| topic.encoding == "cdr").map_err(|error| fault(path, &error))?;
         let topics = Topics::of(path, &recording, settings)?;
         let mut warnings = Vec::new();
         if !recording.is_protected() {
-            warnings.push(Fault::new("no check sums", path).remedy("damage would not be noticed"));
+            warnings.push(Fault::new("no check sums", path).remedy("damage cannot be detected; record with CRCs"));
         }
         let mut reader = Messages { path, recording: &recording, settings, warnings };
         let infos = [reader.info(&topics.infos[0])?, reader.info(&topics.infos[1])?];
@@ -63,7 +63,8 @@ impl Bag {
         let left = left_out(found.len(), [stamps[0].len(), stamps[1].len()], path);
         reader.warnings.extend(left?);
         if found.is_empty() {
-            return Err(Fault::new("no stereo pair", path).remedy("no two images are of one instant; see `tolerance`"));
+            return Err(Fault::new("no stereo pair", path)
+                .remedy("no two images have stamps within `tolerance`; enlarge it or check the topics"));
         }
         let pairs: Vec<(u64, [Entry; 2])> =
             found.iter().map(|&(i, j)| (images[0][i].0, [images[0][i].1, images[1][j].1])).collect();
@@ -82,8 +83,8 @@ impl Bag {
         self.decoded([left, right], [&bytes(left)?, &bytes(right)?])
     }
 
-    /// The poses of the left camera that `said` names at the stamps of the pairs, and their covariances where they have any:
-    /// a topic of odometry, or `tf:FRAME`, the camera in that frame.
+    /// The poses of the left camera at the stamps of the pairs, with covariances if there are any. `said` is a topic of
+    /// odometry, or `tf:FRAME` for the pose of the camera in that frame.
     pub(super) fn poses(&self, said: &str) -> Result<Poses, Fault> {
         let (recording, settings) = (&self.recording, &self.settings);
         let reader = Messages { path: &self.path, recording, settings, warnings: Vec::new() };
@@ -91,7 +92,7 @@ impl Bag {
         reader.poses(said, &self.tree, &self.frames[0], &at)
     }
 
-    /// What it holds, in a line.
+    /// A summary in one line.
     pub(super) fn notes(&self) -> String {
         let ([left, right], [w, h]) = (&self.topics.images, self.rig.left().size());
         let (first, last) = (self.pairs[0].0, self.pairs[self.pairs.len() - 1].0);
@@ -106,11 +107,11 @@ impl Bag {
         )
     }
 
-    /// Decodes all pairs once: those that cannot be read are left out, so that none ends a run midway.
+    /// Decodes all pairs once and skips the unreadable ones, so that none stops a run midway.
     fn inspect_images(&mut self) -> Result<(), Fault> {
-        /// Pairs are read in the order of the file, and so many of them decoded at a time.
+        /// The number of pairs that are decoded in parallel, in the order of the file.
         const AT_ONCE: usize = 16;
-        /// Pairs left out that are told one by one.
+        /// The maximum number of skipped pairs with a warning of their own.
         const REPORTED: usize = 10;
         let bytes = |entry: &Entry| self.recording.message(entry).map_err(|error| fault(&self.path, &error));
         let mut seen: Vec<Result<bool, Fault>> = Vec::with_capacity(self.pairs.len());
@@ -125,30 +126,30 @@ impl Bag {
         let all = self.pairs.len();
         let identical = seen.iter().filter(|one| **one == Ok(true)).count();
         if identical > 0 {
-            let fault = Fault::new("left and right images that are the same", &self.path);
+            let fault = Fault::new("identical left and right images", &self.path);
             let [left, right] = &self.topics.images;
             let fault = fault.value(format!("{left} and {right}, {identical} of {all} pairs"));
             return Err(fault.remedy("name the topic of the other camera; one image twice has no depth"));
         }
         let lost: Vec<Fault> = seen.iter().filter_map(|one| one.clone().err()).collect();
         if 2 * lost.len() > all {
-            let remedy = format!("so are {} of {all} pairs; at least half must be readable", lost.len());
+            let remedy = format!("{} of {all} pairs are unreadable; at least half must be readable", lost.len());
             return Err(Fault { remedy, ..lost[0].clone() });
         }
         let more = lost.len().saturating_sub(REPORTED);
         if more > 0 {
-            let fault = Fault::new("pairs that cannot be read", &self.path).value(format!("{} of {all}", lost.len()));
-            self.warnings.push(fault.remedy("they are left out"));
+            let fault = Fault::new("unreadable pairs", &self.path).value(format!("{} of {all}", lost.len()));
+            self.warnings.push(fault.remedy("they are skipped"));
         }
         let reported =
-            lost.into_iter().take(REPORTED).map(|fault| Fault { remedy: "its pair is left out".to_owned(), ..fault });
+            lost.into_iter().take(REPORTED).map(|fault| Fault { remedy: "its pair is skipped".to_owned(), ..fault });
         self.warnings.extend(reported);
         let mut readable = seen.iter().map(Result::is_ok);
         self.pairs.retain(|_| readable.next().unwrap_or(false));
         Ok(())
     }
 
-    /// Whether the images are the cameras' they are said to be, as some pairs from the whole length show.
+    /// Checks a sample of pairs for exchanged left and right images.
     fn appear_at_the_sides(&mut self) -> Result<(), Fault> {
         let step = self.pairs.len().div_ceil(INSPECTED_PAIRS).max(1);
         let mut sides = Sides::default();
@@ -160,12 +161,13 @@ impl Bag {
             return Err(fault.remedy("exchange the topics `left` and `right`, or `left-info` and `right-info`"));
         }
         self.warnings.extend(strangers(sides, &self.path));
-        // A right camera on the left: the right one sees the left one's centre at t.
+        // The centre of the left camera in the right camera's frame is t; a positive x puts the right camera on the
+        // left.
         let t = self.rig.right_from_left().translation();
         if t.x > 0.5 * t.norm() {
-            let fault = Fault::new("a left camera that stands to the right of the other", &self.path);
+            let fault = Fault::new("a left camera to the right of the right camera", &self.path);
             let fault = fault.value(format!("{} by {:.4} m", self.topics.images[0], t.x));
-            self.warnings.push(fault.remedy("exchange `left` and `right` unless that is meant"));
+            self.warnings.push(fault.remedy("exchange `left` and `right` unless this is intended"));
         }
         Ok(())
     }
@@ -175,7 +177,7 @@ impl Bag {
         Ok((self.image(entries[0], bytes[0], left)?, self.image(entries[1], bytes[1], right)?))
     }
 
-    /// The image in a message.
+    /// The image of a message.
     fn image(&self, entry: &Entry, bytes: &[u8], camera: &Pinhole) -> Result<Image, Fault> {
         let topic = &self.recording.topics()[entry.topic];
         let broken = |what: String| message_fault(&self.path, topic, entry, &what);
@@ -195,12 +197,12 @@ impl Bag {
     }
 }
 
-/// What is wrong with a message.
+/// The fault of a message.
 fn message_fault(path: &Path, topic: &Topic, entry: &Entry, what: &str) -> Fault {
     Fault::new(what, path).value(format!("{} message {} at {} ns", topic.name, entry.sequence, entry.log_time))
 }
 
-/// Reads messages of a recording.
+/// A reader of messages of a recording.
 struct Messages<'a> {
     path: &'a Path,
     recording: &'a Recording,
@@ -228,13 +230,13 @@ impl Messages<'_> {
             if !info.is_of_one_camera_with(&other) {
                 let value = format!("{topic}: the message of {} ns", other.header.stamp_ns);
                 let fault = Fault::new("a calibration that changes within the recording", self.path).value(value);
-                return Err(fault.remedy("cut the recording there and run its parts by themselves"));
+                return Err(fault.remedy("split the recording there and run its parts separately"));
             }
         }
         Ok(info)
     }
 
-    /// Stamp, message and coordinate frame of each image, in order of time.
+    /// The stamp, message and coordinate frame of each image, in order of time.
     fn stamps(&mut self, topic: &str) -> Result<Vec<(u64, Entry, String)>, Fault> {
         let mut images: Vec<(u64, Entry, String)> = Vec::new();
         for entry in self.of(topic) {
@@ -247,7 +249,7 @@ impl Messages<'_> {
         };
         let wrong = images.windows(2).find(|pair| pair[0].0 >= pair[1].0);
         if let (Some([before, after]), false) = (wrong, self.settings.sort_stamps) {
-            let what = if before.0 == after.0 { "two images with one stamp" } else { "stamps that go back" };
+            let what = if before.0 == after.0 { "two images with one stamp" } else { "decreasing stamps" };
             return Err(fault(what, after));
         }
         images.sort_by_key(|image| image.0);
@@ -258,7 +260,7 @@ impl Messages<'_> {
         {
             let value = format!("{topic}: taken at {stamp} ns, recorded at {} ns", entry.log_time);
             let fault = Fault::new("clocks that are more than a year apart", self.path).value(value);
-            self.warnings.push(fault.remedy("do seconds and nanoseconds mix? the time of capture is used"));
+            self.warnings.push(fault.remedy("check the units (s, ns) of the driver; the time of capture is used"));
         }
         Ok(images)
     }
@@ -289,14 +291,14 @@ impl Messages<'_> {
         let calibrated = ros::right_from_left(&infos[0], &infos[1], rectified).map_err(|what| fault(1, what))?;
         let [left, right] = frames;
         let stamp = infos[0].header.stamp_ns;
-        // One frame for both images, as some drivers have it, says nothing of the cameras.
+        // Some drivers name one frame for both images; the transform between the cameras is then unknown.
         let of_tree = (left != right).then(|| tree.look_up(right, left, stamp, self.settings.gap_ns())).flatten();
         if let (Some(_), Some(stands)) = (&calibrated, &of_tree) {
             let said = ros::contradiction(&infos[0], &infos[1], stands).map_err(|what| fault(1, what))?;
             if let Some(said) = said {
-                let what = "P and the transforms contradict each other about where the cameras stand".to_owned();
+                let what = "P and the transforms give different poses of the cameras".to_owned();
                 let remedy = format!(
-                    "correct {} or the transform `{right}` from `{left}`; without the transform P alone holds",
+                    "correct {} or the transform `{right}` from `{left}`; without the transform, P is used alone",
                     topics.infos[1]
                 );
                 return Err(fault(1, what).value(said).remedy(remedy));
@@ -310,8 +312,8 @@ impl Messages<'_> {
         StereoRig::new(camera(0)?, camera(1)?, stands).map_err(|error| fault(1, error.to_string()))
     }
 
-    /// The poses of the left camera that `said` names, and their covariances where they have any: a topic of odometry,
-    /// or `tf:FRAME`, the camera in that frame.
+    /// The poses of the left camera, with covariances if there are any. `said` is a topic of odometry, or `tf:FRAME`
+    /// for the pose of the camera in that frame.
     fn poses(&self, said: &str, tree: &Tree, camera: &str, stamps: &[u64]) -> Result<Poses, Fault> {
         let gap = self.settings.gap_ns();
         if said.is_empty() {
@@ -321,9 +323,9 @@ impl Messages<'_> {
             let poses: Vec<_> =
                 stamps.iter().filter_map(|&stamp| Some((stamp, tree.look_up(frame, camera, stamp, gap)?))).collect();
             if poses.is_empty() {
-                let fault =
-                    Fault::new("no transform that leads there", self.path).value(format!("`{frame}` from `{camera}`"));
-                return Err(fault.remedy("is the name of the frame right?"));
+                let fault = Fault::new("no transform to the frame of the poses", self.path)
+                    .value(format!("`{frame}` from `{camera}`"));
+                return Err(fault.remedy("check the name of the frame"));
             }
             return Ok((poses, None));
         }

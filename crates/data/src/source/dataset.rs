@@ -1,4 +1,4 @@
-//! A recorded data set.
+//! Recorded data sets.
 
 use std::path::Path;
 
@@ -11,22 +11,23 @@ use serde::{Deserialize, Serialize};
 use super::{CalibratedPort, FrameData, Hints, SensorFrame, Sequence, Source, Truth, WorldPrior};
 use crate::dataset::{Dataset, hash_faults, input_hashes, inspect_images, swapped};
 
-/// Reads a `seafix-dataset/1` folder, one of EuRoC, or a sequence of KITTI.
+/// A reader of `seafix-dataset/1` folders, EuRoC folders and KITTI sequences.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DatasetSource {
-    /// The folder; relative to the experiment file.
+    /// The folder, relative to the experiment file.
     pub path: String,
-    /// The file of a site to look for, instead of the data set's own; relative to the experiment file.
+    /// The site file, relative to the experiment file; the data set's own site if empty.
     pub site: String,
-    /// The most pixels that an image's header may declare.
+    /// The maximum number of pixels in an image's header.
     pub max_pixels: u64,
-    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    /// The maximum size of an image file and of its decoder's memory (bytes).
     pub max_bytes: u64,
-    /// Whether one image of another size than the calibration refuses the whole set; otherwise its pair is left out
-    /// and counted, as long as at least half of the pairs stay.
+    /// Whether an image of another size than the calibration rejects the data set. Otherwise its pair is skipped and
+    /// counted; at least half of the pairs must remain.
     pub reject_mismatched_images: bool,
-    /// Sort pairs that are out of order by time, and keep the first of each stamp; otherwise such a set is refused.
+    /// Whether pairs are sorted by time, keeping the first of each stamp. Otherwise pairs out of order reject the data
+    /// set.
     pub sort_stamps: bool,
 }
 
@@ -46,12 +47,12 @@ impl Default for DatasetSource {
 
 impl Component for DatasetSource {
     const NAME: &'static str = "dataset";
-    const SUMMARY: &'static str = "stereo pairs from the folder of a data set, ours or others'";
+    const SUMMARY: &'static str = "stereo pairs from the folder of a data set, Seafix, EuRoC or KITTI";
     const SOURCE: &'static str = "docs/formats.md";
 
     fn check(&self) -> Result<(), String> {
         in_range(!self.path.is_empty(), "path", "''", "the folder of a data set, relative to the experiment file")?;
-        // What TOML can say.
+        // The largest integer in TOML.
         let max = i64::MAX as u64;
         in_range((1..=max).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
         in_range((1..=max).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
@@ -82,7 +83,7 @@ pub(super) struct Recorded {
 }
 
 impl Recorded {
-    /// The data set with the site in the file `site`, relative to `folder`, or its own.
+    /// Opens the data set with its own site, or with the site file `site` relative to `folder`.
     pub(super) fn open(mut dataset: Dataset, site: &str, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
         if !site.is_empty() {
             let file = folder.join(site);
@@ -92,7 +93,7 @@ impl Recorded {
             let fault = Fault::new("no site", &dataset.folder);
             return Err(vec![fault.remedy("a fix needs a known object: add `site = \"site.toml\"`")]);
         };
-        // Every image is decoded once before anything is written: a damaged one shall not end a run midway.
+        // Every image is decoded once before a run begins, so that a damaged one does not stop it midway.
         let (mut faults, identical) = inspect_images(&dataset);
         faults.extend(identical.fault(&dataset));
         faults.extend(hash_faults(&dataset));
@@ -125,7 +126,7 @@ impl Sequence for Recorded {
     }
 
     fn bits(&self) -> u8 {
-        // Sixteen is what a set of eight bits says that says nothing.
+        // A data set without the key `bits` has 16; its images may have 8.
         if self.dataset.bits < 16 { self.dataset.bits } else { 8 }
     }
 

@@ -1,4 +1,4 @@
-//! A simulated dive: a vehicle, lamps, water, and everything that may go wrong as a number.
+//! Simulated dives with vehicle, lamps and water.
 
 use std::path::Path;
 
@@ -13,8 +13,8 @@ use super::{
     CalibratedPort, FrameData, Hints, SensorBuffer, SensorFrame, Sequence, Source, Truth, WorldPrior, readings,
 };
 
-/// A vehicle's dive over a site given as data, under lamps in water: rendered stereo pairs, or clouds of
-/// the same views with `as-points`.
+/// A source that simulates a vehicle's dive over a given site, under lamps in water. Every disturbance is a setting. It
+/// gives rendered stereo pairs, or with `as-points` clouds of the same views.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Dive(pub Mission);

@@ -1,4 +1,4 @@
-//! A data set of EuRoC.
+//! EuRoC data sets.
 
 use std::path::Path;
 
@@ -9,17 +9,17 @@ use serde::{Deserialize, Serialize};
 use super::{DatasetSource, Sequence, Source, dataset::Recorded};
 use crate::dataset::Dataset;
 
-/// Reads a folder in the layout of the EuRoC data sets: `mav0/cam0`, `mav0/cam1`, `mav0/state_groundtruth_estimate0`.
+/// A reader of folders in the EuRoC layout: `mav0/cam0`, `mav0/cam1`, `mav0/state_groundtruth_estimate0`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Euroc {
-    /// The folder; relative to the experiment file.
+    /// The folder, relative to the experiment file.
     pub path: String,
-    /// The file of the site to look for; relative to the experiment file.
+    /// The site file, relative to the experiment file.
     pub site: String,
-    /// The most pixels that an image's header may declare.
+    /// The maximum number of pixels in an image's header.
     pub max_pixels: u64,
-    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    /// The maximum size of an image file and of its decoder's memory (bytes).
     pub max_bytes: u64,
 }
 

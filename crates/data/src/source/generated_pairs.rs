@@ -1,4 +1,4 @@
-//! Putative correspondences with a share of wrong ones.
+//! Putative correspondences with a given fraction of outliers.
 
 use std::path::Path;
 
@@ -8,22 +8,23 @@ use serde::{Deserialize, Serialize};
 
 use super::{Sequence, Source, generated_problems::posed, problem_sequence::ProblemSequence};
 
-/// Pairs of model and measured points of which a share is wrong, each frame another object and another pose: how the
-/// literature compares what is robust. Of one frame the object, its pose and the noise do not depend on the share.
+/// Putative pairs of model and measured points, of which a given fraction are outliers; each frame has an object and a
+/// pose of its own.
 ///
-/// Source: Yang, Shi and Carlone, *TEASER: fast and certifiable point cloud registration*, 2020, Sec. VII.
+/// This is the usual benchmark of robust registration: Yang, Shi and Carlone, *TEASER: fast and certifiable point cloud
+/// registration*, 2020, Sec. VII. The object, pose and noise of a frame do not depend on the outlier fraction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct GeneratedPairs {
-    /// Pairs of a frame.
+    /// The number of pairs of a frame.
     pub pairs: usize,
-    /// How many in a hundred are wrong.
+    /// The percentage of outliers.
     pub outliers: usize,
-    /// Points of wrong pairs lie in a ball of this radius about the object (m).
+    /// The radius of the ball about the object in which the points of outliers lie (m).
     pub radius: f64,
-    /// Noise of the measured points, an axis (m).
+    /// The standard deviation of the measured points per axis (m).
     pub sigma: f64,
-    /// How many frames.
+    /// The number of frames.
     pub frames: u64,
 }
 
@@ -35,7 +36,7 @@ impl Default for GeneratedPairs {
 
 impl Component for GeneratedPairs {
     const NAME: &'static str = "generated-pairs";
-    const SUMMARY: &'static str = "putative pairs of which a share is wrong, with truth";
+    const SUMMARY: &'static str = "putative pairs with a given fraction of outliers, with truth";
     const SOURCE: &'static str = "Yang, Shi, Carlone, TEASER, 2020";
 
     fn check(&self) -> Result<(), String> {
@@ -54,7 +55,7 @@ impl Source for GeneratedPairs {
         let &Self { pairs, outliers, radius, sigma, frames } = self;
         let of = PutativePairs { pairs, outliers, radius, sigma };
         let generated = move |index: usize| posed(Generated::of_pairs(&of, seed, index as u64));
-        let name = format!("{pairs} pairs, {outliers} % wrong, seed {seed}");
+        let name = format!("{pairs} pairs, {outliers} % outliers, seed {seed}");
         Ok(Box::new(ProblemSequence::new(name, frames as usize, generated, Vec::new())))
     }
 

@@ -1,4 +1,4 @@
-//! Identification problems drawn from a family.
+//! Coherence problems generated from a family.
 
 use std::{path::Path, sync::Arc};
 
@@ -13,17 +13,17 @@ use super::{
     problem_sequence::{Posed, ProblemSequence},
 };
 
-/// Problems of one family, each a frame: the same as `seafix generate` writes.
+/// Generated coherence problems of one family, one a frame, equal to those that `seafix generate` writes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct GeneratedProblems {
     /// The family: `paper-scale`, `site-scale`, `no-prior`, `putative`, `lattice`, `few-visible` or `dense-clutter`.
     pub family: String,
-    /// How many.
+    /// The number of problems.
     pub frames: u64,
-    /// The number of the first in its family; what is varied cycles with the number.
+    /// The number of the first problem in its family; the varied quantity cycles with the number.
     pub first: u64,
-    /// Whether the object is left away: the cloud is clutter, and every pose is wrong.
+    /// Whether the object is absent: the cloud is clutter, and every pose is wrong.
     pub absent: bool,
 }
 
@@ -35,7 +35,7 @@ impl Default for GeneratedProblems {
 
 impl Component for GeneratedProblems {
     const NAME: &'static str = "generated-problems";
-    const SUMMARY: &'static str = "identification problems drawn from a family, one a frame, with truth";
+    const SUMMARY: &'static str = "coherence problems generated from a family, one a frame, with truth";
     const SOURCE: &'static str = "ours";
 
     fn check(&self) -> Result<(), String> {
@@ -61,10 +61,10 @@ impl Source for GeneratedProblems {
     }
 }
 
-/// A problem, and its truth for the judge.
+/// A problem with its truth.
 pub(super) fn posed(Generated { problem, truth }: Generated) -> Posed {
     let camera_from_object =
-        Transform::<Camera, Object>::from_rows(&truth.t_cam_obj).expect("it was made of a rigid motion");
+        Transform::<Camera, Object>::from_rows(&truth.t_cam_obj).expect("the generator writes a rigid motion");
     let rule = Solved { ideal_rms: truth.ideal_tre_rms, putative: problem.putative.is_some() };
     let pairs = truth.pairs.iter().map(|&[model, cloud]| (model, cloud)).collect();
     Posed {

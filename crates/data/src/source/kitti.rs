@@ -1,4 +1,4 @@
-//! A sequence of KITTI.
+//! KITTI odometry sequences.
 
 use std::path::Path;
 
@@ -9,20 +9,20 @@ use serde::{Deserialize, Serialize};
 use super::{DatasetSource, Sequence, Source, dataset::Recorded};
 use crate::dataset::{Cameras, Dataset};
 
-/// Reads an odometry sequence of KITTI: `calib.txt`, `times.txt`, `image_0`, `image_1`, the truth in `poses.txt` or
-/// `../../poses/NAME.txt`.
+/// A reader of KITTI odometry sequences: `calib.txt`, `times.txt`, `image_0`, `image_1`, and the ground truth in
+/// `poses.txt` or `../../poses/NAME.txt`.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Kitti {
-    /// The folder; relative to the experiment file.
+    /// The folder, relative to the experiment file.
     pub path: String,
-    /// The file of the site to look for; relative to the experiment file.
+    /// The site file, relative to the experiment file.
     pub site: String,
-    /// Which two of the four cameras: `grey`, `colour`, or `any`, the grey ones where they are there.
+    /// The pair of cameras: `grey`, `colour`, or `any` (grey if present).
     pub cameras: Cameras,
-    /// The most pixels that an image's header may declare.
+    /// The maximum number of pixels in an image's header.
     pub max_pixels: u64,
-    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    /// The maximum size of an image file and of its decoder's memory (bytes).
     pub max_bytes: u64,
 }
 

@@ -1,4 +1,4 @@
-//! The frames that another run logged.
+//! Frames from the log of another run.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use seafix_vision::Image;
 use super::{FrameData, LoggedInput, SensorFrame, Sequence, Truth, WorldPrior, problem_sequence::no_site};
 use crate::{dataset::sha256, log_conversion};
 
-/// A trial's log as a passage: what its method was given, its judge's truth, but none of its answers.
+/// The log of a trial as a sequence: inputs and ground truth, without the trial's results.
 pub(super) struct Logged {
     frames: Frames,
     name: String,
@@ -30,20 +30,22 @@ pub(super) struct Logged {
 }
 
 impl Logged {
-    /// The log in `path`; `reading` says whether its images or its clouds are looked at.
+    /// Opens the log at `path`; `reading` selects its images or its clouds.
     pub(super) fn open(path: &Path, reading: LoggedInput) -> Result<Self, Vec<Fault>> {
         let one = |fault| vec![fault];
         let frames = Frames::open(path).map_err(|error| one(fault(path, &error)))?;
         let header = frames.header();
         if frames.is_empty() {
-            return Err(one(Fault::new("a log without frames", path).remedy("it says nothing that could be replayed")));
+            return Err(one(
+                Fault::new("a log without frames", path).remedy("there is nothing to replay; give a complete log")
+            ));
         }
         let images = match (reading, frames.has_images(0)) {
             (LoggedInput::Clouds, _) | (LoggedInput::Any, false) => false,
             (_, true) => true,
             (LoggedInput::Images, false) => {
                 let fault = Fault::new("a log without images", path);
-                return Err(one(fault.remedy("read its clouds, and leave the stages before the search as they are")));
+                return Err(one(fault.remedy("replay its clouds, with the front end unchanged")));
             }
         };
         let rig = rig(&header.rig).map_err(|what| one(Fault::new(what, path)))?;
@@ -63,14 +65,12 @@ impl Logged {
             devices.extend(hints.map(|reading| reading.device.clone()));
         }
         if !exact {
-            let what =
-                if images { "images that were logged with fewer bits" } else { "inputs that were logged rounded" };
-            warnings
-                .push(Fault::new(what, path).remedy("results may differ from the logged ones in their last digits"));
+            let what = if images { "images logged with fewer bits" } else { "inputs logged in rounded form" };
+            warnings.push(Fault::new(what, path).remedy("results may differ from the logged ones in the last digits"));
         }
         if let Some(lost) = frames.recovered() {
-            let fault = Fault::new("a log that was saved of one that was not whole", path).value(lost);
-            warnings.push(fault.remedy("frames are missing that its trial had"));
+            let fault = Fault::new("a log recovered from an incomplete one", path).value(lost);
+            warnings.push(fault.remedy("some frames of its trial are missing"));
         }
         let site = if posed { no_site() } else { Site::parse(&header.site, path)? };
         Ok(Self {
@@ -94,7 +94,7 @@ impl Logged {
     }
 }
 
-/// What is wrong with a log.
+/// The fault of a log.
 pub(super) fn fault(path: &Path, error: &LogError) -> Fault {
     let text = error.to_string();
     let (what, remedy) = text.split_once("; ").unwrap_or((&text, ""));
@@ -185,7 +185,7 @@ impl Sequence for Logged {
         let inputs = frame.inputs.as_deref().unwrap_or(&rounded);
         let cloud = match frame.inputs {
             Some(_) => log_conversion::cloud(&frame.cloud, inputs)
-                .ok_or_else(|| broken("a point whose pixels have no covariance".to_owned()))?,
+                .ok_or_else(|| broken("a point without covariance of its pixels".to_owned()))?,
             None => self.old_cloud(&frame),
         };
         let hints = log_conversion::hints(inputs, &cloud);
@@ -196,8 +196,8 @@ impl Sequence for Logged {
         };
         let frame_data = match &frame.images {
             Some([left, _]) if left.width != self.rig.left().size()[0] => {
-                let fault = broken("an image that was logged as a thumbnail".to_owned());
-                return Err(fault.remedy("read the clouds, or log the images of the run"));
+                let fault = broken("an image logged as a thumbnail".to_owned());
+                return Err(fault.remedy("replay the clouds, or run again with full images in the log"));
             }
             Some([left, right]) => FrameData::Stereo(image(left).map_err(broken)?, image(right).map_err(broken)?),
             None => FrameData::Points(cloud),
@@ -222,7 +222,7 @@ impl Sequence for Logged {
 }
 
 impl Logged {
-    /// The cloud of a log that is older than its inputs: pixels err independently.
+    /// The cloud of a log from before inputs were logged; its pixel errors are independent.
     fn old_cloud(&self, frame: &FrameRecord) -> Vec<seafix_geometry::MeasuredPoint> {
         let sigma = self.frames.header().pixel_sigma.unwrap_or(0.3);
         let pairs = frame.cloud.iter().filter(|point| point.pixels.is_some());
@@ -232,7 +232,7 @@ impl Logged {
         log_conversion::cloud(&frame.cloud, &inputs).expect("every pair of pixels was given a covariance")
     }
 
-    /// The rough pose of such a log, with the standard deviations that are typical of it.
+    /// The prior pose of such a log, with the typical standard deviations in its header.
     fn old_prior(&self, frame: &FrameRecord) -> Result<Option<WorldPrior>, String> {
         let (Some(prior), Some((position, attitude))) = (&frame.prior, self.prior_sigma()) else { return Ok(None) };
         let world_from_camera: Transform<World, Camera> =

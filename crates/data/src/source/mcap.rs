@@ -1,4 +1,4 @@
-//! Recordings: the log of another run, and those of ROS 2.
+//! MCAP files: logs of other runs, and ROS 2 recordings.
 
 use std::path::Path;
 
@@ -10,59 +10,60 @@ use serde::{Deserialize, Serialize};
 use super::{Sequence, Source, logged, logged::Logged, recorded::Recorded};
 use crate::{dataset::SAME_INSTANT_NS, ros::Views};
 
-/// Which of what a run logged is looked at.
+/// The part of a log's inputs to replay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoggedInput {
-    /// Images where there are any, else clouds.
+    /// Images if there are any, otherwise clouds.
     #[default]
     Any,
     /// Images.
     Images,
-    /// Clouds: the stages before the search do no work.
+    /// Clouds; the front end does not run.
     Clouds,
 }
 
-/// Reads an MCAP file: the log of a trial, or a recording of ROS 2 with images, calibrations and poses (all settings but
-/// `path` and `read` are about the latter).
+/// A reader of MCAP files: the log of a trial, or a ROS 2 recording with images, calibrations and poses. All settings
+/// except `path` and `read` apply to ROS 2 recordings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mcap {
-    /// The file; relative to the experiment file.
+    /// The file, relative to the experiment file.
     pub path: String,
-    /// Of our own logs: `images`, `clouds`, or `any`, images where there are any.
+    /// The part of a Seafix log to replay: `images`, `clouds`, or `any` (images if there are any).
     pub read: LoggedInput,
-    /// The file of the site to look for; relative to the experiment file. Its world is that of the poses.
+    /// The site file, relative to the experiment file. Its world frame is that of the poses.
     pub site: String,
-    /// Topics of the left and the right images (Image, CompressedImage); empty: those whose names say so.
+    /// The topic of the left images (Image or CompressedImage); found by its name if empty.
     pub left: String,
-    /// See `left`.
+    /// The topic of the right images, like `left`.
     pub right: String,
-    /// Topics of the calibrations (CameraInfo); empty: `camera_info` beside the images.
+    /// The topic of the left calibration (CameraInfo); `camera_info` beside the images if empty.
     pub left_info: String,
-    /// See `left-info`.
+    /// The topic of the right calibration, like `left-info`.
     pub right_info: String,
-    /// Whether the images are `rectified` or `raw`; `by-name`: rectified if their topic's name has `rect` in it.
+    /// The kind of the images, `rectified` or `raw`; `by-name` takes topics with `rect` in their name as rectified.
     pub images: Views,
-    /// The rough pose a method may use: a topic of Odometry, or `tf:FRAME`, the camera in that frame; empty: none.
+    /// The prior pose: a topic of Odometry, or `tf:FRAME` for the pose of the camera in that frame; no prior if empty.
     pub prior: String,
-    /// Its standard deviation a world axis (m), and of the attitude a camera axis (degrees); 0: as the messages say.
+    /// The standard deviation of the prior's position per world axis (m); 0 uses the covariances of the messages.
     pub prior_position: f64,
-    /// See `prior-position`.
+    /// The standard deviation of the prior's attitude per camera axis (degrees); 0 uses the covariances of the
+    /// messages.
     pub prior_attitude_deg: f64,
-    /// The true pose, likewise; no method sees it.
+    /// The ground truth pose, in the form of `prior`; methods do not receive it.
     pub truth: String,
-    /// Images of one instant have stamps within this (s).
+    /// The maximum difference of the two stamps of a pair (s).
     pub tolerance: f64,
-    /// Between poses farther apart than this (s) nothing is known.
+    /// The maximum time between two poses for interpolation (s).
     pub max_gap: f64,
-    /// Whether images out of order are sorted and the first of each stamp kept, instead of refused.
+    /// Whether images are sorted by time, keeping the first of each stamp. Otherwise images out of order are rejected.
     pub sort_stamps: bool,
-    /// Depth of the pixels in images of 16 bits.
+    /// The number of significant bits of a pixel in images of 16 bits.
     pub bits: u8,
-    /// The most pixels that an image's header may declare.
+    /// The maximum number of pixels in an image's header.
     pub max_pixels: u64,
-    /// The most memory that an image's decoder may take, and the largest image file (bytes).
+    /// The maximum size of an image file and of its decoder's memory (bytes).
     pub max_bytes: u64,
 }
 
@@ -94,12 +95,12 @@ impl Default for Mcap {
 }
 
 impl Mcap {
-    /// Standard deviations of the prior: position (m), attitude (rad); `None` where the messages tell.
+    /// The standard deviations of the prior: position (m), attitude (rad); `None` if the messages have covariances.
     pub(super) fn prior_sigma(&self) -> Option<(f64, f64)> {
         (self.prior_position > 0.0).then(|| (self.prior_position, self.prior_attitude_deg.to_radians()))
     }
 
-    /// The longest time between two poses (ns).
+    /// The maximum time between two poses for interpolation (ns).
     pub(super) fn gap_ns(&self) -> u64 {
         (self.max_gap * 1e9) as u64
     }
@@ -118,7 +119,12 @@ impl Component for Mcap {
         let (position, attitude) = (self.prior_position, self.prior_attitude_deg);
         in_range((0.0..=1e3).contains(&position), "prior-position", position, "0 to 1000")?;
         in_range((0.0..=180.0).contains(&attitude), "prior-attitude-deg", attitude, "0 to 180")?;
-        in_range((position > 0.0) == (attitude > 0.0), "prior-attitude-deg", attitude, "both deviations, or neither")?;
+        in_range(
+            (position > 0.0) == (attitude > 0.0),
+            "prior-attitude-deg",
+            attitude,
+            "both standard deviations or neither",
+        )?;
         in_range([8, 12, 16].contains(&self.bits), "bits", self.bits, "8, 12 or 16")?;
         let max = i64::MAX as u64;
         in_range((1..=max).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
@@ -136,7 +142,7 @@ impl Source for Mcap {
         }
         if self.site.is_empty() {
             let fault = Fault::new("a recording without a site", &path);
-            return Err(one(fault.remedy("a fix needs a known object: set `site` to the file of one")));
+            return Err(one(fault.remedy("a fix needs a known object: set `site` to a site file")));
         }
         Ok(Box::new(Recorded::open(&path, self, folder)?))
     }

@@ -1,4 +1,4 @@
-//! Sources: where stereo pairs, or clouds, come from.
+//! Sources of stereo pairs and clouds.
 
 use std::path::Path;
 
@@ -45,119 +45,119 @@ pub use virtual_points::VirtualPoints;
 
 pub use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 
-/// What is true at one instant. The runner compares with it; no method is given it.
+/// The ground truth of one frame. Evaluation uses it; no method receives it.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// The left camera.
+    /// The pose of the left camera.
     pub world_from_camera: Transform<World, Camera>,
-    /// Each object of the site, in its order; `None` where no world is known. Of a problem its only object.
+    /// The pose of each object of the site, in its order; `None` without a known world. A coherence problem has one
+    /// object.
     pub world_from_object: Vec<Option<Transform<World, Object>>>,
-    /// The feature points both cameras see, as (object, point) indices; `None` where nobody knows.
+    /// The feature points in view of both cameras, as (object, point) indices; `None` if unknown.
     pub visible: Option<Vec<(usize, usize)>>,
-    /// The Cramér–Rao bound on the pose relative to an object of the site, where it is known: the least covariance that
-    /// any unbiased estimate could have.
+    /// The Cramér–Rao bound of the pose relative to an object of the site: the lower bound of the covariance of any
+    /// unbiased estimate.
     pub bound: Option<(usize, Covariance6<Object, Camera>)>,
-    /// The answer to an identification problem, where the frame is one.
+    /// The answer to the coherence problem, if the frame is one.
     pub answer: Option<TrueAnswer>,
 }
 
-/// The true answer to an identification problem, and by which rule a pose is right.
+/// The true answer to a coherence problem, and the rule by which a pose is correct.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueAnswer {
     /// The true pairs (model point, cloud point).
     pub pairs: Vec<(usize, usize)>,
-    /// When a pose counts as found.
+    /// The rule by which a pose is correct.
     pub rule: Solved,
 }
 
 pub use crate::dataset::CalibratedPort;
 
-/// A sequence of instants, simulated or recorded, opened and checked.
+/// A sequence of sensor frames, simulated or recorded, opened and checked.
 pub trait Sequence: Send + Sync {
-    /// Its name, for people.
+    /// The name of the sequence in messages and reports.
     fn name(&self) -> &str;
-    /// What there is to see; without objects where each instant brings its own.
+    /// The site; without objects if each frame brings an object of its own.
     fn site(&self) -> &Site;
-    /// The rig the method is told.
+    /// The rig that methods receive.
     fn rig(&self) -> &StereoRig;
-    /// Where the left camera sits in the vehicle.
+    /// The pose of the left camera in the vehicle.
     fn body_from_camera(&self) -> Transform<Body, Camera>;
-    /// Whether it gives images rather than clouds.
+    /// Whether the sequence has images rather than clouds.
     fn images(&self) -> bool;
-    /// Whether every point says which one it is, so that nothing is searched.
+    /// Whether all points are labelled, so that no search runs.
     fn labelled(&self) -> bool {
         false
     }
-    /// Whether every instant is a problem about an object of its own: the passage has then no site.
+    /// Whether every frame is a coherence problem with its own object; the sequence then has no site.
     fn posed(&self) -> bool {
         false
     }
-    /// How many instants there are.
+    /// The number of frames.
     fn frames(&self) -> usize;
-    /// The number of instant `index`: it seeds what a method draws, and names the frame in logs.
+    /// The number of frame `index` in logs, which also seeds the random numbers of methods.
     fn number(&self, index: usize) -> u64 {
         index as u64
     }
-    /// Standard deviations of the prior, typical for the passage: position per world axis (m) and
-    /// attitude per camera axis (rad).
+    /// The typical standard deviations of the prior: position per world axis (m) and attitude per camera axis (rad).
     fn prior_sigma(&self) -> Option<(f64, f64)>;
-    /// Standard deviation of a pixel coordinate in clouds that come without images (px), where known.
+    /// The standard deviation of a pixel coordinate in clouds without images (px), if known.
     fn pixel_sigma(&self) -> Option<f64> {
         None
     }
-    /// Depth of the pixels of its images (bits).
+    /// The number of significant bits of a pixel.
     fn bits(&self) -> u8 {
         8
     }
-    /// The ports that the cameras stand behind, where they stand behind any, as the rig was calibrated behind them.
+    /// The ports in front of the cameras, with the distances of their calibration.
     fn ports(&self) -> [Option<CalibratedPort>; 2] {
         [None, None]
     }
-    /// Whether both the vehicle's Doppler log and its gyro are heard.
+    /// Whether the sequence has readings of both the Doppler log and the gyro.
     fn has_readings(&self) -> bool {
         false
     }
-    /// What the vehicle's navigation sensors said, as tables: names of files and their CSV text.
+    /// The readings of the navigation sensors as tables: file names and CSV text.
     fn sensors(&self) -> Vec<(String, String)> {
         Vec::new()
     }
-    /// What is odd about it but not wrong.
+    /// Warnings about the data.
     fn warnings(&self) -> &[Fault] {
         &[]
     }
-    /// What a method may see at instant `index`.
+    /// The sensor frame at `index`.
     ///
     /// # Errors
     /// A file that cannot be read.
     fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault>;
-    /// What is true at instant `index`, where it is known.
+    /// The ground truth at `index`, if known.
     fn truth(&self, index: usize) -> Option<Truth>;
-    /// Files it was made from, with their SHA-256.
+    /// The input files with their SHA-256.
     ///
     /// # Errors
     /// A file that cannot be read.
     fn inputs(&self) -> Result<Vec<(String, String)>, Fault>;
 }
 
-/// Where stereo pairs or clouds come from.
+/// A source of stereo pairs or clouds.
 pub trait Source: Send + Sync + std::fmt::Debug {
-    /// Opens the passage that `seed` selects; relative paths start from `folder`. Everything that
-    /// can be checked without decoding images is checked here.
+    /// Opens the sequence that `seed` selects. Relative paths start from `folder`. Everything except image content is
+    /// checked.
     ///
     /// # Errors
-    /// Everything that is wrong with it, at once.
+    /// All faults of the source.
     fn open(&self, seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>>;
     /// Whether its points have pixels, which some solvers need.
     fn has_pixels(&self) -> bool {
         true
     }
-    /// Whether it may have readings of the vehicle's Doppler log and gyro; what it opens says whether it has.
+    /// Whether it may have readings of the Doppler log and gyro; [`Sequence::has_readings`] decides.
     fn may_have_readings(&self) -> bool {
         false
     }
 }
 
-/// All sources.
+/// The registry of all sources.
 pub static SOURCES: Registry<dyn Source> = Registry::new(
     "source",
     &[
@@ -175,7 +175,7 @@ pub static SOURCES: Registry<dyn Source> = Registry::new(
     ],
 );
 
-/// The site of a problem, which is about an object of its own; `None` where the passage's is looked at.
+/// The site of a coherence problem with an object of its own; `None` if the site of the sequence applies.
 pub fn own_site(sensor_frame: &SensorFrame) -> Option<Site> {
     match &sensor_frame.hints {
         Hints::Problem(problem) => Some(problem_sequence::site_of(problem)),

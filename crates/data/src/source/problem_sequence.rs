@@ -1,4 +1,4 @@
-//! Identification problems as the frames of a passage: what both sources of problems share.
+//! Coherence problems as the frames of a sequence.
 
 use std::sync::Arc;
 
@@ -9,21 +9,21 @@ use seafix_simulation::VirtualRig;
 
 use super::{FrameData, Hints, SensorFrame, Sequence, TrueAnswer, Truth};
 
-/// Time between frames (ns): problems have none.
+/// The nominal time between frames (ns); problems have no time.
 const STEP_NS: u64 = 100_000_000;
 
-/// A problem, and what is true of it where that is known.
+/// A problem, and its truth if known.
 #[derive(Debug, Clone)]
 pub(super) struct Posed {
     pub(super) problem: Arc<CoherenceProblem>,
     pub(super) truth: Option<(Transform<Object, Camera>, TrueAnswer)>,
 }
 
-/// Gives the problem of an index, the same one every time.
+/// A function from an index to its problem, always the same one.
 type Posing = Box<dyn Fn(usize) -> Posed + Send + Sync>;
 
-/// A problem a frame: its model is an object of its own, which no other frame has and which stands in no world. Those
-/// that are drawn are in memory one at a time.
+/// A sequence of coherence problems. The model of each frame is an object of its own, without a pose in the world.
+/// Generated problems are created one at a time.
 pub(super) struct ProblemSequence {
     name: String,
     site: Site,
@@ -33,12 +33,12 @@ pub(super) struct ProblemSequence {
     inputs: Vec<(String, String)>,
 }
 
-/// The site of problems: none, for each frame has its own.
+/// The empty site of the sequence; each frame has its own.
 pub(super) fn no_site() -> Site {
     Site { name: "problems".to_owned(), frame: 0, objects: Vec::new(), warnings: Vec::new() }
 }
 
-/// The site of one problem: its object by itself.
+/// The site of one problem with its only object.
 pub(super) fn site_of(problem: &CoherenceProblem) -> Site {
     let object = SiteObject {
         id: problem.id.clone(),
@@ -53,14 +53,14 @@ pub(super) fn site_of(problem: &CoherenceProblem) -> Site {
 }
 
 impl ProblemSequence {
-    /// So many problems; their ids differ. `inputs` are the files they came from, with their hashes.
+    /// A sequence of N problems with distinct ids. `inputs` are the files that they were read from, with their hashes.
     pub(super) fn new(
         name: String,
         frames: usize,
         posing: impl Fn(usize) -> Posed + Send + Sync + 'static,
         inputs: Vec<(String, String)>,
     ) -> Self {
-        let rig = VirtualRig::default().build().expect("the default rig is sound");
+        let rig = VirtualRig::default().build().expect("the default rig is valid");
         Self { name, site: no_site(), rig, frames, posing: Box::new(posing), inputs }
     }
 }
@@ -74,7 +74,7 @@ impl Sequence for ProblemSequence {
         &self.site
     }
 
-    /// Problems come without cameras; logs and viewers have this one.
+    /// Problems have no cameras; logs and viewers receive this rig.
     fn rig(&self) -> &StereoRig {
         &self.rig
     }
@@ -110,7 +110,7 @@ impl Sequence for ProblemSequence {
         })
     }
 
-    /// The world of a frame is its object's.
+    /// The world frame is that of the object.
     fn truth(&self, index: usize) -> Option<Truth> {
         let (object_from_camera, answer) = (self.posing)(index).truth?;
         Some(Truth {

@@ -1,4 +1,4 @@
-//! Identification problems in files.
+//! Coherence problems from files.
 
 use std::{
     fs,
@@ -19,18 +19,18 @@ use super::{
 };
 use crate::dataset::sha256;
 
-/// The problems (`coherence-problem/1`) of a folder and the folders in it, each a frame, in the order of their paths.
-/// The truth of `NAME.json`, where there is one, is `NAME.truth.json`: it goes to the judge alone.
+/// A source of coherence problems (`coherence-problem/1`) from a folder, one a frame. Subfolders are included, in the
+/// order of paths. The ground truth of `NAME.json` is `NAME.truth.json` if it exists; only evaluation uses it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Problems {
-    /// The folder, or one problem's file; relative to the experiment file.
+    /// The folder, or the file of one problem; relative to the experiment file.
     pub path: String,
 }
 
 impl Component for Problems {
     const NAME: &'static str = "problems";
-    const SUMMARY: &'static str = "identification problems (coherence-problem/1) in files, one a frame";
+    const SUMMARY: &'static str = "coherence problems (coherence-problem/1) in files, one a frame";
     const SOURCE: &'static str = "docs/formats.md";
 
     fn check(&self) -> Result<(), String> {
@@ -46,8 +46,8 @@ impl Source for Problems {
         gather(&path, &mut files).map_err(one)?;
         files.sort();
         if files.is_empty() {
-            let remedy = "name a folder of .json files; `seafix generate` makes some";
-            return Err(one(Fault::new("no problem", &path).remedy(remedy)));
+            let remedy = "name a folder of .json files; `seafix generate` writes some";
+            return Err(one(Fault::new("no coherence problem", &path).remedy(remedy)));
         }
         let (mut posed, mut inputs, mut faults) = (Vec::new(), Vec::new(), Vec::new());
         for file in &files {
@@ -63,7 +63,7 @@ impl Source for Problems {
         if !faults.is_empty() {
             return Err(faults);
         }
-        // Problems of one path and number need not be the same.
+        // The hash distinguishes problems with the same path and number.
         let mut contents = Sha256::new();
         inputs.iter().for_each(|(name, hash)| contents.update(format!("{hash}  {name}\n")));
         let contents: String = contents.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
@@ -77,7 +77,7 @@ impl Source for Problems {
     }
 }
 
-/// The files of problems at `path`, truth left out; links are not followed.
+/// The problem files at `path` without those of truth; links are not followed.
 fn gather(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), Fault> {
     let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path);
     if !path.is_dir() {
@@ -100,12 +100,12 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), Fault> {
     Ok(())
 }
 
-/// A problem and its truth, and the hashes of both files under their names below `folder`.
+/// A problem with its truth, and the hashes of both files by their names below `folder`.
 fn read(file: &Path, folder: &Path) -> Result<(Posed, Vec<(String, String)>), Fault> {
     let mut problem = problem_file::read(file)?;
     if problem.model.len() < 3 {
         let fault = Fault::new("a model of fewer than three points", file).value(problem.model.len());
-        return Err(fault.remedy("a pose needs three; leave the file out"));
+        return Err(fault.remedy("a pose needs three points; remove the file"));
     }
     if problem.id.is_empty() {
         problem.id = file.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -120,15 +120,16 @@ fn read(file: &Path, folder: &Path) -> Result<(Posed, Vec<(String, String)>), Fa
     Ok((Posed { problem: Arc::new(problem), truth }, hashes))
 }
 
-/// Two problems of one name: results would not tell them apart.
+/// The fault of two problems with the same name, which results could not distinguish.
 fn twice(posed: &[Posed], files: &[PathBuf]) -> Vec<Fault> {
     let mut names: Vec<&str> = posed.iter().map(|posed| posed.problem.id.as_str()).collect();
     names.sort_unstable();
     let same = names.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
-    same.map(|id| Fault::new("two problems of one `id`", &files[0]).value(id).remedy("give each its own")).collect()
+    same.map(|id| Fault::new("two problems with the same `id`", &files[0]).value(id).remedy("give each its own"))
+        .collect()
 }
 
-/// `NAME.truth.json`: the keys the judge needs; what else was drawn is the writer's own.
+/// The truth in `NAME.truth.json`; other keys are ignored.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TruthFile {
@@ -156,11 +157,11 @@ impl TruthFile {
                 .on_line(Some(error.line()).filter(|line| *line > 0))
         })?;
         let camera_from_object = Transform::<Camera, Object>::from_rows(&truth.t_cam_obj)
-            .map_err(|error| Fault::new(format!("`T_cam_obj` is no rigid motion: {error}"), file))?;
+            .map_err(|error| Fault::new(format!("`T_cam_obj` is not a rigid motion: {error}"), file))?;
         let (n, m) = (problem.model.len(), problem.cloud.len());
         if let Some(pair) = truth.pairs.iter().find(|[model, cloud]| *model >= n || *cloud >= m) {
-            let fault = Fault::new("a true pair that points nowhere", file).value(format!("{pair:?}"));
-            return Err(fault.remedy(format!("there are {n} model and {m} cloud points, from 0")));
+            let fault = Fault::new("a true pair with an index out of range", file).value(format!("{pair:?}"));
+            return Err(fault.remedy(format!("there are {n} model and {m} cloud points, counted from 0")));
         }
         let ideal_rms = truth.ideal_tre_rms.filter(|_| truth.pose_defined);
         if truth.pose_defined && !ideal_rms.is_some_and(|rms| rms >= 0.0) {

@@ -1,4 +1,4 @@
-//! What the navigation sensors of a dive said, to an odometry and as tables beside its data set, and where its route led.
+//! Sensor readings of a simulated dive: for an odometry, and as tables beside its data set.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use seafix_simulation::{PlannedMission, sensors::TimedReading};
 
 use super::SensorBuffer;
 
-/// What the Doppler log and the gyro told, and how much noise their data sheets say is in it.
+/// The readings of the Doppler log and the gyro, with the noise of their data sheets.
 pub(super) fn sensor_buffer(mission: &PlannedMission) -> SensorBuffer {
     let readings = mission.readings();
     let noise = Noise::of(mission);
@@ -21,7 +21,7 @@ pub(super) fn sensor_buffer(mission: &PlannedMission) -> SensorBuffer {
     SensorBuffer::new(doppler.chain(gyro).collect())
 }
 
-/// Standard deviations of the noise of a reading, each axis: velocity (m/s), rate of turn (rad/s).
+/// The standard deviations of a reading's noise per axis: velocity (m/s), rate of turn (rad/s).
 struct Noise {
     doppler: f64,
     gyro: f64,
@@ -34,7 +34,7 @@ impl Noise {
     }
 }
 
-/// The tables, by the names of their files.
+/// The tables with the names of their files.
 pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
     let readings = mission.readings();
     let axes = |name: &str| ["x", "y", "z"].map(|axis| format!("{name}{axis}")).join(",");
@@ -60,7 +60,7 @@ pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
     all.chain(lbl(mission)).map(|(name, table)| (format!("{name}.csv"), table)).collect()
 }
 
-/// Transponders as surveyed, the ranges to them, and the positions by them; nothing where there are none.
+/// The surveyed transponders, the ranges to them, and the resulting positions; empty without transponders.
 fn lbl(mission: &PlannedMission) -> Vec<(&'static str, String)> {
     let places = &mission.settings().sensors.lbl.transponders;
     if places.is_empty() {
@@ -70,7 +70,7 @@ fn lbl(mission: &PlannedMission) -> Vec<(&'static str, String)> {
     let mut ranges = "stamp_ns,arrival_ns,transponder,range\n".to_owned();
     let mut positions = "stamp_ns,arrival_ns,north,east,down,sigma_north,sigma_east,sigma_down\n".to_owned();
     let put = |table: &mut String, line: std::fmt::Arguments<'_>| {
-        table.write_fmt(line).expect("a string takes all");
+        table.write_fmt(line).expect("writing to a string does not fail");
         table.push('\n');
     };
     for (k, [north, east, down]) in places.iter().enumerate() {
@@ -102,7 +102,7 @@ fn table<V>(
     for reading in readings {
         let [stamp, arrival] = [reading.time, reading.arrival].map(|time| mission.stamp(time));
         let values: Vec<String> = numbers(&reading.value).iter().map(f64::to_string).collect();
-        writeln!(text, "{stamp},{arrival},{}", values.join(",")).expect("a string takes all");
+        writeln!(text, "{stamp},{arrival},{}", values.join(",")).expect("writing to a string does not fail");
     }
     text
 }
@@ -115,7 +115,7 @@ mod tests {
 
     use super::*;
 
-    /// A dive of some seconds with all sensors.
+    /// A short dive with all sensors.
     fn mission() -> PlannedMission {
         let transponders = vec![[-50.0, -40.0, 38.0], [60.0, -40.0, 39.0], [55.0, 55.0, 37.0], [-40.0, 60.0, 38.5]];
         let mut mission = Mission {
@@ -128,12 +128,12 @@ mod tests {
         mission.plan(3, 0, Path::new("")).unwrap()
     }
 
-    /// A table as others read it: the names of its columns, its rows.
+    /// The header and the rows of a table.
     fn read(text: &str) -> (String, Vec<Vec<String>>) {
         let mut lines = text.lines();
         let columns = lines.next().unwrap().to_owned();
         let rows: Vec<Vec<String>> = lines.map(|line| line.split(',').map(str::to_owned).collect()).collect();
-        assert!(rows.iter().all(|row| row.len() == columns.split(',').count()), "{columns}: rows of other lengths");
+        assert!(rows.iter().all(|row| row.len() == columns.split(',').count()), "{columns}: rows of different lengths");
         (columns, rows)
     }
 
@@ -167,7 +167,7 @@ mod tests {
             assert!(rows.len() == values.len() && !rows.is_empty(), "{name}: {} of {}", rows.len(), values.len());
             for ((row, times), values) in rows.iter().zip(times).zip(values) {
                 assert_eq!(row[..2], times.map(|time| mission.stamp(time).to_string()), "{name}");
-                assert!(times[0] <= times[1], "{name}: heard before it was said");
+                assert!(times[0] <= times[1], "{name}: received before it was sent");
                 assert_eq!(row[2..].iter().map(number).collect::<Vec<_>>(), values, "{name}");
             }
         };
@@ -201,7 +201,7 @@ mod tests {
             let q = said.world_from_body;
             vec![said.rate.x, said.rate.y, said.rate.z, q.i, q.j, q.k, q.w]
         });
-        // Ranges, as many as were heard, and where they put the vehicle.
+        // The received ranges, and the position that they determine.
         let sensor_buffer = said.lbl.iter().map(|answer| answer.value.0.0.iter().flatten().count()).sum::<usize>();
         assert_eq!(
             (&tables["ranges.csv"].0[..], tables["ranges.csv"].1.len()),
@@ -215,7 +215,7 @@ mod tests {
         let places: Vec<Vec<f64>> =
             tables["transponders.csv"].1.iter().map(|row| row[1..].iter().map(number).collect()).collect();
         assert_eq!(places, mission.settings().sensors.lbl.transponders.iter().map(|p| p.to_vec()).collect::<Vec<_>>());
-        // The points as they are, where the survey has them but for its errors.
+        // The true points agree with the survey within its errors.
         let (columns, rows) = &tables["truth-points.csv"];
         assert_eq!(columns, "object,point,x,y,z");
         let surveyed =
@@ -229,7 +229,7 @@ mod tests {
             let truth = Vector3::from_fn(|k, _| number(&row[2 + k]));
             assert!((truth - at.coords).norm() < 0.01 && truth != at.coords, "{object} {point}");
         }
-        // The route, as the setting `route.waypoints` takes it.
+        // The route in the form of the setting `route.waypoints`.
         let (columns, rows) = &tables["waypoints.csv"];
         assert_eq!(columns, "north,east,height");
         let waypoints: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|k| number(&row[k]))).collect();

@@ -1,4 +1,4 @@
-//! A recording of ROS 2 with a site: what a method sees of it, and what is true.
+//! ROS 2 recordings with a site.
 
 use std::path::{Path, PathBuf};
 
@@ -13,21 +13,21 @@ use crate::dataset::{
     tum::{Stamped, between},
 };
 
-/// Stereo pairs, calibration and poses out of a recording of ROS 2.
+/// The stereo pairs, calibration and poses of a ROS 2 recording.
 pub(super) struct Recorded {
     path: PathBuf,
     bag: Bag,
     gap_ns: u64,
     site: Site,
     prior: Vec<Stamped<World, Camera>>,
-    /// The prior's covariances, one a pose, or one for all.
+    /// The prior's covariances: one for each pose, or one for all.
     covariances: Vec<Covariance6<World, Camera>>,
     truth: Vec<Stamped<World, Camera>>,
     warnings: Vec<Fault>,
 }
 
-/// What is wrong with the recording at `path` by itself, its warnings, and what it holds in a line: rig and images by the names
-/// of its topics, every image decoded.
+/// The faults, the warnings and a one-line summary of the recording at `path`. Rig and images are found by the names of
+/// their topics, and every image is decoded.
 pub fn check_recording(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>, String) {
     let settings = Mcap { max_pixels: limits.pixels, max_bytes: limits.bytes, ..Mcap::default() };
     match Bag::open(path, &settings) {
@@ -37,7 +37,7 @@ pub fn check_recording(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fau
 }
 
 impl Recorded {
-    /// Reads `path` and the file of its site through.
+    /// Opens the recording at `path` and its site file.
     pub(super) fn open(path: &Path, settings: &Mcap, folder: &Path) -> Result<Self, Vec<Fault>> {
         let one = |fault| vec![fault];
         let file = folder.join(&settings.site);
@@ -62,7 +62,7 @@ impl Recorded {
             if !given.is_empty() && without > 0 {
                 let fault = Fault::new(format!("stereo pairs without a {name}"), path);
                 let value = format!("{without} of {}, {given}", bag.pairs.len());
-                warnings.push(fault.value(value).remedy("poses farther apart than `max-gap` say nothing between them"));
+                warnings.push(fault.value(value).remedy("poses farther apart than `max-gap` are not interpolated"));
             }
         }
         warnings.extend(site.warnings.clone());

@@ -1,28 +1,28 @@
-//! What the navigation sensors told between one frame and the next.
+//! Navigation sensor readings between frames.
 
 use seafix_navigation::{Device, Reading};
 
-/// Readings in the order of their arrival.
+/// A buffer of readings in the order of their arrival.
 #[derive(Debug, Clone, Default)]
 pub struct SensorBuffer {
-    /// When each is there to be used (ns), and the reading.
+    /// The time of arrival (ns) and the reading.
     arrived: Vec<(u64, Reading)>,
 }
 
 impl SensorBuffer {
-    /// Readings with their arrivals, in any order.
+    /// A buffer of readings with their arrivals, in any order.
     pub fn new(mut arrived: Vec<(u64, Reading)>) -> Self {
-        // What arrives together stays in the order of what it measures.
+        // Readings that arrive together stay in the order of measurement.
         arrived.sort_by_key(|(arrival_ns, reading)| (*arrival_ns, reading.stamp_ns));
         Self { arrived }
     }
 
-    /// Whether every device says anything.
+    /// Whether every device has a reading.
     pub fn is_complete(&self) -> bool {
         Device::ALL.iter().all(|device| self.arrived.iter().any(|(_, reading)| reading.device == *device))
     }
 
-    /// What was told up to the frame `now`, of the frame `before` not yet.
+    /// The readings that arrive after the frame `before`, up to and including the frame `now`.
     pub fn between(&self, before: Option<u64>, now: u64) -> Vec<Reading> {
         let until = |stamp: u64| self.arrived.partition_point(|(arrival_ns, _)| *arrival_ns <= stamp);
         let reported = &self.arrived[before.map_or(0, until)..until(now)];

@@ -1,4 +1,4 @@
-//! Which topics of a recording are the two cameras'.
+//! The image and calibration topics of a recording.
 
 use std::path::Path;
 
@@ -20,12 +20,12 @@ const INFOS: [&str; 1] = ["sensor_msgs/CameraInfo"];
 const ODOMETRY: [&str; 1] = ["nav_msgs/Odometry"];
 const TRANSFORMS: [&str; 1] = ["tf2_msgs/TFMessage"];
 
-/// What names of topics call the cameras.
+/// The words for the two cameras in topic names.
 const SIDES: [[&str; 2]; 5] =
     [["left", "right"], ["cam0", "cam1"], ["camera0", "camera1"], ["infra1", "infra2"], ["port", "starboard"]];
 
 impl Topics {
-    /// The topics that the settings name, or that name themselves; their schemas are those that are decoded.
+    /// The topics that the settings name, otherwise those recognised by name. Their schemas are supported.
     pub(super) fn of(path: &Path, recording: &Recording, settings: &Mcap) -> Result<Self, Fault> {
         let find = Finder { path, topics: recording.topics() };
         let images = match [settings.left.as_str(), settings.right.as_str()] {
@@ -51,7 +51,7 @@ impl Topics {
     }
 }
 
-/// Where the calibration of an image's camera is by the custom of ROS: beside the image.
+/// The topic of an image's calibration: by ROS convention beside the image.
 fn beside(image: &str) -> String {
     let image = image.strip_suffix("/compressed").unwrap_or(image);
     let folder = image.rsplit_once('/').map_or("", |(folder, _)| folder);
@@ -64,7 +64,7 @@ struct Finder<'a> {
 }
 
 impl<'a> Finder<'a> {
-    /// The topic of this name, one of these types.
+    /// The topic of this name with one of these types.
     fn called(&self, name: &str, key: &str, types: &[&str]) -> Result<&'a Topic, Fault> {
         let fitting = || self.topics.iter().filter(|topic| types.contains(&ros::plain(&topic.schema).as_str()));
         let Some(topic) = self.topics.iter().find(|topic| topic.name == name) else {
@@ -79,21 +79,22 @@ impl<'a> Finder<'a> {
         let kind = ros::plain(&topic.schema);
         let fault = |what: String| Fault::new(what, self.path).value(&topic.name);
         if !types.contains(&kind.as_str()) {
-            return Err(fault(format!("a topic of type `{kind}`")).remedy(format!("{} is read", types.join(" or "))));
+            return Err(fault(format!("a topic of type `{kind}`"))
+                .remedy(format!("give a topic of type {}", types.join(" or "))));
         }
         if topic.encoding != "cdr" || !["ros2msg", "ros2idl"].contains(&topic.schema_encoding.as_str()) {
             return Err(fault(format!("messages in `{}`, described in `{}`", topic.encoding, topic.schema_encoding))
                 .remedy(
-                    "`cdr` is read, described in `ros2msg` or `ros2idl`; ROS 1: convert the bag with rosbags-convert",
+                    "only `cdr` with `ros2msg` or `ros2idl` is supported; convert a ROS 1 bag with rosbags-convert",
                 ));
         }
         match ros::differs(&topic.schema, &topic.schema_encoding, &String::from_utf8_lossy(&topic.definition)) {
-            Some(what) => Err(fault(what).remedy("this version reads the definitions of ROS 2")),
+            Some(what) => Err(fault(what).remedy("give a bag with ROS 2 message definitions")),
             None => Ok(topic),
         }
     }
 
-    /// The two topics of images whose names say which camera they are.
+    /// The two image topics whose names identify left and right.
     fn by_name(&self) -> Result<[&'a Topic; 2], Fault> {
         let images: Vec<&Topic> =
             self.topics.iter().filter(|topic| IMAGES.contains(&ros::plain(&topic.schema).as_str())).collect();
@@ -104,7 +105,7 @@ impl<'a> Finder<'a> {
             }
         }
         let names: Vec<&str> = images.iter().map(|topic| topic.name.as_str()).collect();
-        let fault = Fault::new("it is not clear which images are the left and the right camera's", self.path);
+        let fault = Fault::new("ambiguous image topics of the left and the right camera", self.path);
         Err(fault.remedy(match names.is_empty() {
             true => "it has no topic of type sensor_msgs/Image or sensor_msgs/CompressedImage".to_owned(),
             false => format!("set `left` and `right`; there are {}", names.join(", ")),

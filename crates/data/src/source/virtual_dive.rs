@@ -1,4 +1,4 @@
-//! A planned dive as a passage: what both virtual sources share.
+//! A planned dive as a sequence, common to both virtual sources.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ impl Sequence for Virtual {
         self.dive.rig()
     }
 
-    /// The cameras look down: right in the image is starboard, its lower edge is aft.
+    /// The cameras look down: the right of the image is starboard, its lower edge is aft.
     fn body_from_camera(&self) -> Transform<Body, Camera> {
         let axes = Matrix3::from_columns(&[Vector3::y(), -Vector3::x(), Vector3::z()]);
         Transform::from_axes(&axes, Vector3::zeros())

@@ -1,4 +1,4 @@
-//! The virtual dive, rendered.
+//! The virtual dive as rendered stereo pairs.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Sequence, Source, virtual_dive::open};
 
-/// A seeded dive over the virtual production system, as rendered stereo pairs.
+/// A seeded dive over the virtual production system, rendered as stereo pairs.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct VirtualImages(pub Dive);

@@ -1,4 +1,4 @@
-//! Layouts of points before two cameras: the Monte Carlo of METHOD §3.
+//! Point layouts in front of two cameras: the Monte Carlo of METHOD §3.
 
 use std::path::Path;
 
@@ -12,36 +12,36 @@ use serde::{Deserialize, Serialize};
 
 use super::{FrameData, Hints, SensorFrame, Sequence, Source, Truth, WorldPrior};
 
-/// Many draws of many layouts, as clouds of noisy points: every layout is an object of one site, or several that share its
-/// points, a kilometre from the next, and frame k is draw k / `layouts` of layout k mod `layouts`.
+/// A Monte Carlo of point layouts, as clouds of noisy points. Every layout is one object of a site, or several objects
+/// that share its points; layouts are 1 km apart. Frame k is draw k / `layouts` of layout k mod `layouts`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct VirtualLayouts {
-    /// How the points lie: `spread` or `compact`.
+    /// The shape of the layouts: `spread` or `compact`.
     pub shape: Shape,
-    /// Points of a layout.
+    /// The number of points of a layout.
     pub points: usize,
-    /// How many layouts.
+    /// The number of layouts.
     pub layouts: usize,
-    /// How many draws, over all layouts.
+    /// The number of draws over all layouts.
     pub frames: usize,
-    /// Mean depth (m).
+    /// The mean depth (m), up to 100.
     pub distance: f64,
-    /// Standard deviation of each pixel coordinate, in each image (px).
+    /// The standard deviation of each pixel coordinate in each image (px).
     pub sigma_px: f64,
-    /// Standard deviation of each coordinate of a model point (m), drawn afresh each draw.
+    /// The standard deviation of each coordinate of a model point (m), drawn again for each draw.
     pub model_sigma: f64,
-    /// Share of the draws in which one point, any of them, is a wrong match: another one, uniform in its shell.
+    /// The fraction of draws with one wrong match: a random point is replaced by one uniform in its gate.
     pub wrong_match_rate: f64,
-    /// Half-size (m) of the shell in which a wrong match lies.
+    /// The half-size (m) of the gate in which a wrong match lies.
     pub gate: f64,
-    /// The cameras.
+    /// The stereo rig.
     pub rig: VirtualRig,
-    /// How many objects the points of a layout belong to, in turn.
+    /// The number of objects that share the points of a layout in turn.
     pub objects: usize,
-    /// Standard deviation of each surveyed world coordinate of the objects' base points (m), drawn once.
+    /// The standard deviation of each surveyed world coordinate of the objects' base points (m), drawn once.
     pub survey_sigma: f64,
-    /// Whether every point says which one it is, so that nothing is left to be identified.
+    /// Whether all points are labelled, so that no search runs.
     pub labelled: bool,
 }
 
@@ -66,9 +66,9 @@ impl Default for VirtualLayouts {
     }
 }
 
-/// The prior of every draw: position (m) and attitude (rad) a axis. It only tells the layouts' points apart.
+/// The prior of every draw: position (m) and attitude (rad) per axis. It serves to separate the layouts.
 const PRIOR: (f64, f64) = (0.05, 0.01);
-/// How far layouts lie from each other (m).
+/// The distance between neighbouring layouts (m).
 const APART: f64 = 1000.0;
 
 impl Component for VirtualLayouts {
@@ -80,14 +80,19 @@ impl Component for VirtualLayouts {
         in_range((3..=1000).contains(&self.points), "points", self.points, "3 to 1000")?;
         in_range((1..=1000).contains(&self.layouts), "layouts", self.layouts, "1 to 1000")?;
         in_range(self.frames >= 1, "frames", self.frames, "1 or more")?;
-        // Written so that a NaN is refused too.
+        // The comparison rejects NaN too.
         let far = self.distance > 0.0 && self.distance <= 100.0;
         in_range(far, "distance", self.distance, "a positive number of metres, at most 100")?;
         let noise = |value: f64, max: f64| value >= 0.0 && value <= max;
         in_range(noise(self.sigma_px, 100.0), "sigma-px", self.sigma_px, "0 to 100")?;
         in_range(noise(self.model_sigma, 1.0), "model-sigma", self.model_sigma, "0 to 1")?;
         in_range(noise(self.survey_sigma, 1.0), "survey-sigma", self.survey_sigma, "0 to 1")?;
-        in_range(noise(self.wrong_match_rate, 1.0), "wrong-match-rate", self.wrong_match_rate, "a share from 0 to 1")?;
+        in_range(
+            noise(self.wrong_match_rate, 1.0),
+            "wrong-match-rate",
+            self.wrong_match_rate,
+            "a fraction from 0 to 1",
+        )?;
         let gate = self.gate > 0.0 && self.gate <= 10.0;
         in_range(gate, "gate", self.gate, "a positive number of metres, at most 10")?;
         let enough = self.objects >= 1 && 3 * self.objects <= self.points;
@@ -117,7 +122,7 @@ impl Source for VirtualLayouts {
 }
 
 impl VirtualLayouts {
-    /// The Cramér–Rao bound of a layout that is one object.
+    /// The Cramér–Rao bound of a layout of one object.
     fn bound(&self, placed: &Placed) -> Option<Covariance6<Object, Camera>> {
         if self.objects > 1 {
             return None;
@@ -128,22 +133,22 @@ impl VirtualLayouts {
     }
 }
 
-/// Where a layout's own frame lies in the world.
+/// The pose of a layout in the world.
 fn world_from_layout(k: usize) -> Transform<World, Object> {
     Transform::new(UnitQuaternion::identity(), Vector3::new(APART * k as f64, 0.0, 0.0))
 }
 
 impl VirtualLayouts {
-    /// A part of the k-th layout as an object with a frame by the rule of Fig. 2 on its largest triangle, as the survey has
-    /// it, and where it truly stands.
+    /// Part `part` of layout k as an object by survey, and its true pose. Its frame follows the rule of Fig. 2 on its
+    /// largest triangle.
     fn object(&self, seed: u64, k: usize, part: usize, placed: &Placed) -> (SiteObject, Transform<World, Object>) {
         let points: Vec<Point<World>> =
             placed.model.iter().skip(part).step_by(self.objects).map(|&at| world_from_layout(k) * at).collect();
         let n = points.len();
         let square = |[a, b, c]: [usize; 3]| (points[b] - points[a]).cross(&(points[c] - points[a])).norm_squared();
         let all = (0..n).flat_map(|a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])));
-        let base = all.max_by(|a, b| square(*a).total_cmp(&square(*b))).expect("three points at least");
-        let stands = |base: &[Point<World>; 3]| triad(&base[0], &base[1], &base[2]).expect("a layout is no line");
+        let base = all.max_by(|a, b| square(*a).total_cmp(&square(*b))).expect("at least three points");
+        let stands = |base: &[Point<World>; 3]| triad(&base[0], &base[1], &base[2]).expect("a layout is not collinear");
         let truly = stands(&base.map(|i| points[i]));
         let mut stream = Stream::new(seed, k as u64, part as u64, Purpose::Survey);
         let base_in_world = base.map(|i| points[i] + stream.normal3(self.survey_sigma));
@@ -170,7 +175,7 @@ struct Layouts {
     name: String,
     site: Site,
     placed: Vec<Placed>,
-    /// Where each object truly stands.
+    /// The true pose of each object.
     stand: Vec<Transform<World, Object>>,
     bounds: Vec<Option<Covariance6<Object, Camera>>>,
 }
@@ -181,13 +186,13 @@ impl Layouts {
         (index % self.placed.len(), (index / self.placed.len()) as u64)
     }
 
-    /// The object and the place in it of a layout's point.
+    /// The label of a layout's point: object and point index.
     fn name_of(&self, layout: usize, point: usize) -> (usize, usize) {
         let objects = self.settings.objects;
         (layout * objects + point % objects, point / objects)
     }
 
-    /// The wrong match of a draw that has one: which point, and what was taken for it.
+    /// The wrong match of a draw, if it has one: the index of the point and its replacement.
     fn mismatch(&self, layout: usize, draw: u64) -> Option<(usize, MeasuredPoint)> {
         let mut stream = Stream::new(self.seed, layout as u64, draw, Purpose::Mismatches);
         (stream.unit() < self.settings.wrong_match_rate).then(|| {
@@ -248,7 +253,7 @@ impl Sequence for Layouts {
             world_from_camera: self.world_from_camera(layout).perturbed(&xi),
             covariance: Covariance6::isotropic(attitude, position),
         };
-        // A draw that noise leaves untriangulable is a frame without points, and counts as one.
+        // A draw that noise makes impossible to triangulate counts as a frame without points.
         let mut cloud = self.placed[layout].draw(draw).unwrap_or_default();
         if let Some((wrong, other)) = self.mismatch(layout, draw)
             && !cloud.is_empty()
@@ -317,12 +322,13 @@ mod tests {
             assert!(wrong.len() <= 1 && wrong.iter().all(|off| **off < 0.4), "{wrong:?}");
             draws += wrong.len();
         }
-        // 200 are expected, ± 13.4.
+        // The expected number is 200 ± 13.4.
         assert!((150..250).contains(&draws), "{draws}");
     }
 
-    /// Layouts stand in a row, and a camera may look along it: what is a kilometre away and has no point in the cloud is
-    /// not attempted. When every target in the view of the prior was, 40 frames had 124 refusals besides their 40 fixes.
+    /// Layouts stand in a row, and a camera may look along it. A layout 1 km away without points in the cloud is not
+    /// attempted. When every target in the view of the prior was attempted, 40 frames had 124 rejections besides their
+    /// 40 fixes.
     #[test]
     fn of_all_layouts_that_is_attempted_whose_points_are_there() {
         let settings = VirtualLayouts { layouts: 20, frames: 20, ..VirtualLayouts::default() };

@@ -1,4 +1,4 @@
-//! The virtual dive as points.
+//! The virtual dive as clouds of points.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Sequence, Source, virtual_dive::open};
 
-/// The same dive as `virtual-images`, as clouds of noisy points: no image is made, none is looked at.
+/// The dive of `virtual-images` as clouds of noisy points, without rendering or processing of images.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct VirtualPoints(pub Dive);

@@ -1,5 +1,5 @@
-//! EuRoC lines: `nanoseconds, px, py, pz, qw, qx, qy, qz`, further columns left unread. Where a header names the columns of
-//! the quaternion, its order holds.
+//! EuRoC lines: `nanoseconds, px, py, pz, qw, qx, qy, qz`; further columns are ignored. A header that names the columns
+//! of the quaternion decides their order.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ fn order(header: &str) -> Option<[usize; 4]> {
     let names: Vec<String> = names.map(str::to_ascii_lowercase).collect();
     let column = |axis: char| names.iter().position(|name| name.starts_with('q') && name.ends_with(axis));
     let found = [column('w')?, column('x')?, column('y')?, column('z')?];
-    // They are where they are sought, in whatever order.
+    // The header may name the columns in any order.
     found.iter().all(|column| (4..8).contains(column)).then_some(found)
 }
 
@@ -29,10 +29,9 @@ pub(super) fn parse(lines: &[(usize, &str)], file: &Path) -> Result<Trajectory, 
             let remedy = "an EuRoC line begins `nanoseconds, px, py, pz, qw, qx, qy, qz`";
             return Err(fault(&format!("{} columns", words.len()), text, remedy));
         }
-        let stamp: u64 =
-            words[0].parse().map_err(|_| fault("a stamp that is no time", words[0], "give whole nanoseconds"))?;
+        let stamp: u64 = words[0].parse().map_err(|_| fault("an invalid stamp", words[0], "give whole nanoseconds"))?;
         if stamps.last().is_some_and(|&last| last >= stamp) {
-            return Err(fault("a stamp that is not after the one before", words[0], "sort the lines by time"));
+            return Err(fault("a stamp not later than the previous one", words[0], "sort the lines by time"));
         }
         let mut numbers = [0.0; 7];
         for (number_, word) in numbers.iter_mut().zip(&words[1..]) {

@@ -7,7 +7,7 @@ use seafix_component::Fault;
 
 use super::{Pose, Trajectory, holds_numbers, number};
 
-/// Files of the benchmark hold seven digits: their rotations are orthonormal to about 1e-6.
+/// The benchmark's files have seven digits: their rotations are orthonormal to about 1e-6.
 const ORTHONORMAL: f64 = 1e-3;
 
 pub(super) fn parse(lines: &[(usize, &str)], file: &Path) -> Result<Trajectory, Fault> {
@@ -26,7 +26,7 @@ pub(super) fn parse(lines: &[(usize, &str)], file: &Path) -> Result<Trajectory, 
         let off = (rotation.transpose() * rotation - Matrix3::identity()).amax();
         if !(off <= ORTHONORMAL && rotation.determinant() > 0.0) {
             let value = format!("off by {off:.3e}, determinant {:.6}", rotation.determinant());
-            let fault = Fault::new("a matrix whose left part is no rotation", file).on_line(line).value(value);
+            let fault = Fault::new("a matrix whose left part is not a rotation", file).on_line(line).value(value);
             return Err(fault.remedy("a KITTI line is the upper three rows of a 4×4 matrix"));
         }
         poses.push(Pose { rotation, position: [m[3], m[7], m[11]].into() });

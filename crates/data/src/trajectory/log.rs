@@ -1,4 +1,4 @@
-//! The ways that a trial's log holds.
+//! Trajectories in a trial's log.
 
 use std::path::Path;
 
@@ -10,23 +10,24 @@ use seafix_log::{FrameRecord, Matrix4, Reader, TrialHeader};
 use super::Trajectory;
 use seafix::UNKNOWN_MOTION;
 
-/// One of the ways of the left camera.
+/// The kind of a logged trajectory of the left camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LoggedTrajectory {
-    /// As it really went, in the world.
+    /// The ground truth in the world.
     True,
-    /// By odometry alone, from the first pair on; where the way was lost it is broken, and goes on where it ended.
+    /// The odometry alone, from the first pair on. It has a break where the motion is unknown, and resumes at the pose
+    /// before.
     Odometry,
-    /// By the navigated pose and the survey of the object it is relative to, in the world. It has no breaks: where odometry was
-    /// lost there is no pose until the next fix, which tells where that is.
+    /// The navigated pose in the world, by the survey of its object. It has no breaks: after a gap of the odometry
+    /// there is no pose until the next fix.
     Navigated,
 }
 
 impl Trajectory {
-    /// A way from a trial's log: the frames that have it.
+    /// Reads a trajectory from a trial's log: the frames that have a pose of this kind.
     ///
     /// # Errors
-    /// A log that cannot be read, or one without such a way.
+    /// A log that cannot be read or has no such trajectory.
     pub fn of_log(file: &Path, which: LoggedTrajectory) -> Result<Self, Fault> {
         let unreadable = |error: seafix_log::LogError| Fault::new(error.to_string(), file);
         let reader = Reader::open(file).map_err(unreadable)?.without_images();
@@ -64,17 +65,17 @@ impl Trajectory {
     }
 }
 
-/// How the odometry reached a frame.
+/// The motion of the odometry to a frame.
 enum Step {
-    /// It begins with it.
+    /// The first frame.
     Begin,
-    /// By this motion from the frame that it reached before.
+    /// A known motion from the last accepted frame.
     Go(Pose),
-    /// By a motion that nobody knows; it goes on from here.
+    /// An unknown motion: the trajectory resumes at this frame.
     Broken,
 }
 
-/// How the odometry reached a frame; none where it left the frame out.
+/// The motion of the odometry to a frame; `None` for a skipped frame.
 fn step(frame: &FrameRecord) -> Option<Step> {
     let odometry = &frame.navigation.as_ref()?.odometry;
     match &odometry.motion {
@@ -95,7 +96,7 @@ fn pose(rows: &Matrix4) -> Pose {
     Pose { rotation: Matrix3::from_fn(|r, c| rows[r][c]), position: Vector3::new(rows[0][3], rows[1][3], rows[2][3]) }
 }
 
-/// `a_from_c`, of `a_from_b` and `b_from_c`.
+/// The composition `a_from_c` of `a_from_b` and `b_from_c`.
 fn after(first: &Pose, then: &Pose) -> Pose {
     Pose { rotation: first.rotation * then.rotation, position: first.rotation * then.position + first.position }
 }

@@ -1,4 +1,4 @@
-//! Trajectory files: TUM, KITTI and EuRoC, told apart by what they contain; and the ways in logs.
+//! Trajectories in TUM, KITTI and EuRoC files, recognised by content, and in logs.
 
 mod euroc;
 mod kitti;
@@ -15,19 +15,19 @@ use crate::dataset::tum::nanoseconds;
 
 pub use log::LoggedTrajectory;
 
-/// The poses of a body along its way, as a file holds them.
+/// A trajectory: the poses of a body in the order of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// The instant of each pose (ns), strictly increasing; `None` in a KITTI file, which has none.
+    /// The stamp of each pose (ns), strictly increasing; `None` for a KITTI file.
     pub stamps: Option<Vec<u64>>,
-    /// The poses: reference from body.
+    /// The poses, `reference_from_body`.
     pub poses: Vec<Pose>,
-    /// Where the way is broken, as places among the poses: the motion from the pose before to this one is unknown, as a line
-    /// `# broken: …` before it says.
+    /// The indices of the poses before which the trajectory is broken. The motion to such a pose is unknown; a line `#
+    /// broken: …` marks it in the file.
     pub breaks: Vec<usize>,
 }
 
-/// How a trajectory is written.
+/// The format of a trajectory file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// `seconds tx ty tz qx qy qz qw`, separated by blanks.
@@ -39,7 +39,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that a file's name asks for: `.csv` EuRoC, `.kitti` KITTI, any other TUM.
+    /// The format by file name: `.csv` EuRoC, `.kitti` KITTI, any other TUM.
     pub fn of_name(file: &Path) -> Self {
         match file.extension().and_then(|ending| ending.to_str()) {
             Some("csv") => Self::Euroc,
@@ -48,7 +48,7 @@ impl Format {
         }
     }
 
-    /// The format of a text, by the separator and the number of columns of its first line with numbers.
+    /// The format of a text, by the separator and the number of columns of its first data line.
     fn of_text(text: &str) -> Option<Self> {
         let line = lines(text).next()?.1;
         let full = |stamp: &str| stamp.trim().parse::<u64>().is_ok();
@@ -64,24 +64,25 @@ impl Trajectory {
     /// Reads a trajectory file of any format.
     ///
     /// # Errors
-    /// The first line that is wrong, or that there is none.
+    /// The first invalid line, or a file without poses.
     pub fn read(file: &Path) -> Result<Self, Fault> {
         Self::parse(&read_text(file)?, file)
     }
 
-    /// The same of a file whose lines are out of order: they are sorted by time, and of each stamp the first is kept.
+    /// Reads a trajectory file whose lines are out of order: they are sorted by time, and the first of each stamp is
+    /// kept.
     ///
     /// # Errors
-    /// As [`read`](Self::read), but for the order.
+    /// As for [`read`](Self::read), except for the order.
     pub fn read_repaired(file: &Path) -> Result<Self, Fault> {
         let text = read_text(file)?;
         Self::of_lines(&sorted(&text), &text, file)
     }
 
-    /// The trajectory of a text; `file` is named in faults.
+    /// Reads the trajectory in a text; `file` is named in faults.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// As for [`read`](Self::read).
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
         Self::of_lines(&all_lines(text).collect::<Vec<_>>(), text, file)
     }
@@ -98,7 +99,7 @@ impl Trajectory {
         Ok(Self { breaks: breaks(lines), ..read? })
     }
 
-    /// The text of this trajectory in a format; poses without stamps are numbered by whole seconds.
+    /// The text of this trajectory in a format. Poses without stamps receive their index as seconds.
     pub fn print(&self, format: Format) -> String {
         match format {
             Format::Tum => tum::print(self),
@@ -112,10 +113,10 @@ impl Trajectory {
     }
 }
 
-/// How a line begins that says that the motion to the next pose is unknown.
+/// The beginning of a comment line that marks the motion to the next pose as unknown.
 const BROKEN: &str = "# broken";
 
-/// The lines, and their numbers from 1.
+/// The lines with their numbers, from 1.
 fn all_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
 }
@@ -124,16 +125,16 @@ fn holds_numbers(line: &str) -> bool {
     !line.is_empty() && !line.starts_with('#')
 }
 
-/// The lines with numbers, and their numbers from 1.
+/// The data lines with their numbers, from 1.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     all_lines(text).filter(|(_, line)| holds_numbers(line))
 }
 
-/// Some lines of a text with their numbers.
+/// Numbered lines of a text.
 type Lines<'a> = Vec<(usize, &'a str)>;
 
-/// The lines by the time of their stamps, of each stamp the first; comments stay before the line that they stood before.
-/// What has no stamp stays where it is: it is for the reader to refuse.
+/// The lines sorted by stamp, with the first of each stamp kept. Comments stay before their line. Lines without a stamp
+/// keep their place and are rejected by the reader.
 fn sorted(text: &str) -> Lines<'_> {
     let mut groups: Vec<(Option<u64>, Lines<'_>)> = Vec::new();
     let mut group = Vec::new();
@@ -152,7 +153,7 @@ fn sorted(text: &str) -> Lines<'_> {
     groups.into_iter().flat_map(|(_, lines)| lines).collect()
 }
 
-/// Before which poses the way is broken.
+/// The indices of the poses before which the trajectory is broken.
 fn breaks(lines: &[(usize, &str)]) -> Vec<usize> {
     let (mut breaks, mut poses, mut broken) = (Vec::new(), 0, false);
     for (_, line) in lines {
@@ -167,7 +168,7 @@ fn breaks(lines: &[(usize, &str)]) -> Vec<usize> {
     breaks
 }
 
-/// A number of a line, or the fault.
+/// The number in a word, or a fault.
 fn number(word: &str, file: &Path, line: usize) -> Result<f64, Fault> {
     word.trim()
         .parse()
@@ -176,7 +177,8 @@ fn number(word: &str, file: &Path, line: usize) -> Result<f64, Fault> {
         .ok_or_else(|| Fault::new("not a finite number", file).on_line(line).value(word).remedy("give a number"))
 }
 
-/// The pose with this position and attitude (w, x, y, z), or by how much the quaternion is off.
+/// The pose with this position and attitude (w, x, y, z). An error is the norm of a quaternion that is not of unit
+/// length.
 fn pose(position: [f64; 3], [w, x, y, z]: [f64; 4]) -> Result<Pose, f64> {
     let quaternion = Quaternion::new(w, x, y, z);
     if (quaternion.norm() - 1.0).abs() > 1e-3 {
@@ -186,7 +188,7 @@ fn pose(position: [f64; 3], [w, x, y, z]: [f64; 4]) -> Result<Pose, f64> {
     Ok(Pose { rotation, position: Vector3::from(position) })
 }
 
-/// The quaternion (w, x, y, z) of a pose, w not negative.
+/// The quaternion (w, x, y, z) of a pose with w ≥ 0.
 fn quaternion(pose: &Pose) -> [f64; 4] {
     let mut rotation = Rotation3::from_matrix_unchecked(pose.rotation);
     rotation.renormalize();
@@ -227,7 +229,8 @@ mod tests {
         assert_eq!(Format::of_text("# nothing\n\n"), None);
     }
 
-    /// Seen to fail when comments are passed over, and when a line that has no order is refused although it may be repaired.
+    /// Seen to fail when comments are skipped, and when a line that cannot be sorted is rejected although it can be
+    /// repaired.
     #[test]
     fn breaks_are_read_and_lines_sorted() {
         let text =
@@ -262,7 +265,7 @@ mod tests {
         let wxyz = read(&(header("q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []") + line)).unwrap().poses[0];
         let tum = read("1000 1 2 3 0.1 -0.2 0.3 0.9273618495495704\n").unwrap().poses[0];
         assert!((xyzw.rotation - tum.rotation).amax() < 1e-15);
-        assert!((xyzw.rotation - wxyz.rotation).amax() > 0.1, "the header says which is w");
+        assert!((xyzw.rotation - wxyz.rotation).amax() > 0.1, "the header names the order of w");
         let wxyz = "# timestamp tx ty tz qw qx qy qz\n1 0 0 0 1 0 0 0\n";
         assert!(read(wxyz).unwrap_err().starts_with("quaternions with w first in walk:1"), "{wxyz}");
     }

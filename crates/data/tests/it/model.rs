@@ -1,4 +1,4 @@
-//! Models by hand, beside the true ones: marks are the true projections, off by as much as a hand.
+//! Models from marks against the true models: marks are true projections with an operator's error.
 
 use std::path::Path;
 
@@ -16,8 +16,8 @@ fn sample() -> Box<dyn Sequence> {
     source.open(0, &folder).unwrap()
 }
 
-/// The object of which a frame shows most, and marks on its points, each `off` px from where it is, in all directions; the
-/// right ones only if `both`.
+/// The object with the most visible points in a frame, and marks of its points. Each mark is `off` px from the true
+/// position, in all directions; right marks only if `both`.
 fn marks(sequence: &dyn Sequence, frame: usize, off: f64, both: bool) -> (usize, String) {
     let truth = sequence.truth(frame).unwrap();
     let visible = truth.visible.unwrap();
@@ -48,9 +48,8 @@ fn model(sequence: &dyn Sequence, frame: usize, text: &str, base: Option<[String
     found.map_err(|fault| fault.to_string())
 }
 
-/// Distances between points whose corners were found are those of the true model, to some millimetres at 3 m, whether the
-/// right place is marked or sought, though marks are off by 1.5 px: 20 mm at that depth. And they err by no more than
-/// their covariances say.
+/// Distances between corners agree with the true model to a few millimetres at 3 m. Marks are off by 1.5 px (20 mm at
+/// that depth), and right positions are marked or matched. The errors agree with their covariances.
 #[test]
 fn marks_a_pixel_off_make_a_model_to_millimetres() {
     let sequence = sample();
@@ -93,12 +92,12 @@ fn the_frame_is_that_of_the_base() {
     for point in &found.points {
         assert!((found.object_from_camera * point.measured.position.at).distance(&point.at) < 1e-6);
     }
-    // It is a site as any other.
+    // The model is a valid site.
     seafix_referencing::Site::parse(&found.site.to_toml(), Path::new("site.toml")).unwrap();
 }
 
-/// A right mark that is wrong along the epipolar line is a point like any other but for what the images show: 25 px are metres.
-/// Seen to fail where the two are not compared.
+/// A right mark with an error along the epipolar line triangulates like any other; only the images reveal it: 25 px are
+/// metres. Seen to fail without the comparison of the two.
 #[test]
 fn a_right_mark_that_the_images_contradict_is_reported() {
     let sequence = sample();
@@ -110,13 +109,13 @@ fn a_right_mark_that_the_images_contradict_is_reported() {
         let lines: Vec<&str> = text.lines().collect();
         for (k, line) in lines.iter().enumerate().skip(1) {
             let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-            // In a rectified pair the epipolar line is the row.
+            // The epipolar line of a rectified pair is the row.
             cells[3] = (cells[3].parse::<f64>().unwrap() - 25.0).to_string();
             let Ok(found) = model(&*sequence, frame, &text.replace(line, &cells.join(",")), None) else { continue };
             let reported: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
             let place = format!("clicks.csv:{}: `{}`", k + 1, cells[0]);
             assert!(
-                reported.len() == 1 && reported[0].contains(&place) && reported[0].contains("px from where"),
+                reported.len() == 1 && reported[0].contains(&place) && reported[0].contains("px from the best match"),
                 "{reported:?}"
             );
         }
@@ -132,13 +131,13 @@ fn marks_that_mean_no_point_are_refused_with_their_line() {
     };
     let lines: Vec<&str> = text.lines().collect();
     let split = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
-    // The right mark on another point.
+    // The right mark is on another point.
     let (mut third, other) = (split(lines[3]), split(lines[5]));
     third[3..].clone_from_slice(&other[3..]);
     let crossed = text.replace(lines[3], &third.join(","));
     let said = refusal(&crossed, None);
     assert!(said.contains("clicks.csv:4") && said.contains("px off the epipolar line"), "{said}");
-    // Two marks on one corner.
+    // Two marks are on one corner.
     let (mut fifth, third) = (split(lines[5]), split(lines[3]));
     fifth[1..].clone_from_slice(&third[1..]);
     let said = refusal(&text.replace(lines[5], &fifth.join(",")), None);

@@ -1,4 +1,4 @@
-//! Intervals without a model of the distribution: the bootstrap over blocks.
+//! Block bootstrap: confidence intervals without a model of the distribution.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,42 +9,44 @@ use rand_chacha::{
 
 use super::{median, quantile};
 
-/// From so many blocks on an interval gains nothing by more of them: its ends are sure to 4 % of its width.
+/// Maximum number of blocks; with this number the ends of an interval are accurate to 4 % of its width.
 const BLOCKS: usize = 400;
-/// From so many values on the median is found by halving, not by sorting every resample.
+/// Number of values above which the median is found by bisection instead of sorting every resample.
 const MANY: usize = 20_000;
-/// What was drawn last of more than [`MANY`]: a report asks for it again and again, from several threads.
+/// The last resamples of more than [`MANY`] values: a report requests them repeatedly, from several threads.
 static LAST: Mutex<Option<Arc<Resamples>>> = Mutex::new(None);
 
-/// The percentile bootstrap over blocks of consecutive values (Politis and Romano, A circular block-resampling
-/// procedure for stationary data, 1992).
+/// The circular block bootstrap with percentile intervals (Politis and Romano, 1992).
 ///
-/// Neighbouring frames of a trajectory are not independent: whole blocks of `block` of them are drawn with
-/// replacement, their begin uniform over all n places of a circle, until n values are together. `block` 1 is Efron's
-/// bootstrap of independent values. What is drawn are *places*: a paired statistic takes the same places out of
-/// both samples.
+/// Neighbouring frames of a trajectory are not independent. A resample consists of blocks of `block` consecutive
+/// values, drawn with replacement from uniform starts on a circle of n values, until it has n values. `block` 1 is
+/// Efron's bootstrap of independent values. A resample is a list of *indices*, so that a paired statistic uses the same
+/// indices in both samples.
+///
+/// Source: Politis and Romano, *A circular block-resampling procedure for stationary data*, 1992.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bootstrap {
-    /// How often the statistic is drawn.
+    /// Number of resamples.
     pub resamples: usize,
-    /// How many consecutive values stay together; at least one.
+    /// Length of a block, at least 1.
     pub block: usize,
-    /// Of the random numbers: the same seed gives the same interval on every machine.
+    /// Seed of the random numbers: the same seed gives the same interval on every machine.
     pub seed: u64,
 }
 
 impl Bootstrap {
-    /// Ten thousand resamples of n values, in blocks of ⌈n^⅓⌉ (the order that is optimal for a variance: Hall, Horowitz
-    /// and Jing, 1995), or of n / 400 where that is longer.
+    /// Ten thousand resamples of n values with a block length of max(⌈n^⅓⌉, n / 400).
+    ///
+    /// The order n^⅓ is optimal for a variance (Hall, Horowitz and Jing, 1995).
     pub fn of(n: usize, seed: u64) -> Self {
         let block = (1..=n.max(1)).find(|block| block * block * block >= n).unwrap_or(1).max(n.div_ceil(BLOCKS));
         Self { resamples: 10_000, block, seed }
     }
 
-    /// The interval that holds `statistic` of n values with this confidence, by its α/2 and 1 − α/2 quantiles over the
-    /// resamples, α = 1 − `confidence`; NaN where n is zero.
+    /// The confidence interval of `statistic` over n values: its α/2 and 1 − α/2 quantiles over the resamples.
     ///
-    /// `statistic` is given the places of one resample, n of 0..n.
+    /// α is 1 − `confidence`. The interval is NaN if n is zero. `statistic` receives the indices of one resample, n
+    /// numbers in 0..n.
     ///
     /// ```
     /// use seafix_evaluation::{Bootstrap, median};
@@ -72,10 +74,10 @@ impl Bootstrap {
         (quantile(&mut sampled, 0.5 * alpha), quantile(&mut sampled, 1.0 - 0.5 * alpha))
     }
 
-    /// The interval of the median of `values`.
+    /// The confidence interval of the median of `values`.
     ///
-    /// Of more than 20 000 it is found without sorting a resample: a resample's median is at most v where half of it is,
-    /// and how often that is so follows from sums of blocks; its ends are values then, not means of two neighbours.
+    /// Above 20 000 values no resample is sorted: the median of a resample is at most v if half of its values are, and
+    /// block sums count these. The ends are then values, not means of two neighbours.
     pub fn median(&self, values: &[f64], confidence: f64) -> (f64, f64) {
         if values.len() <= MANY {
             let mut sampled = Vec::with_capacity(values.len());
@@ -89,7 +91,7 @@ impl Bootstrap {
         sorted.sort_unstable_by(f64::total_cmp);
         let half = values.len().div_ceil(2);
         let sampled = self.draw(values.len());
-        // The least value that the median exceeds in no more than 1 − `fraction` of the resamples.
+        // The smallest value that the median exceeds in at most 1 − `fraction` of the resamples.
         let end = |fraction: f64| {
             let wanted = fraction * self.resamples.max(1) as f64;
             let (mut low, mut high) = (0, sorted.len() - 1);
@@ -108,7 +110,7 @@ impl Bootstrap {
         (end(0.5 * alpha), end(1.0 - 0.5 * alpha))
     }
 
-    /// The blocks of every resample of n values; n is not zero.
+    /// The blocks of every resample of n > 0 values.
     fn draw(&self, n: usize) -> Arc<Resamples> {
         if n <= MANY {
             return Arc::new(self.sampled(n));
@@ -117,7 +119,7 @@ impl Bootstrap {
         match &*last {
             Some(sampled) if sampled.of == (*self, n) => Arc::clone(sampled),
             _ => {
-                // Given back first: two of them at once are the most that a report holds of anything.
+                // The old resamples are dropped first: two sets at once would be the peak memory of a report.
                 *last = None;
                 Arc::clone(last.insert(Arc::new(self.sampled(n))))
             }
@@ -142,23 +144,23 @@ impl Bootstrap {
     }
 }
 
-/// The blocks of all resamples, by where they begin: sums over them go through the values in order, not to and fro.
+/// The blocks of all resamples, sorted by their start: sums then read the values in order.
 #[derive(Debug)]
 struct Resamples {
-    /// What was asked to draw, and of how many values.
+    /// The bootstrap and the number of values of this set.
     of: (Bootstrap, usize),
-    /// How long a block is here.
+    /// The block length.
     block: usize,
-    /// Begin and resample of every whole block, 32 bits each: no memory holds more values than those count.
+    /// Start and resample of every full block in 32 bits each; no memory holds more values than 32 bits count.
     begins: Vec<u64>,
-    /// Where each resample's last block begins, if it is a shorter one.
+    /// Start of each resample's last block, if it is shorter.
     rest: Vec<usize>,
 }
 
 impl Resamples {
-    /// How many events each resample has.
+    /// The number of events in each resample.
     fn sums(&self, events: impl Iterator<Item = bool>) -> Vec<usize> {
-        // Events before each place.
+        // The number of events before each index.
         let mut before = vec![0_u32];
         before.extend(events.scan(0, |sum, event| {
             *sum += u32::from(event);
@@ -180,7 +182,7 @@ impl Resamples {
     }
 }
 
-/// A place of 0..n, uniform up to n / 2⁶⁴: the upper half of a 128-bit product.
+/// A random index in 0..n, uniform up to n / 2⁶⁴: the upper half of a 128-bit product.
 fn place_below(n: usize, random: &mut ChaCha8Rng) -> usize {
     ((u128::from(random.next_u64()) * n as u128) >> 64) as usize
 }
@@ -205,13 +207,13 @@ mod tests {
         assert_eq!(Bootstrap::of(1_000_000, 1).block, 2500);
     }
 
-    /// Of many values the median's interval is found by halving, and is that of the resamples' medians.
+    /// For many values the interval by bisection equals that of the sorted resamples.
     #[test]
     fn the_median_of_many_is_that_of_the_resamples() {
         let n = MANY + 1;
         let values: Vec<f64> = (0..n).map(|i| (i.wrapping_mul(2_654_435_761) % 1009) as f64).collect();
         let bootstrap = Bootstrap { resamples: 39, block: 1000, seed: 2 };
-        // With 39 resamples both ends of 95 % are resamples.
+        // With 39 resamples both ends of the 95 % interval are resamples.
         let by_sorting =
             bootstrap.interval(n, 0.95, |at| median(&mut at.iter().map(|&i| values[i]).collect::<Vec<_>>()));
         let by_halving = bootstrap.median(&values, 0.95);

@@ -1,20 +1,20 @@
-//! Shares among trials that hang together.
+//! Confidence intervals of proportions over correlated trials.
 
 use super::rate::real_clopper_pearson;
 
-/// The confidence interval of the share of events among trials in a row of which neighbours are not independent; (NaN, NaN)
-/// where there are none.
+/// The confidence interval of the fraction of events in a series of correlated trials.
 ///
-/// [`clopper_pearson`](super::clopper_pearson)'s of the effective number of trials n/d (Korn and Graubard, Confidence intervals
-/// for proportions with small expected number of positive counts estimated from survey data, 1998). The design effect
-/// d = V_b / (b p (1 − p)) is how much more the sums of `block` consecutive events vary, over all places of a circle, than those
-/// of independent ones would. Of m runs of the rarer kind it is known to a share of √(2/m): it is taken so much greater, one at
-/// the least and the block's length at most. So where all are events, or none is, every block is one trial.
+/// It is the [`clopper_pearson`](super::clopper_pearson) interval of the effective number of trials n/d (Korn and
+/// Graubard, Confidence intervals for proportions with small expected number of positive counts estimated from survey
+/// data, 1998). The design effect d = V_b / (b p (1 − p)) is the ratio of variances: sums of `block` consecutive
+/// events, over all starts on a circle, against sums of independent events. With m runs of the rarer outcome its
+/// relative uncertainty is √(2/m), and d is increased by this fraction; it is at least 1 and at most the block length.
+/// If all trials are events, or none, every block counts as one trial. The interval is (NaN, NaN) without trials.
 ///
 /// ```
 /// use seafix_evaluation::{clopper_pearson, clustered};
 /// assert_eq!(clustered(&[true; 40], 4, 0.95), clopper_pearson(10, 10, 0.95));
-/// // Every second one: sums of blocks do not vary at all, yet the trials count as no more than they are.
+/// // Alternating events: block sums do not vary, but the effective number of trials never exceeds the actual one.
 /// let events: Vec<bool> = (0..400).map(|i| i % 2 == 0).collect();
 /// let (low, high) = clustered(&events, 4, 0.95);
 /// assert!((0.444..0.45).contains(&low) && (0.55..0.556).contains(&high));
@@ -30,14 +30,16 @@ pub fn clustered(events: &[bool], block: usize, confidence: f64) -> (f64, f64) {
     real_clopper_pearson(effective * k as f64 / n as f64, effective, confidence)
 }
 
-/// The interval of the share of `k` events in `n` trials in a row that are only counted: how they hang together is not known, and
-/// every `block` of them are one trial of [`clopper_pearson`](super::clopper_pearson). (0, 1) where there are none.
+/// The confidence interval of `k` events in `n` correlated trials of unknown order.
+///
+/// Every `block` trials count as one trial of [`clopper_pearson`](super::clopper_pearson). The interval is (0, 1)
+/// without trials.
 pub fn of_blocks(k: usize, n: usize, block: usize, confidence: f64) -> (f64, f64) {
     let block = block.clamp(1, n.max(1)) as f64;
     real_clopper_pearson(k as f64 / block, n as f64 / block, confidence)
 }
 
-/// Not less than 1, nor more than the block's length; `k` of the events are.
+/// The design effect, between 1 and the block length; `k` trials are events.
 fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
     let n = events.len();
     let (longest, fraction) = (block as f64, k as f64 / n as f64);
@@ -69,7 +71,7 @@ mod tests {
 
     #[test]
     fn few_events_state_little_and_no_fraction_that_was_seen_is_left_out() {
-        // Three of seven, each alone, in blocks of two: 1.8 times fewer than seven.
+        // Three separate events in seven trials, blocks of two: the effective number of trials is 1.8 times smaller.
         let (low, high) = clustered(&[true, false, true, false, true, false, false], 2, 0.95);
         assert!(low > 0.02 && low < 0.1 && high > 0.8 && high < 0.95, "{low} {high}");
         assert_eq!(clustered(&[false; 9], 3, 0.95), clopper_pearson(0, 3, 0.95));
@@ -77,9 +79,9 @@ mod tests {
         assert_eq!(clustered(&[true], 5, 0.95), clopper_pearson(1, 1, 0.95));
     }
 
-    /// Runs of ten equal events in a row count as one each, whichever share they have; the interval holds it as often as it says.
+    /// Runs of ten equal events count as one trial each; the interval has its nominal coverage.
     ///
-    /// Seen to fail when the design effect is taken as one.
+    /// The test fails with a design effect of one.
     #[test]
     fn events_that_come_in_runs_are_no_surer_than_their_runs() {
         let mut random = ChaCha8Rng::seed_from_u64(1);

@@ -1,10 +1,12 @@
-//! Many tests at once.
+//! Correction for multiple tests.
 
-/// p-values adjusted for the size of their family (Holm, A simple sequentially rejective multiple test procedure,
-/// 1979), in the order of `p`.
+/// Holm's adjustment of p-values for the size of their family.
 ///
-/// With p₍₁₎ ≤ … ≤ p₍ₘ₎ the adjusted p₍ᵢ₎ is max over j ≤ i of min(1, (m − j + 1) p₍ⱼ₎): below α, with a chance of at most
-/// α of any false claim in the whole family.
+/// The adjusted values are in the order of `p`. With p₍₁₎ ≤ … ≤ p₍ₘ₎ the adjusted p₍ᵢ₎ is the maximum over j ≤ i of
+/// min(1, (m − j + 1) p₍ⱼ₎). Claims with an adjusted value below α have a probability of at most α of any false claim
+/// in the family.
+///
+/// Source: Holm, *A simple sequentially rejective multiple test procedure*, 1979.
 ///
 /// ```
 /// assert_eq!(seafix_evaluation::holm(&[0.01, 0.04, 0.03]), [0.03, 0.06, 0.06]);

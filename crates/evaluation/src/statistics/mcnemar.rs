@@ -1,9 +1,11 @@
-//! Two rates over the same trials.
+//! Comparison of two success rates over the same trials.
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
-/// The exact two-sided p-value that two methods succeed equally often (McNemar, 1947), `first` being the trials where
-/// only the one succeeded and `second` those where only the other did: twice the smaller tail of a fair coin.
+/// The exact two-sided p-value of McNemar's test (1947): two methods succeed equally often.
+///
+/// `first` is the number of trials in which only the first method succeeded, `second` that of the second. The p-value
+/// is twice the smaller tail of a binomial distribution with probability 1/2.
 ///
 /// ```
 /// assert_eq!(seafix_evaluation::mcnemar(0, 0), 1.0);

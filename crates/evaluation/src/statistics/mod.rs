@@ -1,7 +1,7 @@
-//! Rates, quantiles, intervals and tests: what says how sure a number is, and whether two differ.
+//! Rates, quantiles, confidence intervals and significance tests.
 //!
-//! A failure has no error; where one is compared, it stands as infinity. Everything here but a mean is a function of
-//! ranks and keeps it so: no failure is averaged away.
+//! A failed trial has no error; in comparisons its error is infinite. All functions except means depend on ranks only,
+//! so that no failure is averaged away.
 
 mod bootstrap;
 mod clustered;

@@ -1,7 +1,8 @@
 //! Quantiles.
 
-/// The `p` quantile of `values` (linear between order statistics, Hyndman and Fan's type 7);
-/// sorts them in place; NaN without values.
+/// The `p` quantile of `values`, linear between order statistics (Hyndman and Fan's type 7).
+///
+/// It sorts the values in place; NaN without values.
 ///
 /// ```
 /// assert_eq!(seafix_evaluation::quantile(&mut [3.0, 1.0, 2.0], 0.5), 2.0);
@@ -15,15 +16,15 @@ pub fn quantile(values: &mut [f64], p: f64) -> f64 {
     let place = p.clamp(0.0, 1.0) * (values.len() - 1) as f64;
     let (below, fraction) = (place.floor() as usize, place.fract());
     match values.get(below + 1) {
-        // An infinite neighbour (a failure counted as infinity) must not turn an exact hit into NaN.
+        // An infinite neighbour (a failure) must not turn an exact order statistic into NaN.
         Some(above) if fraction > 0.0 => between(values[below], *above, fraction),
         _ => values[below],
     }
 }
 
-/// The median of `values`, without sorting them all; reorders them; NaN without values.
+/// The median of `values`, by selection instead of sorting; NaN without values.
 ///
-/// The same number as [`quantile`] at one half, where none of the middle two is infinite.
+/// It reorders the values. It equals [`quantile`] at 0.5 if neither of the middle two values is infinite.
 ///
 /// ```
 /// assert_eq!(seafix_evaluation::median(&mut [3.0, 1.0, 2.0, f64::INFINITY]), 2.5);
@@ -42,7 +43,7 @@ pub fn median(values: &mut [f64]) -> f64 {
     between(below, upper, 0.5)
 }
 
-/// Between a number and infinity stands infinity of that sign; between the two infinities nothing is known.
+/// Linear interpolation: infinite between a number and an infinity, NaN between opposite infinities.
 fn between(low: f64, high: f64, fraction: f64) -> f64 {
     if low == high || low == f64::NEG_INFINITY && high.is_finite() { low } else { low + fraction * (high - low) }
 }

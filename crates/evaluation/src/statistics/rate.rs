@@ -1,11 +1,11 @@
-//! Rates with their intervals.
+//! Confidence intervals of rates.
 
 use statrs::distribution::{Beta, ContinuousCDF};
 
 /// The exact confidence interval of a rate of `k` events in `n` trials (Clopper and Pearson, 1934).
 ///
-/// The bounds are quantiles of beta distributions: B(α/2; k, n−k+1) and B(1−α/2; k+1, n−k),
-/// α = 1 − `confidence`. Without trials nothing is known: (0, 1).
+/// The bounds are quantiles of beta distributions: B(α/2; k, n−k+1) and B(1−α/2; k+1, n−k), α = 1 − `confidence`. The
+/// interval is (0, 1) without trials.
 ///
 /// ```
 /// let (low, high) = seafix_evaluation::clopper_pearson(0, 299, 0.90);
@@ -16,7 +16,7 @@ pub fn clopper_pearson(k: usize, n: usize, confidence: f64) -> (f64, f64) {
     real_clopper_pearson(k as f64, n as f64, confidence)
 }
 
-/// The same of an effective number of trials, which need not be whole.
+/// The Clopper–Pearson interval of an effective, possibly fractional number of trials.
 pub(super) fn real_clopper_pearson(k: f64, n: f64, confidence: f64) -> (f64, f64) {
     let alpha = 1.0 - confidence;
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).expect("both shape parameters are positive").inverse_cdf(p);

@@ -1,9 +1,8 @@
-//! How much of the errors stays below a bound, in one number.
+//! Area under the recall curve.
 
-/// The area under the curve of recall up to `bound`, as a share of what it could be: 1/a·∫₀ᵃ P(e ≤ x) dx, which is the mean of
-/// max(0, 1 − e/a).
+/// The normalised area under the recall curve up to `bound`: 1/a·∫₀ᵃ P(e ≤ x) dx, the mean of max(0, 1 − e/a).
 ///
-/// A failure enters as infinity and adds nothing; NaN without errors.
+/// A failure has an infinite error and adds nothing; NaN without errors.
 ///
 /// ```
 /// let errors = [0.0, 0.01, 0.08, f64::INFINITY];

@@ -1,28 +1,30 @@
-//! Which of two methods errs less, over pairs of their errors.
+//! Comparison of two methods by paired errors.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Up to so many differences the distribution of the rank sum is counted out.
+/// Maximum number of differences for the exact distribution of the rank sum.
 const EXACT: usize = 60;
 
-/// What [`signed_rank`] finds.
+/// The result of [`signed_rank`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignedRank {
-    /// Pairs whose members differ; ties say nothing and are left out.
+    /// Number of pairs with different members; ties are excluded.
     pub differing: usize,
-    /// Two-sided p-value that differences are as often above zero as below, size for size.
+    /// Two-sided p-value of the hypothesis that the differences are symmetric about zero.
     pub p: f64,
-    /// Matched-pairs rank-biserial correlation (Kerby, 2014): (W₋ − W₊) / (W₋ + W₊), the rank sums of the differences
-    /// first − second. 1: the first is smaller in every pair; −1: the second is; 0: neither, or nothing differs.
+    /// Matched-pairs rank-biserial correlation (Kerby, 2014): (W₋ − W₊) / (W₋ + W₊), with the rank sums W of first −
+    /// second.
+    ///
+    /// 1: the first is smaller in every pair; −1: the second is; 0: neither, or all pairs are ties.
     pub effect: f64,
 }
 
 /// Wilcoxon's signed rank test (Individual comparisons by ranking methods, 1945) on pairs (first, second).
 ///
-/// A failure enters as infinity: against a number it is the largest difference of all, against another failure a tie. A pair
-/// with something that is no number says nothing, as a tie does.
-/// Equal differences share their mean rank. Exact up to 60 differences, ties included, by counting all signs; beyond,
-/// the normal approximation with the tie and continuity corrections.
+/// A failure has an infinite error: against a number it is the largest difference, against another failure a tie. Pairs
+/// with NaN are excluded, as ties are. Equal differences share their mean rank. The test is exact up to 60 differences,
+/// ties included, by enumeration of all signs; beyond that it uses the normal approximation with tie and continuity
+/// corrections.
 ///
 /// ```
 /// use seafix_evaluation::signed_rank;
@@ -34,7 +36,7 @@ pub fn signed_rank(pairs: &[(f64, f64)]) -> SignedRank {
         pairs.iter().filter(|(a, b)| a != b).map(|(a, b)| a - b).filter(|d| !d.is_nan()).collect();
     differences.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
     let n = differences.len();
-    // Ranks times two are whole numbers also where ties share a mean rank.
+    // Doubled ranks are integers even if ties share a mean rank.
     let mut doubled = vec![0_u64; n];
     let (mut begin, mut ties) = (0, 0.0);
     while begin < n {
@@ -57,7 +59,7 @@ pub fn signed_rank(pairs: &[(f64, f64)]) -> SignedRank {
     SignedRank { differing: n, p, effect: (below as f64 - above as f64) / all as f64 }
 }
 
-/// Twice the share of all 2ⁿ choices of signs whose doubled rank sum is at most `min`.
+/// Twice the fraction of all 2ⁿ sign combinations with a doubled rank sum of at most `min`.
 fn counted(doubled: &[u64], min: u64) -> f64 {
     let mut paths = vec![0.0; min as usize + 1];
     paths[0] = 1.0;
@@ -82,7 +84,7 @@ fn approximate(n: usize, ties: f64, min: u64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Seen to hang while such pairs counted.
+    /// The test hangs if pairs with NaN are counted.
     #[test]
     fn what_is_no_number_states_nothing() {
         let pairs = [(1.0, 2.0), (1.0, 3.0), (2.0, 5.0)];

@@ -1,22 +1,22 @@
-//! The motion that lays an estimate on its reference.
+//! Alignment of an estimated trajectory to its reference.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::Pose;
 
-/// A similarity of space: p ↦ `scale` · `rotation` · p + `translation`.
+/// A similarity transform: p ↦ `scale` · `rotation` · p + `translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alignment {
     /// The rotation.
     pub rotation: Matrix3<f64>,
     /// The translation (m).
     pub translation: Vector3<f64>,
-    /// The scale; 1 where none was asked for.
+    /// The scale; 1 for a rigid alignment.
     pub scale: f64,
 }
 
 impl Alignment {
-    /// The alignment that changes nothing.
+    /// The identity alignment.
     pub const IDENTITY: Self =
         Self { rotation: Pose::IDENTITY.rotation, translation: Pose::IDENTITY.position, scale: 1.0 };
 
@@ -27,14 +27,14 @@ impl Alignment {
         matrix.transpose().into()
     }
 
-    /// The pose moved: its position scaled, then both parts turned and shifted.
+    /// The aligned pose: its position is scaled, then both parts are rotated and translated.
     #[must_use]
     pub fn apply(&self, pose: &Pose) -> Pose {
         let motion = Pose { rotation: self.rotation, position: self.translation };
         motion.then(&Pose { position: pose.position * self.scale, ..*pose })
     }
 
-    /// The motion that lays one pose on another.
+    /// The alignment that maps the pose `estimate` to `reference`.
     pub fn onto(reference: &Pose, estimate: &Pose) -> Self {
         let back = estimate.rotation.transpose();
         let inverse = Pose { rotation: back, position: -(back * estimate.position) };
@@ -43,34 +43,36 @@ impl Alignment {
     }
 }
 
-/// Why no alignment is determined.
+/// The reason why an alignment is undetermined.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum UndeterminedAlignment {
     /// Too few poses.
-    #[error("{0} poses; an alignment takes 3")]
+    #[error("{0} poses; an alignment needs at least 3")]
     TooFew(usize),
-    /// The positions of one of the two are one point or one line.
+    /// Positions of one trajectory that coincide or lie on a line.
     #[error(
-        "the positions leave a rotation open: their second singular value is {second:.3e} m² beside {first:.3e} m² (one point, or one line)"
+        "the positions leave a rotation undetermined: their second singular value is {second:.3e} m², the first {first:.3e} m² (a point or a line)"
     )]
     OneLine {
         /// Largest singular value of the cross-covariance (m²).
         first: f64,
-        /// The second (m²).
+        /// Second singular value of the cross-covariance (m²).
         second: f64,
     },
 }
 
-/// The alignment that minimises Σ ‖reference − (s R estimate + t)‖² over the positions (Umeyama,
-/// 1991), s = 1 unless `with_scale`.
+/// Umeyama's alignment (1991): the minimum of Σ ‖reference − (s R estimate + t)‖² over the positions.
+///
+/// The scale s is 1 unless `with_scale` is set.
 ///
 /// # Errors
-/// [`UndeterminedAlignment`] with fewer than three poses, or positions on one line: the rotation about it is open.
+/// [`UndeterminedAlignment`] with fewer than three poses, or with positions on a line: the rotation about it is
+/// undetermined.
 ///
 /// # Panics
-/// When the two are not of one length.
+/// If the trajectories differ in length.
 pub fn align(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Result<Alignment, UndeterminedAlignment> {
-    assert_eq!(reference.len(), estimate.len(), "trajectories of one length");
+    assert_eq!(reference.len(), estimate.len(), "trajectories of equal length");
     let n = reference.len();
     if n < 3 {
         return Err(UndeterminedAlignment::TooFew(n));
@@ -87,7 +89,7 @@ pub fn align(reference: &[Pose], estimate: &[Pose], with_scale: bool) -> Result<
     let svd = covariance.svd(true, true);
     let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
     let [first, second, third] = svd.singular_values.into();
-    // Rounding leaves a line about eps of its length squared across.
+    // Rounding gives a line a second singular value of about ε times the squared length.
     if !(second > f64::EPSILON * first.max(1.0)) {
         return Err(UndeterminedAlignment::OneLine { first, second });
     }

@@ -1,10 +1,10 @@
-//! Which pose belongs to which.
+//! Association of poses by time.
 
-/// Pairs (reference, estimate) of poses of one instant: for each stamp of the shorter trajectory
-/// the nearest of the longer, the first where two are as near, if within `tolerance_ns`.
+/// Pairs (reference, estimate) of poses by nearest stamp.
 ///
-/// `offset_ns` is added to the estimate's stamps. Stamps are in order. As in evo, one pose of the
-/// longer trajectory may serve twice.
+/// Each stamp of the shorter trajectory is associated with the nearest one of the longer, the first of equally near
+/// ones, if it is within `tolerance_ns`. `offset_ns` is added to the estimate's stamps. Stamps must be in order. As in
+/// evo, one pose of the longer trajectory may occur twice.
 ///
 /// ```
 /// use seafix_evaluation::trajectory::associate;

@@ -1,32 +1,32 @@
-//! Drift of odometry, in per cent of the way.
+//! Drift of odometry relative to the path length (KITTI).
 
 use super::{Pose, path_lengths, relation::angle};
 
-/// What an estimate drifts over one stretch of the reference's path.
+/// The drift over one segment of the reference path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriftSegment {
-    /// The pose it starts from.
+    /// Index of the first pose.
     pub from: usize,
-    /// The pose it ends at.
+    /// Index of the last pose.
     pub to: usize,
-    /// The length wanted (m).
+    /// Nominal length (m).
     pub length: f64,
-    /// Error of the translation over `length`: a share, 0.01 is one per cent.
+    /// Translation error divided by `length`; 0.01 is one per cent.
     pub translation: f64,
-    /// Error of the rotation over `length` (rad/m).
+    /// Rotation error divided by `length` (rad/m).
     pub rotation: f64,
 }
 
-/// The drift over every stretch of the wanted `lengths` (m): from each pose to the first at least
-/// so far along the reference's path.
+/// The drift over all segments of the nominal `lengths` (m).
 ///
-/// As the KITTI benchmark measures it (Geiger et al., 2012), which starts at every tenth pose and
-/// takes 100 to 800 m: the error of a stretch is (estimate_i⁻¹ · estimate_j)⁻¹ · (reference_i⁻¹ · reference_j).
+/// A segment runs from each pose to the first pose at least this length further along the reference path. The error is
+/// (estimate_i⁻¹ · estimate_j)⁻¹ · (reference_i⁻¹ · reference_j), as in the KITTI benchmark (Geiger et al., 2012),
+/// which starts at every tenth pose and uses 100 to 800 m.
 ///
 /// # Panics
-/// When the two are not of one length.
+/// If the trajectories differ in length.
 pub fn drift(reference: &[Pose], estimate: &[Pose], lengths: &[f64]) -> Vec<DriftSegment> {
-    assert_eq!(reference.len(), estimate.len(), "trajectories of one length");
+    assert_eq!(reference.len(), estimate.len(), "trajectories of equal length");
     let path = path_lengths(reference);
     let segment = |from: usize, length: f64| {
         let to = from + path[from..].partition_point(|end| end - path[from] < length);
@@ -49,7 +49,7 @@ mod tests {
             (0..21).map(|i| Pose { position: [f64::from(i) * scale, 0.0, 0.0].into(), ..Pose::IDENTITY }).collect()
         };
         let segments = drift(&line(1.0), &line(1.01), &[5.0, 40.0]);
-        assert_eq!(segments.len(), 16, "starts with five metres ahead of them; forty are never reached");
+        assert_eq!(segments.len(), 16, "starts with five metres left; forty are never reached");
         assert!(segments.iter().all(|segment| (segment.translation - 0.01).abs() < 1e-12 && segment.rotation < 1e-12));
     }
 }

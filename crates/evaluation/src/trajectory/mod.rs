@@ -1,8 +1,7 @@
-//! Trajectories against a reference: absolute and relative pose error, drift over segments.
+//! Trajectory errors against a reference: absolute and relative pose error, drift over segments.
 //!
-//! The definitions are those of evo 1.38 (Grupp, 2017), which this field compares by: association by
-//! nearest stamp, alignment after Umeyama, [`ape`] and [`rpe`] per [`Relation`]. [`drift`] is the
-//! KITTI benchmark's (Geiger et al., 2012) with lengths of one's own.
+//! The definitions are those of evo 1.38 (Grupp, 2017): association by nearest stamp, Umeyama alignment, [`ape`] and
+//! [`rpe`] by [`Relation`]. [`drift`] is that of the KITTI benchmark (Geiger et al., 2012), with configurable lengths.
 //!
 //! ```
 //! use seafix_evaluation::trajectory::{Pose, Relation, Summary, ape};
@@ -29,10 +28,10 @@ pub use summary::Summary;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// A pose as its file gives it: reference from body.
+/// A pose as its file stores it: reference from body.
 ///
-/// The rotation stays a matrix: in a KITTI file it is orthonormal to six digits only, and a repair
-/// would change the errors that other programs print.
+/// The rotation remains a matrix: KITTI files have it orthonormal to six digits only, and a correction would change
+/// errors relative to other programs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// The axes of the body in the reference frame, as columns.
@@ -42,19 +41,19 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The body at the origin.
+    /// The identity pose.
     pub const IDENTITY: Self = Self {
         rotation: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
         position: Vector3::new(0.0, 0.0, 0.0),
     };
 
-    /// This pose and then `next`: `a_from_c = a_from_b · b_from_c`.
+    /// The composition with `next`: `a_from_c = a_from_b · b_from_c`.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         Self { rotation: self.rotation * next.rotation, position: self.rotation * next.position + self.position }
     }
 
-    /// `other` seen from this pose: `self⁻¹ · other`, the inverse of a rotation being its transpose.
+    /// The pose of `other` relative to this one: `self⁻¹ · other`, with the transpose as the inverse of a rotation.
     #[must_use]
     pub fn to(&self, other: &Self) -> Self {
         let back = self.rotation.transpose();
@@ -62,29 +61,30 @@ impl Pose {
     }
 }
 
-/// The absolute pose error of each pair: the [`Relation`]'s size of E = reference⁻¹ · estimate.
+/// The absolute pose error (APE) of each pair: the [`Relation`]'s measure of E = reference⁻¹ · estimate.
 ///
 /// # Panics
-/// When the two are not of one length: associate them first.
+/// If the trajectories differ in length; associate them first.
 pub fn ape(reference: &[Pose], estimate: &[Pose], relation: Relation) -> Vec<f64> {
-    assert_eq!(reference.len(), estimate.len(), "trajectories of one length");
+    assert_eq!(reference.len(), estimate.len(), "trajectories of equal length");
     reference.iter().zip(estimate).map(|(reference, estimate)| relation.absolute(reference, estimate)).collect()
 }
 
-/// The relative pose error of each of these pairs (i, j) of instants: the [`Relation`]'s size of
-/// E = (reference_i⁻¹ · reference_j)⁻¹ · (estimate_i⁻¹ · estimate_j).
+/// The relative pose error (RPE) of each pair (i, j) of instants.
+///
+/// It is the [`Relation`]'s measure of E = (reference_i⁻¹ · reference_j)⁻¹ · (estimate_i⁻¹ · estimate_j).
 ///
 /// # Panics
-/// When the two are not of one length, or a pair points beyond them.
+/// If the trajectories differ in length, or if an index exceeds it.
 pub fn rpe(reference: &[Pose], estimate: &[Pose], pairs: &[(usize, usize)], relation: Relation) -> Vec<f64> {
-    assert_eq!(reference.len(), estimate.len(), "trajectories of one length");
+    assert_eq!(reference.len(), estimate.len(), "trajectories of equal length");
     pairs
         .iter()
         .filter_map(|&(i, j)| relation.relative(&reference[i].to(&reference[j]), &estimate[i].to(&estimate[j])))
         .collect()
 }
 
-/// The length of the path up to each pose (m), from zero.
+/// The path length up to each pose (m), from zero.
 pub fn path_lengths(poses: &[Pose]) -> Vec<f64> {
     let mut length = 0.0;
     let steps = poses.windows(2).map(|step| (step[1].position - step[0].position).norm());

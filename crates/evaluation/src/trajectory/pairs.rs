@@ -1,22 +1,22 @@
-//! Over which intervals a relative error is taken.
+//! Selection of pose pairs for the relative error.
 
 use super::{Pose, path_lengths, relation::angle};
 
-/// How far apart the two poses of a relative error are.
+/// The distance between the two poses of a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Delta {
-    /// So many frames.
+    /// A number of frames.
     Frames(usize),
-    /// So many metres of path.
+    /// A path length (m).
     Metres(f64),
-    /// So many radians of rotation.
+    /// An angle of rotation (rad).
     Radians(f64),
 }
 
-/// The pairs (i, j), i < j, of poses that are `delta` apart.
+/// The pairs (i, j), i < j, of poses at the distance `delta`, selected as by evo.
 ///
-/// Consecutive pairs by default. With `all`, one from every pose on: then frames are met exactly,
-/// metres and radians within `tolerance` times the delta. As evo chooses them.
+/// Pairs are consecutive by default. With `all`, one pair starts at every pose; frames are then exact, and metres and
+/// radians within `tolerance` times the distance.
 pub fn pairs(poses: &[Pose], delta: Delta, all: bool, tolerance: f64) -> Vec<(usize, usize)> {
     match delta {
         Delta::Frames(step) => {
@@ -35,11 +35,11 @@ fn all_by_path(poses: &[Pose], length: f64, tolerance: f64) -> Vec<(usize, usize
     let off = |i: usize, j: usize| (path[j] - path[i] - length).abs();
     (0..poses.len())
         .filter_map(|i| {
-            // Path lengths never fall: the nearest end is one of the two about the wanted length.
+            // Path lengths never decrease: the nearest end is one of the two around the nominal length.
             let after = i + 1 + path[i + 1..].partition_point(|&end| end - path[i] < length);
             let nearest = after.saturating_sub(1).max(i + 1)..poses.len().min(after + 1);
             let mut best = nearest.min_by(|&a, &b| off(i, a).total_cmp(&off(i, b)))?;
-            // Standing still, the first of equal ends.
+            // At rest, the first of several equal ends.
             while best > i + 1 && off(i, best - 1) <= off(i, best) {
                 best -= 1;
             }

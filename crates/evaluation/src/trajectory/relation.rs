@@ -1,30 +1,30 @@
-//! What of a pose difference counts as its error.
+//! Measures of a pose difference.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
 use super::Pose;
 
-/// The size of a pose difference E, by evo's names.
+/// The measure of a pose difference E, by evo's names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Relation {
-    /// `full`: ‖E − I‖ of the 4×4 matrices (Frobenius), metres and radians mixed.
+    /// `full`: Frobenius norm ‖E − I‖ of the 4×4 matrices; it mixes metres and radians.
     Full,
-    /// `trans_part`: the length of the translation of E (m).
+    /// `trans_part`: length of the translation of E (m).
     Translation,
-    /// `rot_part`: ‖R − I‖ of the rotation of E (Frobenius).
+    /// `rot_part`: Frobenius norm ‖R − I‖ of the rotation of E.
     Rotation,
-    /// `angle_rad`: the angle of the rotation of E (rad).
+    /// `angle_rad`: angle of the rotation of E (rad).
     AngleRad,
-    /// `angle_deg`: the same in degrees.
+    /// `angle_deg`: angle of the rotation of E (degrees).
     AngleDeg,
-    /// `point_distance`: between positions (m); relative: the difference of the distances covered.
+    /// `point_distance`: distance of the positions (m); in a relative error, the difference of the distances covered.
     PointDistance,
-    /// `point_distance_error_ratio`: relative only, that difference in % of the reference's distance.
+    /// `point_distance_error_ratio`: relative error only; the difference in % of the reference's distance.
     PointDistanceRatio,
 }
 
 impl Relation {
-    /// Every relation.
+    /// All relations.
     pub const ALL: [Self; 7] = [
         Self::Full,
         Self::Translation,
@@ -35,7 +35,7 @@ impl Relation {
         Self::PointDistanceRatio,
     ];
 
-    /// Its name on the command line.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
@@ -48,7 +48,7 @@ impl Relation {
         }
     }
 
-    /// The unit of its numbers.
+    /// The unit.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Translation | Self::PointDistance => "m",
@@ -59,7 +59,7 @@ impl Relation {
         }
     }
 
-    /// Whether it is defined for one pose, not only for a pair of instants.
+    /// Whether it is defined for an absolute error.
     pub fn is_absolute(self) -> bool {
         self != Self::PointDistanceRatio
     }
@@ -73,7 +73,7 @@ impl Relation {
         }
     }
 
-    /// `None` where a ratio has no denominator.
+    /// The measure of a relative error; `None` for a ratio with a zero denominator.
     pub(super) fn relative(self, reference: &Pose, estimate: &Pose) -> Option<f64> {
         let distances = || (reference.position.norm(), estimate.position.norm());
         match self {
@@ -101,7 +101,7 @@ impl Relation {
     }
 }
 
-/// The angle of a rotation, in [0, π]: by its quaternion, which keeps the digits of small angles.
+/// The angle of a rotation, in [0, π]: by its quaternion, which is precise for small angles.
 pub(super) fn angle(rotation: &Matrix3<f64>) -> f64 {
     let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation));
     2.0 * libm::atan2(q.imag().norm(), q.w.abs())

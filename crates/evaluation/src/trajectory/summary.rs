@@ -1,23 +1,23 @@
-//! Errors in a few numbers.
+//! Summary statistics of errors.
 
 use crate::quantile;
 
 /// Statistics of errors, by evo's names; all NaN without errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Summary {
-    /// Root of the mean square.
+    /// Root mean square error.
     pub rmse: f64,
     /// Mean.
     pub mean: f64,
     /// Median.
     pub median: f64,
-    /// Standard deviation about the mean (of the population, as evo's).
+    /// Standard deviation about the mean (of the population, as in evo).
     pub std: f64,
-    /// Least.
+    /// Minimum.
     pub min: f64,
-    /// Greatest.
+    /// Maximum.
     pub max: f64,
-    /// Sum of squares.
+    /// Sum of squared errors.
     pub sse: f64,
     /// 75 % quantile.
     pub p75: f64,
@@ -25,7 +25,7 @@ pub struct Summary {
     pub p95: f64,
     /// 99 % quantile.
     pub p99: f64,
-    /// How many errors.
+    /// Number of errors.
     pub pairs: usize,
 }
 

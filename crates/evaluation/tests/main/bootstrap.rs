@@ -1,4 +1,4 @@
-//! The bootstrap: its tails counted out, its draws uniform, its medians those of the resamples.
+//! Tests of the bootstrap: interval ends, uniform resampling, medians of many values.
 
 use seafix_evaluation::{Bootstrap, median, quantile};
 
@@ -24,11 +24,7 @@ fn the_ends_leave_half_of_alpha_each() {
     let none = bootstrap.interval(0, 0.9, |_| 0.0);
     assert!(none.0.is_nan() && none.1.is_nan());
     let once = Bootstrap { resamples: 0, block: 0, seed: 1 };
-    assert_eq!(
-        once.interval(1, 0.9, |at| at[0] as f64 + 7.0),
-        (7.0, 7.0),
-        "one resample in blocks of one at the least"
-    );
+    assert_eq!(once.interval(1, 0.9, |at| at[0] as f64 + 7.0), (7.0, 7.0), "at least one resample and one block");
     let mut sampled = 0;
     once.interval(3, 0.9, |_| {
         sampled += 1;
@@ -37,7 +33,7 @@ fn the_ends_leave_half_of_alpha_each() {
     assert_eq!(sampled, 1);
 }
 
-/// Every place as often as every other, whichever place of its block: 20 000 draws of each of 5 places have σ = 126.
+/// Every index is drawn equally often, at each position in a block: 20 000 draws of each of 5 indices have σ = 126.
 #[test]
 fn every_place_is_generated_alike() {
     let mut counts = [[0_i32; 5]; 5];
@@ -51,7 +47,7 @@ fn every_place_is_generated_alike() {
     assert!(counts.as_flattened().iter().all(|count| (count - 4000).abs() < 300), "{counts:?}");
 }
 
-/// 10 000 resamples of ours, 200 000 of SciPy's; the values lie about 0.1 apart.
+/// 10 000 resamples here, 200 000 in SciPy; the values are about 0.1 apart.
 #[test]
 fn scipy_has_the_same_interval() {
     let values = numbers(SCIPY, "values");
@@ -69,18 +65,20 @@ fn scipy_has_the_same_interval() {
 #[test]
 fn blocks_are_as_long_as_the_literature_states() {
     let block = |n: usize| Bootstrap::of(n, 1).block;
-    // ⌈n^⅓⌉ up to 400^{3/2} = 8000 values, ⌈n/400⌉ beyond.
+    // ⌈n^⅓⌉ up to 400^{3/2} = 8000 values, ⌈n/400⌉ above.
     assert_eq!([block(1), block(8), block(9), block(27), block(28)], [1, 2, 3, 3, 4]);
     assert_eq!([block(8000), block(8001), block(8800), block(8801)], [20, 21, 22, 23]);
     assert_eq!((Bootstrap::of(9, 6).resamples, Bootstrap::of(9, 6).seed), (10_000, 6));
 }
 
-/// Of 20 001 values and more the interval is found by halving: its ends are the resamples' medians in their order, the
-/// ⌈αR/2⌉-th and the ⌈(1 − α/2)R⌉-th of R. Blocks with a rest and without.
+/// From 20 001 values on, the interval is found by bisection.
+///
+/// Its ends are order statistics of the resamples' medians: the ⌈αR/2⌉-th and the ⌈(1 − α/2)R⌉-th of R. The blocks
+/// divide the number of values or leave a remainder.
 #[test]
 fn the_median_of_many_is_that_of_the_resamples_in_order() {
     for (n, block) in [(20_001, 1000), (20_004, 5001), (20_003, 7), (20_001, 60_000)] {
-        // No two alike, and scattered.
+        // Distinct, scattered values.
         let values: Vec<f64> = (0..n).map(|i| (i * 7919 % 20_011) as f64).collect();
         let bootstrap = Bootstrap { resamples: 5, block, seed: 2 };
         let mut medians = Vec::new();
@@ -96,7 +94,7 @@ fn the_median_of_many_is_that_of_the_resamples_in_order() {
             assert_eq!(bootstrap.median(&values, confidence), wanted, "{n} {block} {confidence}");
         }
     }
-    // 20 000 are still sorted: the mean of two neighbours may be an end.
+    // 20 000 values are still sorted: the mean of two neighbours may be an end.
     let values: Vec<f64> = (0..20_000).map(f64::from).collect();
     let bootstrap = Bootstrap { resamples: 4, block: 500, seed: 2 };
     let mut medians = Vec::new();

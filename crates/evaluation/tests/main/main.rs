@@ -1,4 +1,4 @@
-//! Numbers of other programs, and of hand calculation, that this crate meets.
+//! Comparison of this crate with other programs and with hand calculation.
 //!
 //! `../fixtures` holds each table beside the script that made it.
 
@@ -16,16 +16,16 @@ fn numbers(table: &str, key: &str) -> Vec<f64> {
     line.split_whitespace().map(|number| number.parse().unwrap()).collect()
 }
 
-/// What stands behind `prefix` in the keys of a table.
+/// The rest of each key that begins with `prefix`.
 fn names<'a>(table: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a str> {
     table.lines().filter_map(move |line| line.strip_prefix(prefix)?.split(':').next())
 }
 
-/// Every number within `tolerance` of the wanted one, relative to the largest wanted.
+/// Asserts that every number is within `tolerance` of its expected value, relative to the largest expected one.
 fn near(found: &[f64], wanted: &[f64], tolerance: f64, what: &str) {
     assert_eq!(found.len(), wanted.len(), "{what}");
     let size = wanted.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
     for (i, (a, b)) in found.iter().zip(wanted).enumerate() {
-        assert!((a - b).abs() <= tolerance * size, "{what}, number {i}: {a}, not {b}");
+        assert!((a - b).abs() <= tolerance * size, "{what}, number {i}: {a}, expected {b}");
     }
 }

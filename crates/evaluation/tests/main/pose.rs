@@ -1,4 +1,4 @@
-//! Errors and bounds of one pose against NumPy's.
+//! Tests of pose errors and bounds against NumPy.
 
 use nalgebra::{Matrix4, Matrix6, Vector3};
 use seafix_evaluation::{
@@ -27,7 +27,7 @@ fn points<F: Frame>(key: &str) -> Vec<Point<F>> {
     numbers(NUMPY, key).chunks(3).map(|at| Point::new(at[0], at[1], at[2])).collect()
 }
 
-/// The number of a key of one.
+/// The single number of a key.
 fn number(key: &str) -> f64 {
     numbers(NUMPY, key)[0]
 }
@@ -53,7 +53,7 @@ fn seen(with_model: bool) -> Vec<Seen> {
     points("model").into_iter().enumerate().map(point).collect()
 }
 
-/// Through a lens, with the model's errors and pixels that err together. Seen to fail with 4·STEP for 2·STEP.
+/// With lens distortion, model errors and correlated pixel errors. The test fails with 4·STEP for 2·STEP.
 #[test]
 fn the_bound_is_fisher_s() {
     let (rig, pose) = (rig(), pose("pose"));
@@ -64,7 +64,7 @@ fn the_bound_is_fisher_s() {
     close(nonlinearity(&rig, &pose, &seen(true), &bound).unwrap(), "nonlinearity", 1e-4);
 }
 
-/// Three points are enough, unless one is behind the cameras.
+/// Three visible points suffice; none of them may be behind the cameras.
 #[test]
 fn a_bound_needs_three_points_that_are_seen() {
     let (rig, pose, points) = (rig(), pose("pose"), seen(true));
@@ -97,7 +97,7 @@ fn errors_of_a_fix_are_numpy_s() {
     let moved = mean_distance(&estimate, &truth, &one).unwrap();
     assert!(
         (moved - position_error(&estimate, &truth)).abs() < 1e-14,
-        "the camera's own place moves as the camera does"
+        "the camera's own position moves with the camera"
     );
 }
 
@@ -110,7 +110,7 @@ fn the_normalised_error_is_numpy_s() {
     assert_eq!(nees(&pose("estimate"), &pose("pose"), &negative, &points("centroid")[0]), None);
 }
 
-/// 3 m beside, 2 m of arm at a turn of 60°: 9 + 8/3 (2 · sin 30°)².
+/// A displacement of 3 m, and an arm of 2 m with a rotation of 60°: 9 + 8/3 (2 · sin 30°)².
 #[test]
 fn a_lever_arm_by_hand() {
     let found = lever_arm_error(3.0, std::f64::consts::FRAC_PI_3, 2.0);
@@ -119,7 +119,8 @@ fn a_lever_arm_by_hand() {
     assert_eq!([alert_limit(1.0), alert_limit(2.0), alert_limit(3.0)], [0.05, 0.1, 0.1]);
 }
 
-/// Each rule at both of its sides, off the model's centroid: a turn about the origin moves it.
+/// Each criterion just below and above its limit, for a model off its origin: a rotation about the origin moves the
+/// centroid.
 #[test]
 fn a_solved_pose_by_hand() {
     let truth = Transform::<Object, Camera>::identity();
@@ -131,9 +132,9 @@ fn a_solved_pose_by_hand() {
         Solved { ideal_rms: Some(ideal), putative }.holds(&estimate, &truth, &model)
     };
     assert!(holds(0.0, false, moved(0.0499, 0.0)) && !holds(0.0, false, moved(0.0501, 0.0)));
-    // The centroid, 1 m off, by 2 · sin 0.7° = 24 mm: right; by 2 · sin 1.45° = 51 mm: wrong.
+    // The centroid at 1 m moves by 2 · sin 0.7° = 24 mm (correct) or 2 · sin 1.45° = 51 mm (wrong).
     assert!(holds(0.0, false, moved(0.0, 1.4)) && !holds(0.0, false, moved(0.0, 2.9)));
-    // About the centroid itself the attitude counts.
+    // A rotation about the centroid itself changes the attitude only.
     let about = |degrees: f64| {
         let turn = so3::exp(&Vector3::new(0.0, 0.0, f64::to_radians(degrees)));
         Transform::new(turn, Vector3::x() - turn * Vector3::x())
@@ -141,5 +142,5 @@ fn a_solved_pose_by_hand() {
     assert!(holds(0.0, false, about(1.99)) && !holds(0.0, false, about(2.01)));
     assert!(holds(0.0, true, moved(0.0099, 0.0)) && !holds(0.0, true, moved(0.0101, 0.0)));
     assert!(holds(0.02, true, moved(0.0599, 0.0)) && !holds(0.02, true, moved(0.0601, 0.0)));
-    assert!(holds(0.0, false, truth), "no error is three times none");
+    assert!(holds(0.0, false, truth), "three times a zero error is zero");
 }

@@ -1,4 +1,4 @@
-//! Tests, intervals and quantiles against SciPy and NumPy.
+//! Tests of significance tests, intervals and quantiles against SciPy and NumPy.
 
 use seafix_evaluation::{
     clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile, recall_area, signed_rank,
@@ -8,7 +8,7 @@ use crate::{names, near, numbers};
 
 const SCIPY: &str = include_str!("../fixtures/probability.txt");
 
-/// Seen to fail with a continuity correction of 1, and with the tie correction added.
+/// The test fails with a continuity correction of 1, and with the tie correction added.
 #[test]
 fn scipy_has_the_same_signed_rank() {
     let mut samples = 0;
@@ -18,8 +18,8 @@ fn scipy_has_the_same_signed_rank() {
         let found = signed_rank(&pairs);
         let wanted = numbers(SCIPY, &format!("signed rank {name}"));
         assert_eq!(found.differing as f64, wanted[0], "{name}");
-        assert!((found.p / wanted[1] - 1.0).abs() < 1e-9, "{name}: {}, not {}", found.p, wanted[1]);
-        assert!((found.effect - wanted[2]).abs() < 1e-14, "{name}: {}, not {}", found.effect, wanted[2]);
+        assert!((found.p / wanted[1] - 1.0).abs() < 1e-9, "{name}: {}, expected {}", found.p, wanted[1]);
+        assert!((found.effect - wanted[2]).abs() < 1e-14, "{name}: {}, expected {}", found.effect, wanted[2]);
         samples += 1;
     }
     assert_eq!(samples, 9);
@@ -43,7 +43,7 @@ fn scipy_has_the_same_intervals_of_rates() {
     }
 }
 
-/// Seen to fail with 4/runs for 2/runs.
+/// The test fails with 4/runs for 2/runs.
 #[test]
 fn correlated_trials_have_korn_and_graubard_s_interval() {
     let mut rows = 0;
@@ -63,7 +63,7 @@ fn scipy_has_the_same_p_of_two_rates() {
         let words: Vec<usize> = name.split(' ').map(|word| word.parse().unwrap()).collect();
         let wanted = numbers(SCIPY, &format!("mcnemar {name}"))[0];
         let found = mcnemar(words[0], words[1]);
-        assert!((found / wanted - 1.0).abs() < 1e-9, "{name}: {found}, not {wanted}");
+        assert!((found / wanted - 1.0).abs() < 1e-9, "{name}: {found}, expected {wanted}");
         assert_eq!(mcnemar(words[1], words[0]), found);
     }
     assert_eq!(mcnemar(0, 0), 1.0);
@@ -74,7 +74,7 @@ fn scipy_has_the_same_p_of_two_rates() {
 fn holm_by_hand() {
     near(&holm(&[0.01, 0.02, 0.03, 0.04, 0.05]), &[0.05, 0.08, 0.09, 0.09, 0.09], 1e-15, "rising");
     near(&holm(&[0.6, 0.001, 0.3, 0.02]), &[0.6, 0.004, 0.6, 0.06], 1e-15, "mixed");
-    assert_eq!(holm(&[0.9, 0.8]), [1.0, 1.0], "never above one");
+    assert_eq!(holm(&[0.9, 0.8]), [1.0, 1.0], "at most one");
     assert_eq!(holm(&[0.04]), [0.04]);
     assert!(holm(&[]).is_empty());
 }
@@ -85,38 +85,39 @@ fn numpy_has_the_same_quantiles() {
     for name in names(SCIPY, "quantile ") {
         let found = quantile(&mut values.clone(), name.parse().unwrap());
         let wanted = numbers(SCIPY, &format!("quantile {name}"))[0];
-        assert!((found - wanted).abs() < 1e-14, "{name}: {found}, not {wanted}");
+        assert!((found - wanted).abs() < 1e-14, "{name}: {found}, expected {wanted}");
     }
     assert_eq!(median(&mut values.clone()), numbers(SCIPY, "quantile 0.5")[0]);
     assert_eq!(median(&mut [4.0, 1.0, 3.0, 8.0]), 3.5);
-    // Beyond both ends stand the ends.
+    // Quantiles outside [0, 1] are the end values.
     assert_eq!([quantile(&mut [1.0, 2.0], -0.1), quantile(&mut [1.0, 2.0], 1.1)], [1.0, 2.0]);
     assert_eq!([quantile(&mut [1.0, 2.0], -2.5), quantile(&mut [1.0, 2.0], 2.5)], [1.0, 2.0]);
     let infinite = f64::INFINITY;
     assert_eq!(median(&mut [1.0, infinite]), infinite);
     assert_eq!(median(&mut [-infinite, 1.0]), -infinite);
-    assert_eq!(quantile(&mut [1.0, 2.0, infinite], 0.5), 2.0, "an exact hit has no neighbour");
+    assert_eq!(quantile(&mut [1.0, 2.0, infinite], 0.5), 2.0, "an exact order statistic needs no neighbour");
     assert_eq!(median(&mut [infinite, infinite]), infinite);
 }
 
 #[test]
 fn recall_by_hand() {
-    // 1, 0.75, 0 at the bound, and nothing beyond.
+    // Contributions of 1 and 0.75, and of 0 at the bound and beyond.
     assert_eq!(recall_area(&[0.0, 0.5, 2.0, 3.0, f64::INFINITY], 2.0), 1.75 / 5.0);
 }
 
-/// Two differences of one size and a larger one: ranks 1.5, 1.5, 3.
+/// Two differences of equal size and a larger one: ranks 1.5, 1.5, 3.
 #[test]
 fn ranks_by_hand() {
     let found = signed_rank(&[(1.0, 2.0), (2.0, 1.0), (0.0, 5.0)]);
-    // W₊ = 1.5: of the eight choices of signs four have a rank sum of at most 1.5 on one side: 0, 1.5, 1.5 … thrice.
+    // W₊ = 1.5: three of the eight sign combinations have a rank sum of at most 1.5 on one side (0, 1.5, 1.5), hence p
+    // = 2 · 3/8.
     assert_eq!((found.differing, found.p), (3, 0.75));
     assert!((found.effect - (4.5 - 1.5) / 6.0).abs() < 1e-15);
-    // A difference of infinity is one, whatever its sign.
+    // An infinite difference is a single difference, whatever its sign.
     let found = signed_rank(&[(f64::INFINITY, 1.0), (0.0, 1.0)]);
     assert_eq!((found.differing, found.p), (2, 1.0));
     assert!((found.effect + 1.0 / 3.0).abs() < 1e-15);
-    // Three of the four choices of signs are as far from even: a probability all the same.
+    // Three of the four sign combinations are at least as extreme; the p-value stays at most one.
     assert_eq!(signed_rank(&[(1.0, 2.0), (2.0, 1.0)]).p, 1.0);
     let nothing = signed_rank(&[(1.0, 1.0)]);
     assert_eq!((nothing.differing, nothing.p, nothing.effect), (0, 1.0, 0.0));

@@ -1,4 +1,4 @@
-//! Errors of trajectories against evo, number by number.
+//! Tests of trajectory errors against evo.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_evaluation::trajectory::{
@@ -28,12 +28,12 @@ fn statistics(errors: &[f64]) -> [f64; 10] {
     [s.rmse, s.mean, s.median, s.std, s.min, s.max, s.sse, s.p75, s.p95, s.p99]
 }
 
-/// Each number to its own digits.
+/// Asserts that the numbers agree, each relative to its own size.
 fn alike(found: &[f64], wanted: &[f64], what: &str) {
     assert_eq!(found.len(), wanted.len(), "{what}");
     for (i, (a, b)) in found.iter().zip(wanted).enumerate() {
-        // evo's angles are those of a logarithm: sure to 1e-12 of a radian.
-        assert!((a - b).abs() <= 1e-9 * b.abs() + 1e-12, "{what}, number {i}: {a}, not {b}");
+        // evo computes angles by a logarithm, accurate to 1e-12 rad.
+        assert!((a - b).abs() <= 1e-9 * b.abs() + 1e-12, "{what}, number {i}: {a}, expected {b}");
     }
 }
 
@@ -42,7 +42,7 @@ fn alignment(name: &str, reference: &[Pose], estimate: &[Pose]) -> Alignment {
         "none" => Alignment::IDENTITY,
         "align" => align(reference, estimate, false).unwrap(),
         "align-scale" => align(reference, estimate, true).unwrap(),
-        // The scale alone, of the alignment with it.
+        // The scale of the alignment with scale, alone.
         "scale" => Alignment { scale: align(reference, estimate, true).unwrap().scale, ..Alignment::IDENTITY },
         "origin" => Alignment::onto(&reference[0], &estimate[0]),
         _ => panic!("{name}"),
@@ -67,7 +67,7 @@ fn evo_aligns_alike() {
     assert!((alignment("scale", &reference, &estimate).scale - numbers(EVO, "alignment scale")[12]).abs() < 1e-14);
 }
 
-/// Seen to fail with `ape` of zeros, and without the arm for translations.
+/// The test fails with zeros for `ape`, and without the branch for translations.
 #[test]
 fn evo_has_the_same_absolute_errors() {
     let (reference, estimate) = (poses("reference"), poses("estimate"));
@@ -85,7 +85,7 @@ fn evo_has_the_same_absolute_errors() {
     assert_eq!(Relation::ALL.iter().filter(|relation| relation.is_absolute()).count(), 6);
 }
 
-/// By frames, by path and by angle, consecutive pairs and all of them.
+/// Consecutive and all pairs, by frames, path length and angle.
 #[test]
 fn evo_chooses_the_same_pairs_and_has_the_same_relative_errors() {
     let (reference, estimate) = (poses("reference"), poses("estimate"));
@@ -126,14 +126,14 @@ fn evo_associates_alike() {
     assert_eq!(cases, 21);
     assert_eq!(associate(&[], &[1, 2], 5, 0), []);
     assert_eq!(associate(&[1, 2], &[], 5, 0), []);
-    assert_eq!(associate(&[10, 10, 30], &[10], 5, 0), [(0, 0)], "the first of two of one stamp");
-    // As near to both: the first. One as long as the other: the estimate's are gone through.
+    assert_eq!(associate(&[10, 10, 30], &[10], 5, 0), [(0, 0)], "the first of two equal stamps");
+    // Equal distance: the first one. Equal lengths: the stamps of the estimate are associated.
     assert_eq!(associate(&[10, 20], &[15], 5, 0), [(0, 0)]);
     assert_eq!(associate(&[10, 20], &[14, 16], 100, 0), [(0, 0), (1, 1)]);
     assert_eq!(associate(&[10, 40], &[11, 12], 100, 0), [(0, 0), (0, 1)]);
 }
 
-/// Translation and rotation over a metre, on stretches of 1.5, 3 and 6 m.
+/// Translation and rotation per metre, over segments of 1.5, 3 and 6 m.
 #[test]
 fn the_drift_is_kitti_s() {
     let (reference, estimate) = (poses("reference"), poses("estimate"));
@@ -145,14 +145,14 @@ fn the_drift_is_kitti_s() {
     for (segment, wanted) in found.iter().zip(wanted.chunks(5)) {
         assert_eq!([segment.from as f64, segment.to as f64, segment.length], wanted[..3]);
         assert!((segment.translation / wanted[3] - 1.0).abs() < 1e-12, "{segment:?}: {}", wanted[3]);
-        // The table's angle is an arc cosine's.
+        // The table's angle comes from an arc cosine.
         assert!((segment.rotation - wanted[4]).abs() < 1e-9, "{segment:?}: {}", wanted[4]);
     }
 }
 
 #[test]
 fn a_pose_and_its_matrix_by_hand() {
-    // A quarter turn about z at (1, 2, 3).
+    // A rotation by 90° about z at (1, 2, 3).
     let rotation = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
     let pose = Pose { rotation, position: Vector3::new(1.0, 2.0, 3.0) };
     let ahead = Pose { position: Vector3::new(1.0, 0.0, 0.0), ..Pose::IDENTITY };
@@ -169,8 +169,9 @@ fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose { position: Vector3::new(x, y, z), ..Pose::IDENTITY }
 }
 
-/// ±w across a line ±1: the singular values are the mean squares 2/4 and 2w²/4, and one is refused from w² ≤ 2ε on where the
-/// line is short, relative to its own square where it is long.
+/// Deviations of ±w across a line of ±1 have the singular values 2/4 and 2w²/4.
+///
+/// An alignment is rejected for w² ≤ 2ε on a short line, and relative to the squared length on a long one.
 #[test]
 fn a_line_is_one_up_to_rounding() {
     let cross = |length: f64, w: f64| {
@@ -182,17 +183,17 @@ fn a_line_is_one_up_to_rounding() {
         cross(1.0, 1.01 * edge).is_ok()
             && matches!(cross(1.0, 0.99 * edge), Err(UndeterminedAlignment::OneLine { .. }))
     );
-    // 100 m: first = 5000 m².
+    // For 100 m the first singular value is 5000 m².
     let edge = (2.0 * 5000.0 * f64::EPSILON).sqrt();
     assert!(cross(100.0, 1.01 * edge).is_ok());
     let Err(UndeterminedAlignment::OneLine { first, second }) = cross(100.0, 0.99 * edge) else { panic!("a line") };
     assert!((first - 5000.0).abs() < 1e-9 && (second / (0.99 * 0.99 * 5000.0 * f64::EPSILON) - 1.0).abs() < 0.1);
     let three = [at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0), at(0.0, 1.0, 0.0)];
-    assert!(align(&three, &three, false).is_ok(), "three are enough");
+    assert!(align(&three, &three, false).is_ok(), "three poses suffice");
     assert_eq!(align(&[], &[], true), Err(UndeterminedAlignment::TooFew(0)));
 }
 
-/// A mirrored estimate is laid on by a rotation all the same; Umeyama's scale takes the third singular value negative.
+/// A mirrored estimate is aligned by a rotation; Umeyama's scale has a negative third singular value.
 #[test]
 fn a_mirrored_estimate_is_turned_not_mirrored() {
     let reference = [
@@ -238,19 +239,19 @@ fn relations_have_evo_s_names_and_units() {
     assert_eq!(found, wanted);
 }
 
-/// Ends about the wanted length, by hand: the nearest, and of equals the first.
+/// Pair ends around the nominal length, by hand: the nearest, and the first of equally near ones.
 #[test]
 fn pairs_by_path_take_the_nearest_end() {
     let line = |xs: &[f64]| -> Vec<Pose> { xs.iter().map(|&x| at(x, 0.0, 0.0)).collect() };
     let all = |xs: &[f64], length: f64, tolerance: f64| pairs(&line(xs), Delta::Metres(length), true, tolerance);
-    assert_eq!(all(&[0.0, 0.75, 1.25, 3.0], 1.0, 0.25), [(0, 1)], "0.75 and 1.25 are as near: the first");
+    assert_eq!(all(&[0.0, 0.75, 1.25, 3.0], 1.0, 0.25), [(0, 1)], "0.75 and 1.25 are equally near: the first");
     assert_eq!(all(&[0.0, 0.7, 1.2, 3.0], 1.0, 0.25), [(0, 2)], "1.2 is nearer than 0.7");
     assert_eq!(all(&[0.0, 0.9, 1.2, 3.0], 1.0, 0.25), [(0, 1)], "0.9 is nearer than 1.2");
-    assert_eq!(all(&[0.0, 1.0, 1.0, 1.0], 1.0, 0.0), [(0, 1)], "standing still, the first");
+    assert_eq!(all(&[0.0, 1.0, 1.0, 1.0], 1.0, 0.0), [(0, 1)], "at rest: the first");
     assert_eq!(all(&[0.0, 0.0, 0.0, 1.0], 1.0, 0.0), [(0, 3), (1, 3), (2, 3)]);
-    assert_eq!(all(&[0.0, 0.9, 0.9, 1.3], 1.0, 0.25), [(0, 1)], "standing still before the end, the first");
-    assert_eq!(all(&[0.0, 5.0], 1.0, 5.0), [(0, 1)], "the next is tried, however far");
-    // The tolerance is a share of the length.
+    assert_eq!(all(&[0.0, 0.9, 0.9, 1.3], 1.0, 0.25), [(0, 1)], "at rest before the end: the first");
+    assert_eq!(all(&[0.0, 5.0], 1.0, 5.0), [(0, 1)], "the next pose is always tried");
+    // The tolerance is relative to the length.
     assert_eq!(all(&[0.0, 3.5], 4.0, 0.15), [(0, 1)]);
     assert_eq!(all(&[0.0, 3.5], 4.0, 0.12), []);
     let turned = |angles: &[f64]| -> Vec<Pose> {
@@ -259,7 +260,7 @@ fn pairs_by_path_take_the_nearest_end() {
     };
     let poses = turned(&[0.0, 0.169, 0.171, 0.229, 0.231]);
     assert_eq!(pairs(&poses, Delta::Radians(0.2), true, 0.15), [(0, 2), (0, 3)]);
-    assert_eq!(pairs(&poses[..2], Delta::Radians(0.2), true, 1.0), [(0, 1)], "no pose makes a pair with itself");
+    assert_eq!(pairs(&poses[..2], Delta::Radians(0.2), true, 1.0), [(0, 1)], "no pose is paired with itself");
     assert_eq!(pairs(&poses, Delta::Radians(0.2), false, 0.1), [(0, 3)]);
     assert_eq!(pairs(&poses, Delta::Frames(0), false, 0.1), [(0, 0), (1, 1), (2, 2), (3, 3), (4, 4)]);
 }

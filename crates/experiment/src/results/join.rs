@@ -1,4 +1,4 @@
-//! One table of the tables of its pieces.
+//! Joining of the tables of pieces.
 
 use std::{
     fs::File,
@@ -20,19 +20,19 @@ use super::table::{self, ROW_GROUP, Table};
 /// The rows of one trial in the tables of one piece.
 #[derive(Debug, Clone)]
 pub(crate) struct TrialRows {
-    /// The piece's table as CSV, without a head.
+    /// The piece's table as CSV, without header.
     pub(crate) csv: PathBuf,
-    /// Where the rows begin in it, and how long they are (bytes).
+    /// The offset and the length of the rows (bytes).
     pub(crate) text: (u64, u64),
     /// The piece's table as Parquet.
     pub(crate) parquet: PathBuf,
-    /// The first of their row groups in it, and how many.
+    /// The index of the first row group and the number of row groups.
     pub(crate) groups: (usize, usize),
-    /// How many there are.
+    /// The number of rows.
     pub(crate) rows: usize,
 }
 
-/// Writes the rows of all stretches, in order, below one head.
+/// Writes the rows of all `stretches`, in order, below one header.
 pub(crate) fn join_csv(stretches: &[TrialRows], to: &Path) -> io::Result<()> {
     let mut all = BufWriter::with_capacity(1 << 18, File::create(to)?);
     all.write_all(Table::head().as_bytes())?;
@@ -41,17 +41,17 @@ pub(crate) fn join_csv(stretches: &[TrialRows], to: &Path) -> io::Result<()> {
         piece.seek(SeekFrom::Start(*start))?;
         let copied = io::copy(&mut piece.take(*length), &mut all)?;
         if copied < *length {
-            return Err(io::Error::other(format!("{} ends {} bytes early", csv.display(), length - copied)));
+            return Err(io::Error::other(format!("{} is {} bytes too short", csv.display(), length - copied)));
         }
     }
     all.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
 }
 
-/// Row groups of fewer rows are not kept as they are.
+/// The number of rows below which a row group is merged with others.
 const SMALL: usize = ROW_GROUP / 8;
 
-/// Writes the rows of all stretches, in order. Row groups that are not small are copied as they are; smaller ones are
-/// collected, so that a table of many small pieces has few row groups.
+/// Writes the rows of all `stretches`, in order. Large row groups are copied unchanged. Small ones are merged, so that
+/// a table of many small pieces has few row groups.
 pub(crate) fn join_parquet(stretches: &[TrialRows], to: &Path) -> Result<(), ParquetError> {
     let mut all = table::create(to)?;
     let mut waiting = Table::default();
@@ -68,12 +68,12 @@ pub(crate) fn join_parquet(stretches: &[TrialRows], to: &Path) -> Result<(), Par
         }
     }
     waiting.write(&mut all, true)?;
-    // Writes the footer and gives the file back.
+    // Writes the footer and returns the file.
     all.into_inner()?.sync_all()?;
     Ok(())
 }
 
-/// Copies a row group of another table of the same columns as it is.
+/// Copies a row group of another table with the same columns.
 fn copy(
     all: &mut SerializedFileWriter<File>,
     file: &File,
@@ -100,7 +100,6 @@ fn copy(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::Row;
     use parquet::record::Field;
     use seafix_log::{FrameRecord, TargetRecord};
     use std::fs;
@@ -118,7 +117,7 @@ mod tests {
         let (csv, parquet) = (at("csv"), at("parquet"));
         let rows = (frames.end - frames.start) as usize;
         let mut table = Table::default();
-        frames.clone().for_each(|k| Row::of("001", &frame(k, "a")).for_each(|row| table.add(&row)));
+        frames.clone().for_each(|k| table.add("001", &frame(k, "a")));
         fs::write(&csv, &table.text).unwrap();
         let text = (0, table.text.len() as u64);
         let mut file = table::create(&parquet).unwrap();
@@ -131,7 +130,7 @@ mod tests {
     fn a_joined_table_has_the_rows_of_its_pieces_in_order() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        // Small pieces, one with two row groups of which the first is full, and a small one again.
+        // The pieces are small, one with two row groups of which the first is full, and small again.
         let cuts = [0, 5, 9, 9 + 8192 + 100, 9 + 2 * 8192 + 100, 9 + 2 * 8192 + 107];
         let pieces: Vec<TrialRows> = cuts.windows(2).map(|cut| piece(folder.path(), cut[0]..cut[1])).collect();
         join_csv(&pieces, &at("results.csv")).unwrap();

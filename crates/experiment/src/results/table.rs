@@ -1,4 +1,4 @@
-//! Rows in memory, column by column, on their way into files.
+//! Rows in memory, stored by column, before they are written to files.
 
 use std::{fs::File, path::Path, sync::Arc};
 
@@ -7,19 +7,19 @@ use parquet::{
     column::{reader::ColumnReader, writer::ColumnWriter},
     data_type::ByteArray,
     errors::ParquetError,
-    file::{properties::WriterProperties, reader::RowGroupReader, writer::SerializedFileWriter},
+    file::{metadata::KeyValue, properties::WriterProperties, reader::RowGroupReader, writer::SerializedFileWriter},
     schema::parser::parse_message_type,
 };
 
-use super::{
-    COLUMNS, Row,
-    columns::{Cell, Kind},
+use seafix_log::{
+    FrameRecord, TargetRecord,
+    quantities::{Kind, QUANTITIES, Value},
 };
 
-/// Rows of one row group of the Parquet table, where there are as many.
+/// The number of rows of a full row group of the Parquet table.
 pub(super) const ROW_GROUP: usize = 8192;
 
-/// Rows of one trial: their text as CSV (RFC 4180; unknown values are empty), and their columns.
+/// The rows of one trial: as CSV text (RFC 4180, unknown values empty) and as columns.
 #[derive(Debug)]
 pub(crate) struct Table {
     pub(crate) rows: usize,
@@ -27,7 +27,7 @@ pub(crate) struct Table {
     columns: Vec<Values>,
 }
 
-/// The values of one column; of those that may be unknown the known ones, and for every row whether it has one.
+/// The values of one column. A column with unknown values has the known ones, and for every row whether it has one.
 #[derive(Debug)]
 enum Values {
     Text(Vec<ByteArray>),
@@ -44,32 +44,36 @@ impl Default for Table {
             Kind::Real => Values::Real(Vec::new(), Vec::new()),
             Kind::Flag => Values::Flag(Vec::new(), Vec::new()),
         };
-        let columns = COLUMNS.iter().map(|column| empty(column.kind)).collect();
+        let columns = QUANTITIES.iter().map(|column| empty(column.kind)).collect();
         Self { rows: 0, text: String::new(), columns }
     }
 }
 
 impl Table {
-    /// The head of the table as CSV.
+    /// The header of the table as CSV.
     pub(super) fn head() -> String {
-        COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
+        QUANTITIES.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
     }
 
-    /// Adds a row.
-    pub(crate) fn add(&mut self, row: &Row<'_>) {
+    /// Adds the rows of a frame, one for each attempt.
+    pub(crate) fn add(&mut self, trial: &str, frame: &FrameRecord) {
+        frame.targets.iter().for_each(|target| self.add_row(trial, frame, target));
+    }
+
+    fn add_row(&mut self, trial: &str, frame: &FrameRecord, target: &TargetRecord) {
         self.rows += 1;
-        for (place, (column, values)) in COLUMNS.iter().zip(&mut self.columns).enumerate() {
+        for (place, (column, values)) in QUANTITIES.iter().zip(&mut self.columns).enumerate() {
             if place > 0 {
                 self.text.push(',');
             }
-            let cell = (column.fill)(row);
+            let cell = column.value(trial, frame, target);
             write_cell(&mut self.text, &cell);
             values.push(cell);
         }
         self.text.push('\n');
     }
 
-    /// Adds the rows of a row group to the columns; their text is not made again.
+    /// Adds the rows of a row group to the columns, but not to the text.
     pub(super) fn read(&mut self, group: &dyn RowGroupReader) -> Result<(), ParquetError> {
         let rows = group.metadata().num_rows() as usize;
         self.rows += rows;
@@ -79,8 +83,8 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the columns as row groups of [`ROW_GROUP`] rows, and forgets them; how many groups. What is left over is a
-    /// smaller group where this is the `end`, else it waits.
+    /// Writes the columns as row groups of [`ROW_GROUP`] rows and removes them. The result is the number of groups. The
+    /// remaining rows are written as a smaller group if this is the `end`.
     pub(crate) fn write(&mut self, file: &mut SerializedFileWriter<File>, end: bool) -> Result<usize, ParquetError> {
         let mut groups = 0;
         while self.rows >= ROW_GROUP || (end && self.rows > 0) {
@@ -100,17 +104,17 @@ impl Table {
 }
 
 impl Values {
-    fn push(&mut self, cell: Cell) {
+    fn push(&mut self, cell: Value) {
         fn known<T>((values, levels): (&mut Vec<T>, &mut Vec<i16>), value: Option<T>) {
             levels.push(i16::from(value.is_some()));
             values.extend(value);
         }
         match (self, cell) {
-            (Self::Text(all), Cell::Text(word)) => all.push(ByteArray::from(word.into_bytes())),
-            (Self::Integer(all, levels), Cell::Integer(value)) => known((all, levels), value),
-            (Self::Real(all, levels), Cell::Real(value)) => known((all, levels), value),
-            (Self::Flag(all, levels), Cell::Flag(value)) => known((all, levels), value),
-            _ => unreachable!("a column fills cells of its own kind"),
+            (Self::Text(all), Value::Text(word)) => all.push(ByteArray::from(word.into_bytes())),
+            (Self::Integer(all, levels), Value::Integer(value)) => known((all, levels), value),
+            (Self::Real(all, levels), Value::Real(value)) => known((all, levels), value),
+            (Self::Flag(all, levels), Value::Flag(value)) => known((all, levels), value),
+            _ => unreachable!("a column has cells of its own type"),
         }
     }
 
@@ -128,11 +132,11 @@ impl Values {
             (Self::Flag(all, levels), ColumnReader::BoolColumnReader(mut reader)) => {
                 reader.read_records(rows, Some(levels), None, all).map(drop)
             }
-            _ => Err(ParquetError::General("a column of another kind".to_owned())),
+            _ => Err(ParquetError::General("a column of another type".to_owned())),
         }
     }
 
-    /// Writes the first `rows` rows and forgets them.
+    /// Writes the first `rows` rows and removes them.
     fn write(&mut self, writer: &mut ColumnWriter<'_>, rows: usize) -> Result<(), ParquetError> {
         fn first<T>(values: &mut Vec<T>, levels: &mut Vec<i16>, rows: usize) -> (Vec<T>, Vec<i16>) {
             let levels: Vec<i16> = levels.drain(..rows).collect();
@@ -156,14 +160,14 @@ impl Values {
                 let (values, levels) = first(all, levels, rows);
                 writer.write_batch(&values, Some(&levels), None).map(drop)
             }
-            _ => Err(ParquetError::General("a column of another kind".to_owned())),
+            _ => Err(ParquetError::General("a column of another type".to_owned())),
         }
     }
 }
 
-/// An empty Parquet table, ZSTD.
+/// Creates an empty Parquet table with ZSTD compression.
 pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetError> {
-    let fields: String = COLUMNS
+    let fields: String = QUANTITIES
         .iter()
         .map(|column| match column.kind {
             Kind::Text => format!("REQUIRED BYTE_ARRAY {} (UTF8);", column.name),
@@ -173,31 +177,37 @@ pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetE
         })
         .collect();
     let schema = Arc::new(parse_message_type(&format!("message results {{ {fields} }}"))?);
+    // What the columns are, for whoever finds the file alone: the table of `docs/quantities.md`.
+    let about = |suffix: &str, text: &str, column: &str| KeyValue::new(format!("{column}.{suffix}"), text.to_owned());
+    let described = QUANTITIES
+        .iter()
+        .flat_map(|column| [about("unit", column.unit, column.name), about("description", column.doc, column.name)]);
     let properties = WriterProperties::builder()
+        .set_key_value_metadata(Some(described.collect()))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_created_by(concat!("seafix ", env!("CARGO_PKG_VERSION")).to_owned())
         .build();
     SerializedFileWriter::new(File::create(path)?, schema, Arc::new(properties))
 }
 
-fn write_cell(text: &mut String, cell: &Cell) {
+fn write_cell(text: &mut String, cell: &Value) {
     use std::fmt::Write;
-    // Writing into a string cannot fail.
+    // Writing to a string does not fail.
     let _ = match cell {
-        Cell::Text(word) => {
+        Value::Text(word) => {
             quote(text, word);
             Ok(())
         }
-        Cell::Integer(Some(number)) => write!(text, "{number}"),
-        // All its digits; very small ones with an exponent instead of many zeros.
-        Cell::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
-        Cell::Real(Some(x)) => write!(text, "{x}"),
-        Cell::Flag(Some(flag)) => write!(text, "{flag}"),
+        Value::Integer(Some(number)) => write!(text, "{number}"),
+        // A real number has all its digits; a very small one has an exponent instead of many zeros.
+        Value::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
+        Value::Real(Some(x)) => write!(text, "{x}"),
+        Value::Flag(Some(flag)) => write!(text, "{flag}"),
         _ => Ok(()),
     };
 }
 
-/// A word as a CSV field: quoted where it must be; a spreadsheet shall not take it for a formula.
+/// A CSV field, quoted if necessary. A spreadsheet does not read it as a formula.
 fn quote(text: &mut String, word: &str) {
     let formula = word.starts_with(['=', '+', '-', '@', '\t', '\r']);
     if formula || word.contains([',', '"', '\n', '\r']) {
@@ -213,7 +223,6 @@ fn quote(text: &mut String, word: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use seafix_log::{FrameRecord, TargetRecord};
 
     #[test]
     fn a_row_is_a_line_and_unknown_is_empty() {
@@ -222,12 +231,12 @@ mod tests {
             let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "absent");
             target.evaluation.visible = Some(4);
             let frame = FrameRecord { frame: 2, stamp_ns: 7, targets: vec![target], ..Default::default() };
-            Row::of("001", &frame).for_each(|row| table.add(&row));
+            table.add("001", &frame);
         }
-        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,wrong,wrong_pairs,visible";
+        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,explanation,wrong,wrong_pairs,visible";
         assert!(Table::head().starts_with(head));
         let mut lines = table.text.lines();
-        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,unidentified,chance,,,4,,"));
+        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,rejected,absent,,,,4,,"));
         assert!(lines.next().unwrap().contains("\"'=1+1\""));
     }
 }

@@ -1,4 +1,4 @@
-//! All pieces become one log a trial and one table.
+//! Assembly of all pieces into one log for each trial and one table.
 
 use std::{
     collections::BTreeMap,
@@ -19,8 +19,8 @@ use crate::{
     results::{TrialRows, join_csv, join_parquet},
 };
 
-/// Writes the logs and tables of the run that `manifest` describes from its pieces, in their order; `false` when the
-/// observer ended it before.
+/// Writes the logs and tables of the run that `manifest` describes from its pieces, in order; `false` if the observer
+/// stopped it.
 pub(super) fn assemble(
     folder: &Path,
     manifest: &mut Manifest,
@@ -35,7 +35,7 @@ pub(super) fn assemble(
             pieces.iter().filter_map(|piece| Some((piece, piece.scale_error(&trial.name)?))).collect();
         let logs = of_trial.iter().map(|(piece, _)| piece.log(&trial.name)).collect();
         outputs.push(Output { path: folder.join(&trial.log), kind: Kind::Log(logs) });
-        // What one run knows after its last frame: a source that is navigated is one piece.
+        // The pose graph is complete after the last frame; a navigated source is one piece.
         if let Some(graph_text) = of_trial.iter().find_map(|(piece, _)| piece.pose_graph(&trial.name)) {
             outputs.push(Output { path: folder.join(pose_graph(&trial.name)), kind: Kind::PoseGraph(graph_text) });
         }
@@ -53,7 +53,7 @@ pub(super) fn assemble(
     Ok(done)
 }
 
-/// A file of the run, and what it is made of.
+/// A file of the run and its parts.
 struct Output<'a> {
     path: PathBuf,
     kind: Kind<'a>,
@@ -67,7 +67,7 @@ enum Kind<'a> {
 }
 
 impl Output<'_> {
-    /// Writes the file; its name and SHA-256, or nothing when the observer ended it before.
+    /// Writes the file; returns its name and SHA-256, or nothing if the observer stopped it.
     fn write(&self, observer: &dyn Observer) -> Result<Option<(String, String)>, RunError> {
         if observer.stops() {
             return Ok(None);
@@ -90,7 +90,7 @@ impl Output<'_> {
         Ok(Some((name, sha256(&self.path).map_err(RunError::Output)?)))
     }
 
-    /// Writes the file under a `.partial` name and renames it when it is on the disk.
+    /// Writes the file with the extension `.partial`, and renames it when it is on the disk.
     fn complete(&self, write: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), RunError> {
         let partial = PathBuf::from(format!("{}.partial", self.path.display()));
         write(&partial).map_err(|error| RunError::unwritable(&partial, error))?;

@@ -1,4 +1,4 @@
-//! What a run would take, by some of its frames.
+//! Estimates of a run's time and space from a sample of its frames.
 
 use std::{
     fs,
@@ -10,45 +10,42 @@ use seafix_component::Fault;
 use seafix_log::Writer;
 
 use super::{RunError, group, partition};
-use crate::{
-    Plan,
-    results::{Row, Table},
-};
+use crate::{Plan, results::Table};
 
-/// What a run would take.
+/// The estimated time and space of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunEstimate {
-    /// Frames of each trial, in the order of the plan's trials.
+    /// The number of frames of each trial, in the order of the plan's trials.
     pub frames: Vec<usize>,
-    /// About so many bytes of log and results; while they are joined, twice as many lie on the disk.
+    /// The approximate size of logs and results (bytes); twice as much is needed while they are joined.
     pub bytes: u64,
-    /// About so long for one thread, writing included.
+    /// The approximate time of one thread, writing included.
     pub work: Duration,
-    /// About so long whatever the number of threads: the longest piece, which one thread makes.
+    /// The lower limit of the time for any number of threads: the longest piece.
     pub longest: Duration,
-    /// So many frames were tried over all sources,
+    /// The number of sampled frames over all sources.
     pub tried: usize,
-    /// in so much time.
+    /// The time for the sampled frames.
     pub spent: Duration,
 }
 
 impl RunEstimate {
-    /// About how long on so many threads.
+    /// The approximate time with this number of threads.
     pub fn on(&self, threads: usize) -> Duration {
         self.work.div_f64(threads.max(1) as f64).max(self.longest)
     }
 }
 
-/// Frames of each source that are tried at least, where it has as many: the first is cold.
+/// The minimum number of sampled frames of each source; the first one is slow.
 const MIN: usize = 4;
-/// Together they may take so long, and each at most its share.
+/// The maximum time of all samples together, divided evenly among the sources.
 const LONGEST: Duration = Duration::from_secs(20);
 
-/// What `plan` would take: leads some frames of every source through its trials and writes their logs into the system's
-/// temporary folder; nothing of it stays. Trials share their stages, unless each is measured `separate`ly.
+/// Estimates `plan` from a sample of every source's frames. Logs are written to the system's temporary folder and
+/// removed. Trials share stages unless they are measured `separate`ly.
 ///
 /// # Errors
-/// Everything that is wrong with the inputs, and a temporary folder that cannot be written.
+/// All faults of the inputs, and a temporary folder that cannot be written.
 pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
     let groups = group::open(plan, separate)?;
     let pieces = partition::cut(&groups);
@@ -78,12 +75,12 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
             let group_frame = group.observe(index, &mut sessions).map_err(input)?;
             let (records, levels) = group.record(index, group_frame, &[], |_, _| true);
             for (which, (record, writer)) in records.iter().zip(&mut writers).enumerate() {
-                // Frames come in an order of their own; stamps in logs do not decrease.
+                // Sampled frames are out of order, but stamps in logs must not decrease.
                 let record = seafix_log::FrameRecord { stamp_ns: tried as u64, ..record.clone() };
                 failures += usize::from(crate::log_decimation::failed(&record));
                 let trial = group.trials[which];
                 writer.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
-                Row::of(&trial.name, &record).for_each(|row| table.add(&row));
+                table.add(&trial.name, &record);
             }
             tried += 1;
             warm.push(first.elapsed());
@@ -95,7 +92,7 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
         }
         let written = place.bytes();
         let empty = place.empty(group)?;
-        // What the first costs more, memory that is got for instance, it costs once.
+        // The additional cost of the first frame, such as the allocation of memory, occurs once.
         let all: Duration = warm.iter().sum();
         let cold = if tried > 1 { warm[0] } else { Duration::ZERO };
         let a_frame = (all - cold).div_f64((tried - usize::from(tried > 1)).max(1) as f64)
@@ -105,7 +102,7 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
         let logged: f64 =
             pieces.iter().filter(|piece| piece.group == number).map(|piece| piece.expected(fraction)).sum();
         let frame_bytes = written.saturating_sub(empty) as f64 / tried.max(1) as f64;
-        // The same rows stand in a Parquet file, a third as long.
+        // A Parquet file has the same rows in a third of the size.
         let rows = table.text.len() as f64 * 4.0 / 3.0 / tried.max(1) as f64;
         estimate.bytes += (empty as f64 + frame_bytes * logged + rows * count as f64) as u64;
         estimate.work += cold + a_frame.mul_f64(count as f64);
@@ -126,12 +123,12 @@ pub fn estimate(plan: &Plan, separate: bool) -> Result<RunEstimate, RunError> {
     Ok(estimate)
 }
 
-/// The frame that is tried as the k-th: of a way that is navigated the next, else one anywhere on it.
+/// The index of the k-th sampled frame: the next one for a navigated sequence, otherwise spread over all.
 fn place_of(k: usize, count: usize, navigates: bool) -> usize {
     if navigates {
         return k;
     }
-    // Every number once, spread by a step without a common divisor.
+    // A step without a common divisor visits every index once.
     let step = (1..).map(|n| (count * 618 / 1000).max(1) + n - 1).find(|step| divisor(*step, count) == 1).unwrap_or(1);
     (k * step) % count
 }
@@ -140,7 +137,7 @@ fn divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { divisor(b, a % b) }
 }
 
-/// A folder that goes when this does.
+/// A temporary folder, removed when dropped.
 struct Scratch(PathBuf);
 
 impl Scratch {
@@ -150,13 +147,13 @@ impl Scratch {
         Ok(Self(folder))
     }
 
-    /// Bytes of the logs in it.
+    /// The size of the logs in it (bytes).
     fn bytes(&self) -> u64 {
         let files = fs::read_dir(&self.0).into_iter().flatten().flatten();
         files.filter_map(|file| Some(file.metadata().ok()?.len())).sum()
     }
 
-    /// Bytes of the logs of a group without a frame.
+    /// The size of the logs of a group without frames (bytes).
     fn empty(&self, group: &group::Group<'_>) -> Result<u64, RunError> {
         for (trial, header) in group.headers.iter().enumerate() {
             Writer::create(&self.0.join(format!("{trial}.mcap")), header)?.finish()?;

@@ -1,4 +1,4 @@
-//! The folder of a run: that it is free, or holds the run that is to be continued, and that nobody else writes into it.
+//! The folder of a run: its lock, and the decision whether to create, resume or replace the run.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -14,18 +14,18 @@ use super::{
 };
 use crate::manifest::{self, Manifest};
 
-/// The folder of a run, locked as long as this lives.
+/// The folder of a run, locked during the lifetime of this value.
 #[derive(Debug)]
 pub(super) struct Claim {
     pub(super) folder: PathBuf,
-    /// The run that is finished already, where it is resumed.
+    /// The finished run in the folder, if it is resumed.
     pub(super) finished: Option<Manifest>,
-    /// The reason why a run that was there was removed, where one was kept before.
+    /// The reason for the removal of an outdated run, if there was one.
     pub(super) outdated: Option<String>,
     lock: Lock,
 }
 
-/// A file that is locked as long as this lives.
+/// A file that is locked during the lifetime of this value.
 #[derive(Debug)]
 struct Lock {
     path: PathBuf,
@@ -33,19 +33,19 @@ struct Lock {
 }
 
 impl Drop for Lock {
-    /// The file goes while it is still locked: whoever has opened it before sees that it has gone.
+    /// The file is removed under the lock, so that a process that has opened it notices.
     fn drop(&mut self) {
-        // In a folder that was replaced it is another's.
+        // The folder may have been replaced by another process.
         if is_at(&self.file, &self.path) {
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// Holds an advisory lock while a run writes into its folder, and says who does.
+/// The file with the advisory lock of a running process; it contains the process and the host.
 const LOCK: &str = ".lock";
 
-/// What can be seen of the folder before anything is opened, computed or written.
+/// Checks the folder before anything is opened, computed or written.
 pub(super) fn inspect(options: &Options) -> Result<(), Fault> {
     match &options.out {
         Some(out) if options.existing == Existing::Refuse && !free(out)? => Err(taken(out)),
@@ -54,7 +54,7 @@ pub(super) fn inspect(options: &Options) -> Result<(), Fault> {
 }
 
 impl Claim {
-    /// Takes the folder that `options` say, or the next free one below `runs` for a run called `name`.
+    /// Claims the folder in `options`, or else the next free one below `runs` for `name`.
     pub(super) fn new(options: &Options, name: &str, manifest: &Manifest) -> Result<Self, RunError> {
         let Some(out) = &options.out else {
             let folder = next_free(name).map_err(RunError::Output)?;
@@ -65,7 +65,7 @@ impl Claim {
         fs::create_dir_all(out).map_err(|error| RunError::Output(unmade(out, &error)))?;
         let mut claim =
             Self { folder: out.clone(), finished: None, outdated: None, lock: lock(out).map_err(RunError::Output)? };
-        // Again under the lock: another run may just have ended.
+        // The check is repeated under the lock, because another run may have ended in between.
         if free(out).map_err(RunError::Output)? {
             return Ok(claim);
         }
@@ -75,10 +75,10 @@ impl Claim {
             Existing::Keep => claim.keep(manifest),
             Existing::Resume => {
                 let old = Manifest::read(out).map_err(RunError::Output)?;
-                let shard = (old.shard != manifest.shard).then_some("which shard of it this is");
+                let shard = (old.shard != manifest.shard).then_some("the number of its shard");
                 if let Some(what) = manifest.differs(&old).or(shard) {
                     let fault = Fault::new("the folder holds another run", &out.join(manifest::NAME)).value(what);
-                    let remedy = "run what was run before, choose a new folder with --out, or --overwrite";
+                    let remedy = "repeat the earlier run, choose a new folder with --out, or --overwrite";
                     return Err(RunError::Output(fault.remedy(format!("it differs; {remedy}"))));
                 }
                 claim.finished = ["finished", "shard"].contains(&&old.state[..]).then_some(old);
@@ -89,11 +89,11 @@ impl Claim {
 }
 
 impl Claim {
-    /// Keeps the run that is there where its results are those of the run that `manifest` describes; makes room otherwise.
+    /// Keeps the existing run if its results are those that `manifest` describes; otherwise makes room.
     fn keep(mut self, manifest: &Manifest) -> Result<Self, RunError> {
         let old = Manifest::read(&self.folder).map_err(RunError::Output)?;
         if old.timed != manifest.timed {
-            // Nobody can make the same durations again.
+            // Durations cannot be reproduced.
             let fault = Fault::new("the folder holds another run", &self.folder.join(manifest::NAME));
             let fault = fault.value("whether durations are logged differs");
             return Err(RunError::Output(fault.remedy("choose another folder, or remove the run with --overwrite")));
@@ -101,26 +101,26 @@ impl Claim {
         if old.stands_for(manifest, &self.folder) {
             self.finished = Some(old);
         } else if old.state == "finished" || old.shard.is_some() || manifest.differs(&old).is_some() {
-            // What is there of a run that was not finished is continued by the program that began it only.
+            // Only the program that began an unfinished run resumes it.
             self.outdated = Some(old.outdated(manifest));
             clear(&self.folder)?;
         }
         Ok(self)
     }
 
-    /// Whether the folder is still the one that was taken: what is made below a name does not tell that another has it since.
+    /// Checks that the folder is still the claimed one: another process may have replaced it under the same name.
     pub(super) fn holds(&self) -> Result<(), RunError> {
         if is_at(&self.lock.file, &self.lock.path) {
             return Ok(());
         }
         let fault = Fault::new("the output folder was removed or replaced while the run was made", &self.folder);
         Err(RunError::Output(
-            fault.remedy("what is in it is not the whole run: run again with --overwrite, or with another --out"),
+            fault.remedy("its content is not the complete run; run again with --overwrite, or with another --out"),
         ))
     }
 }
 
-/// Whether there is no folder, or nothing in it but what a run leaves that was killed before it began.
+/// Whether the folder is absent or empty, apart from the lock of a run killed before it began.
 fn free(out: &Path) -> Result<bool, Fault> {
     let entries = match fs::read_dir(out) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),
@@ -143,14 +143,14 @@ fn taken(out: &Path) -> Fault {
 }
 
 fn unmade(path: &Path, error: &std::io::Error) -> Fault {
-    let fault = Fault::new(format!("cannot make the output folder ({error})"), path);
+    let fault = Fault::new(format!("cannot create the output folder ({error})"), path);
     if path.is_file() {
-        return fault.remedy("a file is there: name a new folder with --out");
+        return fault.remedy("a file has this name; give a new folder with --out");
     }
-    fault.remedy("choose another with --out, or make room and rights for it")
+    fault.remedy("check free space and permissions, or choose another with --out")
 }
 
-/// Takes the lock of a folder, or says who has it.
+/// Locks a folder, or reports the process that holds the lock.
 fn lock(folder: &Path) -> Result<Lock, Fault> {
     let path = folder.join(LOCK);
     let failed = |error: &std::io::Error| unmade(&path, error);
@@ -171,7 +171,7 @@ fn lock(folder: &Path) -> Result<Lock, Fault> {
         }
         Err(TryLockError::Error(error)) => return Err(failed(&error)),
     }
-    // A run that ended just now took the file away between opening and locking: what is locked is then no lock.
+    // A run that just ended may have removed the file between opening and locking; such a lock is void.
     if !is_at(&file, &path) {
         return lock(folder);
     }
@@ -181,7 +181,7 @@ fn lock(folder: &Path) -> Result<Lock, Fault> {
     Ok(Lock { path, file })
 }
 
-/// Whether a file that is open is the one that has this name now.
+/// Whether an open file is still the one with this name.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -189,13 +189,13 @@ fn is_at(file: &File, path: &Path) -> bool {
     file.metadata().is_ok_and(|open| fs::metadata(path).is_ok_and(|named| same(&open, &named)))
 }
 
-/// Elsewhere a file that is open keeps its name.
+/// Other systems do not rename or remove an open file.
 #[cfg(not(unix))]
 fn is_at(_file: &File, path: &Path) -> bool {
     path.exists()
 }
 
-/// The machine's name, where it says one.
+/// The name of the machine, if there is one.
 fn host() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").ok();
     let name = name.or_else(|| std::env::var("HOSTNAME").or_else(|_| std::env::var("COMPUTERNAME")).ok());
@@ -204,7 +204,7 @@ fn host() -> String {
         .unwrap_or_else(|| "a nameless host".to_owned())
 }
 
-/// Removes the run in a folder; what no run makes stops it.
+/// Removes the run in a folder. An unknown file in it is a fault.
 fn clear(out: &Path) -> Result<(), RunError> {
     let failed = |path: &Path, error: std::io::Error| RunError::unwritable(path, error);
     let names: Vec<String> = fs::read_dir(out)
@@ -218,11 +218,11 @@ fn clear(out: &Path) -> Result<(), RunError> {
             || [".mcap", store::POSE_GRAPH].iter().any(|end| name.ends_with(end))
     };
     if let Some(foreign) = names.iter().find(|name| !own(name)) {
-        let fault = Fault::new("the output folder holds something that no run made", &out.join(foreign));
+        let fault = Fault::new("the output folder holds a file that is not part of a run", &out.join(foreign));
         return Err(RunError::Output(fault.remedy("move it away, or choose a new folder with --out")));
     }
     Store::of(out).remove()?;
-    // The manifest last: what is killed here is still a run.
+    // The manifest is removed last, so that an interruption leaves a recognisable run.
     let rest = names.iter().filter(|name| *name != LOCK && *name != manifest::NAME && *name != "pieces");
     for name in rest.map(String::as_str).chain([manifest::NAME]) {
         let path = out.join(name);
@@ -235,7 +235,7 @@ fn clear(out: &Path) -> Result<(), RunError> {
     Ok(())
 }
 
-/// A new folder below `runs`.
+/// Creates a new folder below `runs`.
 fn next_free(name: &str) -> Result<PathBuf, Fault> {
     let runs = Path::new("runs");
     fs::create_dir_all(runs).map_err(|error| unmade(runs, &error))?;
@@ -247,5 +247,5 @@ fn next_free(name: &str) -> Result<PathBuf, Fault> {
             Err(error) => return Err(unmade(&folder, &error)),
         }
     }
-    unreachable!("some number is free")
+    unreachable!("there is a free number")
 }

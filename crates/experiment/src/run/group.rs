@@ -1,4 +1,4 @@
-//! The trials that see the same passage, and what they make of its frames.
+//! The trials with the same sequence, and their results for its frames.
 
 use std::path::Path;
 
@@ -20,36 +20,35 @@ use super::{
 };
 use crate::{ImagesLogged, Plan, Trial, judge::Evaluator, odometry_fault::Motions, pictures::Levels, record};
 
-/// The trials that see the same passage: they share its frames, so that they are compared on the
-/// same noise.
+/// The trials with the same sequence. They share its frames, so that they are compared on the same noise.
 pub(crate) struct Group<'a> {
     pub(crate) sequence: Box<dyn Sequence>,
     pub(crate) trials: Vec<&'a Trial>,
-    /// Which of their stages are the same.
+    /// The stages with equal settings.
     sharing: Sharing,
-    /// What each trial searches for.
+    /// The targets of each trial.
     targets: Vec<Vec<Target>>,
-    /// The network of an earlier run that each trial reads.
+    /// The pose graph of an earlier run for each trial.
     pose_graphs: Vec<Option<PoseGraph>>,
-    /// What the log of each trial begins with.
+    /// The log header of each trial.
     pub(crate) headers: Vec<TrialHeader>,
-    /// About how much log (bytes) one frame takes.
+    /// The approximate size of a frame in a log (bytes).
     pub(super) frame_bytes: u64,
 }
 
-/// The trials of a group on their way from frame to frame.
+/// The odometries and navigation sessions of a group.
 pub(super) struct Sessions<'a> {
-    /// Of each trial that is the first with its odometry.
+    /// The odometry of each trial that is the first with it.
     odometries: Vec<Option<TrialOdometry<'a>>>,
-    /// Of each trial that navigates.
+    /// The session of each trial that navigates.
     trials: Vec<Option<NavigationSession<'a>>>,
 }
 
 impl Sessions<'_> {
-    /// Each odometry takes the next frame.
+    /// Processes the next frame with each odometry.
     ///
     /// # Errors
-    /// A sentence: the frame is no stereo pair, or not after the one before.
+    /// The cause as a sentence: a frame without images, or one that is not later than the previous frame.
     fn advance(&mut self, sensor_frame: &SensorFrame) -> Result<Vec<Option<OdometryResult>>, String> {
         let advance =
             |one: &mut Option<TrialOdometry<'_>>| one.as_mut().map(|one| one.advance(sensor_frame)).transpose();
@@ -59,26 +58,27 @@ impl Sessions<'_> {
         }
     }
 
-    /// Of each trial the network that it laid, where that is kept.
+    /// The pose graph of each trial that keeps one.
     pub(super) fn pose_graphs(self) -> impl Iterator<Item = Option<String>> {
         self.trials.into_iter().map(|session| session.and_then(NavigationSession::pose_graph))
     }
 }
 
-/// What every trial of a group made of one frame, each object by itself.
+/// The results of every trial of a group for one frame, before joint fixes.
 pub(super) struct GroupFrame {
     sensor_frame: SensorFrame,
-    /// What there was to see, and what of it was searched for, where that is not the passage's.
+    /// The site and the targets of the frame, if they are not those of the sequence.
     own: Option<(Site, Vec<Target>)>,
-    /// Of each trial, what it saw, and what it knew then if it navigates.
+    /// The result of each trial, and its state if it navigates.
     frame_results: Vec<(FrameResult, Option<NavigationState>)>,
-    /// Of each trial, which of its stages it shared.
+    /// The stages that each trial shared.
     shared: Vec<SharedStages>,
-    /// Of each trial, what a joint fix takes from it.
+    /// The observations for a joint fix of each trial.
     pub(super) observations_by_frame: Vec<ObjectObservations>,
 }
 
-/// Opens every source once and checks what it needs. Trials share their stages, unless each is measured `separate`ly.
+/// Opens every source once and checks the requirements of its trials. Trials share stages unless they are measured
+/// `separate`ly.
 pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunError> {
     let mut groups: Vec<Group<'_>> = Vec::new();
     let mut faults = Vec::new();
@@ -107,7 +107,7 @@ pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunErr
         for trial in &group.trials {
             let kind = trial.stages.settings().target;
             if group.sequence.posed() && kind != TargetKind::Object {
-                let what = "every problem is about an object of its own, and stands in no site";
+                let what = "a coherence problem has no site";
                 faults.push(Fault::new(what, Path::new(group.sequence.name())).remedy("use target = \"object\""));
                 continue;
             }
@@ -131,47 +131,46 @@ pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunErr
     if faults.is_empty() { Ok(groups) } else { Err(RunError::Input(faults)) }
 }
 
-/// The settings of a trial's key frames, where it has any.
+/// The settings of a trial's key frames, if there are any.
 fn keyframes(trial: &Trial) -> Option<&Keyframes> {
     trial.navigation_stack.as_ref()?.pose_graph.as_ref()
 }
 
-/// Why no trial can navigate through `sequence`.
+/// The fault that prevents navigation through `sequence`.
 fn unnavigable(sequence: &dyn Sequence, navigation_stack: &NavigationStack, targets: &[Target]) -> Option<Fault> {
     let fault = |what: &str, remedy: &str| {
         Some(Fault::new(format!("navigation {what}"), Path::new(sequence.name())).remedy(remedy))
     };
     if !sequence.images() {
-        return fault("needs images, and this source gives points", "leave [navigation] out");
+        return fault("needs images, but this source has points", "remove [navigation]");
     }
     if navigation_stack.listens() && !sequence.has_readings() {
-        let remedy =
-            "navigate by images, odometry = \"stereo\", or take a dive or a data set with `doppler` and `gyro`";
-        return fault("goes by a Doppler log and a gyro, and they are not both heard here", remedy);
+        let remedy = "use odometry = \"stereo\", or a dive or a data set with `doppler` and `gyro`";
+        return fault("needs readings of a Doppler log and a gyro, which this source does not have", remedy);
     }
     let lost = targets.iter().find(|target| target.world_from_object.is_none())?;
-    let what = format!("needs to know where every object stands; `{}` has no place in the world", lost.name);
-    fault(&what, "add its `base_in_world` to the site, or leave [navigation] out")
+    let what = format!("needs the pose of every object; `{}` has none in the world", lost.name);
+    fault(&what, "add its `base_in_world` to the site, or remove [navigation]")
 }
 
 impl Group<'_> {
-    /// The files that its trials read besides the source's, with their SHA-256.
+    /// The files other than the source's that its trials read, with their SHA-256.
     pub(crate) fn pose_graphs_read(&self) -> impl Iterator<Item = (String, String)> {
         let read = self.trials.iter().filter_map(|trial| keyframes(trial)).filter(|one| !one.read.is_empty());
         read.map(|keyframes| (keyframes.read.clone(), keyframes.sha256.clone()))
     }
 
-    /// How many frames before its own the answer to a frame looks back on.
+    /// The number of preceding frames in a joint fix.
     pub(super) fn window_length(&self) -> usize {
         self.trials.iter().map(|trial| trial.stages.window_length()).max().unwrap_or(0)
     }
 
-    /// Whether what any trial knows after a frame is carried to the next.
+    /// Whether the state of a trial is carried from frame to frame.
     pub(super) fn navigates(&self) -> bool {
         self.trials.iter().any(|trial| trial.navigation_stack.is_some())
     }
 
-    /// Sets out with every trial that navigates.
+    /// Begins the sessions of the trials that navigate.
     pub(super) fn sessions(&self) -> Sessions<'_> {
         let trials = self.trials.iter().zip(&self.targets).zip(&self.pose_graphs);
         let sessions = trials.map(|((trial, targets), pose_graph)| {
@@ -191,13 +190,13 @@ impl Group<'_> {
         Sessions { odometries: odometries.collect(), trials: sessions.collect() }
     }
 
-    /// One frame through every trial. The sight is made once, and so is what trials share. `sessions` are the trials' ways
-    /// until here.
+    /// Processes one frame with every trial. The frame and the common stages are computed once. `sessions` have
+    /// processed the frames before.
     pub(super) fn observe(&self, index: usize, sessions: &mut Sessions<'_>) -> Result<GroupFrame, Fault> {
         let (sequence, number) = (&*self.sequence, self.sequence.number(index));
         let sensor_frame = sequence.sensor_frame(index)?;
         let own = own_site(&sensor_frame).map(|site| {
-            let targets = site.targets(TargetKind::Object).expect("an object by itself needs no world");
+            let targets = site.targets(TargetKind::Object).expect("targets of single objects need no world");
             (site, targets)
         });
         let fault = |what: String| Fault::new(what, Path::new(sequence.name())).value(format!("frame {number}"));
@@ -224,7 +223,7 @@ impl Group<'_> {
                 }
             }
         };
-        // Where frames must wait for each other, trials need not.
+        // Trials of one frame run in parallel where frames must run in sequence.
         let frame_results: Result<Vec<_>, String> = match self.navigates() {
             true => sessions.trials.par_iter_mut().enumerate().map(observe).collect(),
             false => sessions.trials.iter_mut().enumerate().map(observe).collect(),
@@ -244,9 +243,9 @@ impl Group<'_> {
         Ok(GroupFrame { sensor_frame, own, frame_results, shared: stages, observations_by_frame })
     }
 
-    /// The records of one frame, a trial each: what is solved together is joined, then truth is asked. `observations_by_frame` are
-    /// those of the frames before, the last of them the frame's own. Of a record that `logged` does not want, by the
-    /// trial's place and what tables hold of it, only that is made. Beside them the frame's images, for the logs.
+    /// The records of one frame, one a trial: joint fixes first, then the evaluation. `observations_by_frame` are those
+    /// of the preceding frames and, last, of this one. `logged` decides, by the index of the trial and its tabular
+    /// record, whether the complete record is made. The frame's images for the logs are returned too.
     pub(super) fn record(
         &self,
         index: usize,
@@ -295,13 +294,13 @@ impl Group<'_> {
     }
 }
 
-/// What a trial searches for in a frame: the frame's `own`, or what it always does.
+/// The targets of a trial in a frame: the frame's `own`, or those of the sequence.
 fn searched<'a>(own: &'a Option<(Site, Vec<Target>)>, always: &'a [Target]) -> &'a [Target] {
     own.as_ref().map_or(always, |(_, targets)| targets)
 }
 
-/// About how much log (bytes) one frame of a passage takes for one trial, by its first. Images, losslessly compressed to
-/// some 0.7 of their size, are nearly all of it where they are logged.
+/// The approximate size (bytes) of a frame in one trial's log, from the first frame. Logged images dominate; lossless
+/// compression reduces them to about 0.7 of their size.
 fn frame_bytes(sequence: &dyn Sequence, level: ImagesLogged) -> Result<u64, Fault> {
     const CLOUD_BYTES: f64 = 150e3;
     if sequence.images() {
@@ -316,6 +315,6 @@ fn frame_bytes(sequence: &dyn Sequence, level: ImagesLogged) -> Result<u64, Faul
         FrameData::Points(cloud) => cloud.len(),
         FrameData::Stereo(..) => 0,
     };
-    // As measured on logs of 3 to 50 points, and a little more.
+    // A fit to logs with 3 to 50 points, with some reserve.
     Ok(4000 + 350 * points as u64)
 }

@@ -1,4 +1,4 @@
-//! A part of a kept run, made again and compared.
+//! Verification of a stored run by repetition of a part.
 
 use std::{
     fs::{self, File},
@@ -17,21 +17,21 @@ use super::{
 };
 use crate::{Plan, manifest, manifest::Manifest, results::TrialRows};
 
-/// A part of a kept run that was made again.
+/// A repeated part of a stored run.
 #[derive(Debug)]
 pub struct Remade {
-    /// Its frames, over all trials.
+    /// The number of frames over all trials.
     pub frames: usize,
-    /// The trials whose rows or frames differ, and how.
+    /// The trials whose rows or frames differ, with the differences.
     pub differing: Vec<String>,
 }
 
-/// Makes one piece of the run in `folder` again, at most `frames` of its frames, and compares it with the run byte by byte.
-/// The identity of the run chooses the piece. The part is made in the folder that `options` say, which must not exist.
+/// Repeats one piece of the run in `folder` and compares it with the stored bytes. At most `frames` of its frames are
+/// repeated. The identity of the run selects the piece. The folder in `options` must not exist.
 ///
 /// # Errors
-/// [`RunError`]: a folder whose run is not complete or not that of `plan`, inputs that cannot be read, an output that cannot
-/// be written, or the observer's end.
+/// [`RunError`]: a folder without a complete run of `plan`, inputs that cannot be read, an output that cannot be
+/// written, or an interruption by the observer.
 pub fn remake(
     plan: &Plan,
     folder: &Path,
@@ -45,8 +45,8 @@ pub fn remake(
     let pieces = partition::cut(&groups);
     let manifest = Manifest::new(plan, options, &groups, pieces.len()).map_err(input)?;
     if !kept.stands_for(&manifest, folder) {
-        let fault = Fault::new("not the run that would be made now", &folder.join(manifest::NAME));
-        return Err(input(fault.value(kept.outdated(&manifest)).remedy("`seafix publish` makes it again")));
+        let fault = Fault::new("the stored run is outdated", &folder.join(manifest::NAME));
+        return Err(input(fault.value(kept.outdated(&manifest)).remedy("`seafix publish` repeats it")));
     }
     let chosen = u64::from_str_radix(&kept.identity[..16], 16).unwrap_or(0) % pieces.len() as u64;
     let piece = pieces[chosen as usize].shortened(frames);
@@ -57,7 +57,7 @@ pub fn remake(
     if !worker::work(&groups, &[&piece], &store, &options.pool()?, false, observer)? {
         return Err(RunError::Interrupted(folder.to_owned()));
     }
-    let lost = || RunError::Output(Fault::new("a piece that was not stored as it was made", scratch.0));
+    let lost = || RunError::Output(Fault::new("a piece that was not stored correctly", scratch.0));
     let sealed = store.sound(piece.number).ok_or_else(lost)?;
     let results = folder.join("results.csv");
     let table =
@@ -76,11 +76,11 @@ pub fn remake(
     Ok(Remade { frames: piece.frames() * group.trials.len(), differing })
 }
 
-/// A folder that is removed with what was made in it.
+/// A temporary folder, removed with its content when dropped.
 struct Scratch<'a>(&'a Path);
 
 impl<'a> Scratch<'a> {
-    /// A folder that is there already is somebody's: it is no scratch.
+    /// An existing folder belongs to someone else and is rejected.
     fn new(path: &'a Path) -> Result<Self, RunError> {
         fs::create_dir(path).map(|()| Self(path)).map_err(|error| RunError::unwritable(path, error))
     }
@@ -97,7 +97,7 @@ fn said(group: &group::Group<'_>, piece: &Piece) -> String {
     format!("frames {} to {}", number(piece.first), number(piece.end.max(piece.first + 1) - 1))
 }
 
-/// The rows of a trial, as text.
+/// The rows of a trial as text.
 fn rows(sealed: &Sealed, trial: &str) -> std::io::Result<String> {
     let Some(TrialRows { csv, text: (start, length), .. }) = sealed.scale_error(trial) else {
         return Ok(String::new());
@@ -108,7 +108,7 @@ fn rows(sealed: &Sealed, trial: &str) -> std::io::Result<String> {
     Ok(text)
 }
 
-/// Whether the frames of `made` are those of the same numbers in `log`.
+/// Whether the frames of `made` equal those with the same numbers in `log`.
 fn in_log(made: Reader, mut log: Reader) -> Result<bool, RunError> {
     for frame in made {
         let frame = frame?;
@@ -124,7 +124,7 @@ fn in_log(made: Reader, mut log: Reader) -> Result<bool, RunError> {
     Ok(true)
 }
 
-/// Equal, with one NaN equal to another.
+/// Equality in which NaN equals NaN.
 fn same(a: &FrameRecord, b: &FrameRecord) -> bool {
     a == b || format!("{a:?}") == format!("{b:?}")
 }

@@ -1,4 +1,4 @@
-//! The shards of a run become the run.
+//! Merging of the shards of a run.
 
 use std::path::{Path, PathBuf};
 
@@ -11,12 +11,12 @@ use super::{
 };
 use crate::manifest::{self, Manifest};
 
-/// Joins the shards in `folders` into a run in the folder of `options`: the same bytes, durations apart, as if it had been
-/// made at once. Shards may come from different machines, and from different ways to deal the run.
+/// Joins the shards in `folders` into a run in the folder of `options`. Except for durations, the bytes are those of an
+/// undivided run. Shards may come from different machines and from different divisions of the run.
 ///
 /// # Errors
-/// [`RunError`]: folders that hold no shard, shards of different runs, pieces that are missing or damaged, or an output
-/// that cannot be written.
+/// [`RunError`]: folders without shards, shards of different runs, missing or damaged pieces, or an output that cannot
+/// be written.
 pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
     let (mut manifest, pieces) = gather(folders).map_err(|fault| RunError::Input(vec![fault]))?;
     manifest.shard = None;
@@ -37,7 +37,7 @@ pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) ->
     Ok(Finished { folder: claim.folder, rows: manifest.rows, kept: false })
 }
 
-/// What the shards have in common, and all their pieces.
+/// The common manifest of the shards, and all their pieces.
 fn gather(folders: &[PathBuf]) -> Result<(Manifest, Vec<Sealed>), Fault> {
     let mut first: Option<(&Path, Manifest)> = None;
     let mut pieces: Vec<Option<Sealed>> = Vec::new();
@@ -47,7 +47,7 @@ fn gather(folders: &[PathBuf]) -> Result<(Manifest, Vec<Sealed>), Fault> {
         let file = folder.join(manifest::NAME);
         if manifest.state != "shard" {
             let fault = Fault::new("not a finished shard", &file).value(format!("a run, {}", manifest.state));
-            return Err(fault.remedy("make it with `seafix run --shard k/n`, or go on with --resume"));
+            return Err(fault.remedy("make it with `seafix run --shard k/n`, or resume it with --resume"));
         }
         match &first {
             None => {
@@ -73,16 +73,13 @@ fn gather(folders: &[PathBuf]) -> Result<(Manifest, Vec<Sealed>), Fault> {
     };
     let missing: Vec<usize> = (0..pieces.len()).filter(|&number| pieces[number].is_none()).collect();
     if let Some(piece) = damaged.iter().find(|(number, _)| missing.contains(number)) {
-        let fault = Fault::new("a piece that is damaged", &piece.1).value(format!(
-            "{} of {} are missing",
-            missing.len(),
-            pieces.len()
-        ));
+        let fault =
+            Fault::new("a damaged piece", &piece.1).value(format!("{} of {} are missing", missing.len(), pieces.len()));
         return Err(fault.remedy("make its shard again with --resume"));
     }
     if let Some(number) = missing.first() {
-        let what = format!("{} of {} pieces are in none of the folders", missing.len(), pieces.len());
-        // A piece knows nothing of shards, but they are dealt out in turn.
+        let what = format!("{} of {} pieces are missing in the folders", missing.len(), pieces.len());
+        // Pieces do not record their shard, but shards are dealt in turn.
         let of = manifest.shard.as_deref().and_then(|shard| shard.split_once('/')?.1.parse::<usize>().ok());
         let shard = of.map_or_else(String::new, |of| format!(", of shard {}/{of}", number % of + 1));
         return Err(Fault::new(what, Path::new("the command line"))

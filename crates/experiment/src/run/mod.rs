@@ -1,9 +1,9 @@
 //! The runner: every frame of every source through every trial's pipeline, into logs and tables.
 //!
-//! A run is cut into [`Piece`](cut::Piece)s: some successive frames of one source, led through every trial that shares
-//! it. Each piece is made by one thread and stored whole; when all are there they are joined into one log a trial and one
-//! table. The cut depends on the plan alone, so the answer depends neither on the number of threads, nor on which
-//! machine made which piece, nor on whether the run was interrupted and resumed.
+//! A run is divided into [`Piece`](partition::Piece)s: some successive frames of one source, processed by every trial
+//! that shares it. One thread computes a piece, which is stored when it is complete. All pieces are then joined into
+//! one log for each trial and one table. The partition depends on the plan alone, so that results do not depend on the
+//! number of threads, on the machines, or on interruptions.
 
 use std::path::{Path, PathBuf};
 
@@ -35,77 +35,77 @@ pub(crate) use group::open;
 use partition::Piece;
 use store::Store;
 
-/// Watches a run, and may end it. The runner itself prints nothing.
+/// An observer of a run that may stop it. The runner itself prints nothing.
 pub trait Observer: Sync {
-    /// The run begins: so many frames over all trials, about so many bytes of log, in this folder.
+    /// Reports the start: the number of frames over all trials, the approximate size of the logs, and the folder.
     fn begins(&self, _frames: usize, _bytes: u64, _folder: &Path) {}
-    /// So many of the frames are there already, from before the run was interrupted.
+    /// Reports the number of frames kept from before an interruption.
     fn resumes(&self, _frames: usize) {}
-    /// A run that was kept is made again, for this reason.
+    /// Reports that an existing run is repeated, and the reason.
     fn renews(&self, _reason: &str) {}
-    /// Something is odd about an input, but not wrong.
+    /// Reports a warning about an input.
     fn warns(&self, _warning: &Fault) {}
-    /// One more frame of `trial` is logged.
+    /// Reports that one more frame of `trial` is logged.
     fn frame(&self, _trial: &str) {}
-    /// Whether the run shall end: each thread then finishes its frame.
+    /// Whether to stop the run; each thread then finishes its frame.
     fn stops(&self) -> bool {
         false
     }
 }
 
-/// Watches nothing.
+/// An observer without output.
 #[derive(Debug, Clone, Copy)]
 pub struct Silent;
 impl Observer for Silent {}
 
-/// Why a run could not be finished.
+/// The reason why a run was not finished.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The inputs are wrong; nothing was written.
+    /// Invalid inputs; nothing was written.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Input(Vec<Fault>),
-    /// The output cannot be written.
+    /// An output that cannot be written.
     #[error("{0}")]
     Output(Fault),
-    /// A log cannot be written.
+    /// A log that cannot be written.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The observer ended it. What was done is kept.
-    #[error("interrupted; go on with `--resume --out {}`, or save what there is with `seafix recover {}`", .0.display(), .0.display())]
+    /// An interruption by the observer; the finished part is kept.
+    #[error("interrupted; resume with `--resume --out {}`, or recover the finished part with `seafix recover {}`", .0.display(), .0.display())]
     Interrupted(PathBuf),
 }
 
 impl RunError {
-    /// A file that cannot be written: which, how far it came, why.
+    /// The fault of a file that cannot be written, with the number of bytes written before.
     pub(crate) fn unwritable(path: &Path, error: impl std::fmt::Display) -> Self {
         let after =
             std::fs::metadata(path).map_or_else(|_| String::new(), |file| format!(", after {} bytes", file.len()));
         Self::Output(
-            Fault::new(format!("cannot write ({error}{after})"), path).remedy("make room on the disk and --resume"),
+            Fault::new(format!("cannot write ({error}{after})"), path).remedy("free some disk space and use --resume"),
         )
     }
 }
 
-/// A run that is complete, or its shard.
+/// A complete run or shard.
 #[derive(Debug)]
 pub struct Finished {
-    /// Its folder.
+    /// The folder.
     pub folder: PathBuf,
-    /// Attempts over all trials and frames; of a shard none are counted.
+    /// The number of attempts over all trials and frames; zero for a shard.
     pub rows: usize,
-    /// Whether it was there already, and nothing was made.
+    /// Whether the run existed already and nothing was computed.
     pub kept: bool,
 }
 
 /// Runs `plan` into a folder.
 ///
-/// The answer depends on the plan alone: not on the number of threads, not on earlier runs, not on interruptions.
-/// Without times ([`Options::timed`]) two runs of a plan have the same bytes. Logs and tables carry `.partial` until they
-/// are complete.
+/// The results depend on the plan alone: not on the number of threads, on earlier runs, or on interruptions. Without
+/// durations ([`Options::timed`]) two runs of a plan have the same bytes. Logs and tables have the extension `.partial`
+/// until they are complete.
 ///
 /// # Errors
-/// [`RunError`]: everything that is wrong with the inputs, before anything is written; or the output
-/// that could not be written; or that it was interrupted.
+/// [`RunError`]: all faults of the inputs, before anything is written; an output that cannot be written; an
+/// interruption.
 pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
     folder::inspect(options).map_err(RunError::Output)?;
     let groups = group::open(plan, options.separate)?;
@@ -119,11 +119,10 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     let mine: Vec<&Piece> = pieces.iter().filter(|piece| options.takes(piece.number)).collect();
     if let (true, Some(shard)) = (mine.is_empty(), options.shard) {
         let fault = Fault::new("an empty shard", &claim.folder).value(shard);
-        observer
-            .warns(&fault.remedy(format!("the run has {} pieces; more shards than that make nothing", pieces.len())));
+        observer.warns(&fault.remedy(format!("the run has {} pieces; use at most as many shards", pieces.len())));
     }
     let frames = |pieces: &[&Piece]| pieces.iter().map(|piece| piece.frames() * groups[piece.group].trials.len()).sum();
-    // A shard is what it is made of: one whose pieces were damaged since is made again.
+    // A shard whose pieces have been damaged since is computed again.
     let full = || mine.iter().all(|piece| Store::of(&claim.folder).sound(piece.number).is_some());
     if let Some(finished) = claim.finished.as_ref().filter(|_| options.shard.is_none() || full()) {
         if options.shard.is_none() {
@@ -132,7 +131,7 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
         return Ok(Finished { rows: finished.rows, folder: claim.folder, kept: true });
     }
     observer.begins(frames(&mine), partition::bytes(&groups, &mine), &claim.folder);
-    // First: a folder without it holds no run.
+    // The manifest is written first: a folder without it holds no run.
     manifest.write(&claim.folder, "running")?;
     let store = Store::open(&claim.folder)?;
     let (made, missing): (Vec<&Piece>, Vec<&Piece>) =

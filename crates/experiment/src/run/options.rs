@@ -1,4 +1,4 @@
-//! How a plan is run: what does not change the answer.
+//! Options of a run that do not change its results.
 
 use std::{
     fmt,
@@ -11,26 +11,26 @@ use seafix_component::Fault;
 
 use super::RunError;
 
-/// Where a run goes, who works on it, and on how much of it.
+/// The options of a run: its folder, its threads and its part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
-    /// The folder of the run; the next free one below `runs` where none is given.
+    /// The folder of the run; by default the next free one below `runs`.
     pub out: Option<PathBuf>,
-    /// What becomes of a run that is there already.
+    /// The treatment of an existing run.
     pub existing: Existing,
-    /// How many threads work.
+    /// The number of threads.
     pub threads: usize,
-    /// Make only this part of the run; [`merge`](super::merge) joins all parts.
+    /// The part of the run to compute; [`merge`](super::merge) joins all parts.
     pub shard: Option<Shard>,
-    /// Whether durations are logged: without them two runs of a plan have the same bytes.
+    /// Whether durations are logged. Without them two runs of a plan have the same bytes.
     pub timed: bool,
-    /// Whether every trial computes all of its stages itself, so that its durations are its own; else trials with equal
-    /// stages share them.
+    /// Whether every trial computes all of its stages, so that its durations are its own. Otherwise trials share equal
+    /// stages.
     pub separate: bool,
 }
 
 impl Options {
-    /// A run into `out` by one thread, which must be a new or an empty folder.
+    /// A run by one thread into `out`, a new or an empty folder.
     pub fn into(out: impl Into<PathBuf>) -> Self {
         Self {
             out: Some(out.into()),
@@ -42,35 +42,35 @@ impl Options {
         }
     }
 
-    /// The threads that work.
+    /// The thread pool.
     pub(super) fn pool(&self) -> Result<ThreadPool, RunError> {
         let threads = self.threads.max(1);
         ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
             let fault = Fault::new(format!("no threads ({error})"), Path::new("the machine")).value(threads);
-            RunError::Output(fault.remedy("ask for fewer with --threads"))
+            RunError::Output(fault.remedy("give a smaller number with --threads"))
         })
     }
 
-    /// Whether the piece of this number is to be made.
+    /// Whether the piece of this number is to be computed.
     pub(super) fn takes(&self, piece: usize) -> bool {
         self.shard.is_none_or(|shard| piece % shard.of == shard.number - 1)
     }
 }
 
-/// What becomes of a run that is in the folder already.
+/// The treatment of an existing run in the folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {
-    /// It stays, and the new run is refused.
+    /// It remains, and the new run is rejected.
     Refuse,
-    /// It is continued, if it is the same run.
+    /// It is resumed if it is the same run.
     Resume,
     /// It is removed.
     Overwrite,
-    /// It stays if its results are those of the new run, or is continued if it is the same run; else it is removed.
+    /// It remains if it has the new run's results, and is resumed if it is the same run; otherwise it is removed.
     Keep,
 }
 
-/// One of several parts that a run is dealt into, piece by piece: `2/7` is the second of seven.
+/// A part of a run that is divided piece by piece: `2/7` is the second of seven.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     number: usize,
@@ -90,7 +90,7 @@ impl FromStr for Shard {
         let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((number, of)) if 1 <= number && number <= of && of <= 1_000_000 => Ok(Self { number, of }),
-            _ => Err(format!("`{text}` is no shard; write k/n with 1 <= k <= n <= 1000000, for instance 2/7")),
+            _ => Err(format!("`{text}` is not a shard; write k/n with 1 <= k <= n <= 1000000, for instance 2/7")),
         }
     }
 }

@@ -1,60 +1,60 @@
-//! How a run is cut into pieces: by the plan alone.
+//! Partition of a run into pieces, determined by the plan alone.
 
 use super::group::Group;
 use crate::log_decimation::Thinned;
 
-/// Some successive frames of one source, led through every trial that shares it: what one thread makes at a time, what a
-/// kill costs at most, and what shards are made of.
+/// A sequence of successive frames of one source, processed by every trial that shares the source. It is the unit of
+/// work of a thread, of loss after an interruption, and of shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Piece {
-    /// Its place in the run.
+    /// The index in the run.
     pub(super) number: usize,
-    /// The place of its source's group of trials.
+    /// The index of the source's group of trials.
     pub(super) group: usize,
-    /// Its first frame.
+    /// The first frame.
     pub(super) first: usize,
-    /// The frame behind its last.
+    /// The frame after the last.
     pub(super) end: usize,
-    /// Of so many frames one is logged, whatever came of it.
+    /// The decimation factor k: frames whose index is a multiple of k are always logged.
     every: u64,
-    /// So many failures are logged besides.
+    /// The number of failures that are logged in addition.
     failures: u64,
 }
 
 impl Piece {
-    /// How many frames, for each trial.
+    /// The number of frames of each trial.
     pub(super) fn frames(&self) -> usize {
         self.end - self.first
     }
 
-    /// The same with at most its first `frames` frames, one at least.
+    /// The same piece with at most its first `frames` frames, at least one.
     pub(super) fn shortened(&self, frames: usize) -> Self {
         Self { end: self.end.min(self.first + frames.max(1)), ..*self }
     }
 
-    /// Which of its frames are logged.
+    /// The filter for its logged frames.
     pub(super) fn thinned(&self) -> Thinned {
         Thinned::new(self.every, self.failures)
     }
 
-    /// How many frames are logged of each trial where this share of them fails.
+    /// The number of logged frames of each trial if the fraction `failing` fails.
     pub(super) fn expected(&self, failing: f64) -> f64 {
         let regular = (self.end as u64).div_ceil(self.every) - (self.first as u64).div_ceil(self.every);
         let others = self.frames() as f64 - regular as f64;
         regular as f64 + (others * failing).min(self.failures as f64)
     }
 
-    /// How many frames at most are logged of each trial.
+    /// The maximum number of logged frames of each trial.
     fn logged(&self) -> u64 {
         let regular = (self.end as u64).div_ceil(self.every) - (self.first as u64).div_ceil(self.every);
         (regular + self.failures).min(self.frames() as u64)
     }
 }
 
-/// All logs of point-level trials together stay below this (bytes).
+/// The limit of all logs without images together (bytes).
 const MAX_LOG: u64 = 900_000_000;
 
-/// The pieces of a run, source after source.
+/// The pieces of a run, source by source.
 pub(super) fn cut(groups: &[Group<'_>]) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
     let points = groups.iter().filter(|group| !group.sequence.images());
@@ -69,7 +69,7 @@ pub(super) fn cut(groups: &[Group<'_>]) -> Vec<Piece> {
             false => thinning(frames as u64, group.frame_bytes, max),
         };
         for k in 0..count {
-            // The failures that may be logged are dealt out evenly, so that pieces know nothing of each other.
+            // The budget of logged failures is divided evenly, so that pieces are independent of each other.
             let fraction = |k: usize| failures * k as u64 / count as u64;
             let (first, end) = ((k * size).min(frames), ((k + 1) * size).min(frames));
             let failures = fraction(k + 1) - fraction(k);
@@ -79,8 +79,9 @@ pub(super) fn cut(groups: &[Group<'_>]) -> Vec<Piece> {
     pieces
 }
 
-/// The most (bytes) that a trial's log may have, so that all together stay below [`MAX_LOG`]: what small ones leave, large ones
-/// take. Of each group what a whole log of one of its trials would have, and how many trials there are.
+/// The maximum size (bytes) of a trial's log for which all logs together stay below [`MAX_LOG`]; large logs use the
+/// space that small ones leave. For each group, `groups` has the size of a trial's complete log and the number of
+/// trials.
 fn level(groups: impl Iterator<Item = (u64, u64)>) -> u64 {
     let mut groups: Vec<(u64, u64)> = groups.collect();
     groups.sort_unstable();
@@ -95,15 +96,15 @@ fn level(groups: impl Iterator<Item = (u64, u64)>) -> u64 {
     u64::MAX
 }
 
-/// How many frames a piece of `group`, one of `groups`, has: few enough that some dozen pieces keep all threads busy and
-/// that their rows fit into memory, many enough that their files, each of which begins with all that is the same for its
-/// trial, are no burden, and that what joint fixes look back on is little beside.
+/// The number of frames of a piece of `group`, one of `groups`. It is small enough for some dozen pieces, which keep
+/// all threads busy and whose rows fit into memory. It is large enough to make the header of every file and the window
+/// of joint fixes negligible.
 fn size(group: &Group<'_>, groups: usize) -> usize {
-    /// The most rows, over all trials.
+    /// The maximum number of rows over all trials.
     const ROWS: usize = 32_768;
     let frames = group.sequence.frames();
     if group.navigates() {
-        // What is known after a frame is carried to the next: one piece.
+        // A navigation session carries its state from frame to frame, so that its source is one piece.
         return frames.max(1);
     }
     let (min, max) = if group.sequence.images() { (1, 8) } else { (16, 8192) };
@@ -111,19 +112,19 @@ fn size(group: &Group<'_>, groups: usize) -> usize {
     size.max(4 * group.window_length())
 }
 
-/// Into how many pieces each of so many groups is cut at most: 64, or so many that all groups together have 256.
+/// The maximum number of pieces of each group: 64, or fewer if all groups together have more than 256.
 fn pieces(groups: usize) -> usize {
     (256 / groups.max(1)).clamp(2, 64)
 }
 
-/// Of `frames` frames of about `bytes` each, what a log of at most `max` bytes holds: all, or every k-th in half of it
-/// and failures in the other half.
+/// The decimation of a log to at most `max` bytes. A log of `frames` frames with about `bytes` each keeps all frames,
+/// or every k-th in one half and failures in the other.
 fn thinning(frames: u64, bytes: u64, max: u64) -> (u64, u64) {
     let fit = (max / bytes.max(1)).max(2);
     if frames <= fit { (1, 0) } else { (frames.div_ceil(fit / 2), fit / 2) }
 }
 
-/// About how much log (bytes) some pieces write.
+/// The approximate size (bytes) of the logs of these pieces.
 pub(super) fn bytes(groups: &[Group<'_>], pieces: &[&Piece]) -> u64 {
     let of = |piece: &&Piece| {
         let group = &groups[piece.group];

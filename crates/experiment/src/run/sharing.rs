@@ -1,4 +1,4 @@
-//! Stages that several trials of a group share: each is computed once a frame.
+//! Stages that several trials of a group share, computed once a frame.
 
 use std::sync::{
     OnceLock,
@@ -10,7 +10,7 @@ use seafix_log::SharedStages;
 
 use crate::Trial;
 
-/// The trials of a group that have a stage in common: for each trial the place of the first that has the same.
+/// The common stages of a group's trials: for each trial, the index of the first trial with the same stage.
 #[derive(Debug)]
 pub(super) struct Sharing {
     front_end: Vec<usize>,
@@ -19,7 +19,7 @@ pub(super) struct Sharing {
 }
 
 impl Sharing {
-    /// Stages with equal resolved settings are shared; if trials are measured `separate`ly, none is.
+    /// Stages with equal resolved settings are shared, unless trials are measured `separate`ly.
     pub(super) fn of(trials: &[&Trial], separate: bool) -> Self {
         let first_alike = |alike: fn(&Trial, &Trial) -> bool| -> Vec<usize> {
             let first = |place: usize| {
@@ -40,7 +40,7 @@ impl Sharing {
         self.odometry[trial]
     }
 
-    /// The stages of `frame_result` that this trial shares in a frame.
+    /// The stages of `frame_result` that this trial shares.
     pub(super) fn shared(&self, trial: usize, frame: &SharedFrame, frame_result: &FrameResult) -> SharedStages {
         let observed = frame_result.times.detect_ms.is_some();
         let searched = frame_result.attempts.iter().any(|attempt| attempt.times.search_ms.is_some());
@@ -61,8 +61,8 @@ fn same_front_end(a: &Trial, b: &Trial) -> bool {
     stages(a) == stages(b)
 }
 
-/// The search starts from the priors of a frame only where no trial navigates. Where shells grow, what is drawn for one
-/// target depends on what the solver made of the one before.
+/// Searches are shared only without navigation, because they then start from the same priors. With expanding gates the
+/// random numbers of one target depend on the solver's result for the previous one.
 fn same_search(a: &Trial, b: &Trial) -> bool {
     let searched = |trial: &Trial| {
         let Pipeline { target, gate, tolerance, search, .. } = trial.resolved.pipeline.clone();
@@ -77,7 +77,7 @@ fn same_odometry(a: &Trial, b: &Trial) -> bool {
     odometry(a).is_some() && odometry(a) == odometry(b)
 }
 
-/// What is shared in one frame; it goes with the frame.
+/// The shared results of one frame.
 #[derive(Debug)]
 pub(super) struct SharedFrame {
     clouds: Vec<Shared<Cloud>>,
@@ -98,7 +98,7 @@ impl SharedFrame {
         self.clouds[sharing.front_end[trial]].get(make)
     }
 
-    /// The answers of a trial's search to every target; `None` where its search is its own.
+    /// The search results of a trial for every target; `None` if its search is not shared.
     pub(super) fn sought(
         &self,
         sharing: &Sharing,
@@ -111,7 +111,7 @@ impl SharedFrame {
     }
 }
 
-/// A result that the first who needs it computes.
+/// A result that its first user computes.
 #[derive(Debug)]
 struct Shared<T> {
     result: OnceLock<T>,

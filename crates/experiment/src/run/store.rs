@@ -1,7 +1,7 @@
-//! Where pieces lie until they are joined: `pieces/000012/` below the folder of the run.
+//! The store of pieces before they are joined: `pieces/000012/` below the folder of the run.
 //!
-//! A piece has one log a trial, the rows of all its trials as `rows.csv` and `rows.parquet`, and `seal.json`, written
-//! last: lengths and check sums. Its folder carries `.partial` until then, so that what has its name is whole.
+//! A piece has one log for each trial, the rows of all trials as `rows.csv` and `rows.parquet`, and `seal.json` with
+//! lengths and checksums, written last. Until then its folder has the extension `.partial`.
 
 use std::{
     collections::BTreeMap,
@@ -24,11 +24,11 @@ pub(super) struct Store {
     folder: PathBuf,
 }
 
-/// What a piece holds.
+/// The description of a complete piece.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Seal {
     format: String,
-    /// Its place in the run.
+    /// The index in the run.
     pub(super) piece: usize,
     first: usize,
     end: usize,
@@ -36,25 +36,25 @@ pub(super) struct Seal {
     files: BTreeMap<String, Sum>,
 }
 
-/// What of a piece is one trial's.
+/// The part of one trial in a piece.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct TrialPart {
     pub(super) name: String,
     pub(super) rows: usize,
-    /// Where its rows begin in `rows.csv`, and how long they are (bytes).
+    /// The offset of its rows in `rows.csv` and their length (bytes).
     text: (u64, u64),
-    /// The first of its row groups in `rows.parquet`, and how many.
+    /// The index of its first row group in `rows.parquet`, and their number.
     groups: (usize, usize),
 }
 
-/// Length and check sum of a file.
+/// The length and checksum of a file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Sum {
     bytes: u64,
     crc32: u32,
 }
 
-/// A piece that is whole.
+/// A complete piece.
 #[derive(Debug, Clone)]
 pub(super) struct Sealed {
     folder: PathBuf,
@@ -67,13 +67,13 @@ impl Sealed {
         self.folder.join(format!("{trial}.mcap"))
     }
 
-    /// The network that a trial laid, where it is kept.
+    /// The pose graph of a trial, if it keeps one.
     pub(super) fn pose_graph(&self, trial: &str) -> Option<PathBuf> {
         let name = pose_graph(trial);
         self.seal.files.contains_key(&name).then(|| self.folder.join(name))
     }
 
-    /// The rows of a trial, where this piece has some.
+    /// The rows of a trial, if this piece has any.
     pub(super) fn scale_error(&self, trial: &str) -> Option<TrialRows> {
         let part = self.seal.trials.iter().find(|part| part.name == trial)?;
         let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
@@ -81,10 +81,10 @@ impl Sealed {
     }
 }
 
-/// How the file of a trial's network ends.
+/// The extension of a trial's pose graph file.
 pub(super) const POSE_GRAPH: &str = ".pose-graph";
 
-/// The file of a trial's network.
+/// The file name of a trial's pose graph.
 pub(super) fn pose_graph(trial: &str) -> String {
     format!("{trial}{POSE_GRAPH}")
 }
@@ -94,14 +94,14 @@ const PARQUET: &str = "rows.parquet";
 const SEAL: &str = "seal.json";
 
 impl Store {
-    /// The pieces below the folder of a run; the folder for them is made.
+    /// Opens the pieces below the folder of a run, and creates their folder.
     pub(super) fn open(run: &Path) -> Result<Self, RunError> {
         let store = Self::of(run);
         fs::create_dir_all(&store.folder).map_err(|error| RunError::unwritable(&store.folder, error))?;
         Ok(store)
     }
 
-    /// The same of a run that is only read.
+    /// The pieces of a run that is only read.
     pub(super) fn of(run: &Path) -> Self {
         Self { folder: run.join("pieces") }
     }
@@ -110,12 +110,12 @@ impl Store {
         self.folder.join(format!("{number:06}"))
     }
 
-    /// Whether a piece is there.
+    /// Whether a piece exists.
     pub(super) fn has(&self, number: usize) -> bool {
         self.at(number).is_dir()
     }
 
-    /// A piece, if it is there and every check sum holds.
+    /// A piece, if it exists and every checksum agrees.
     pub(super) fn sound(&self, number: usize) -> Option<Sealed> {
         let folder = self.at(number);
         let seal: Seal = serde_json::from_slice(&fs::read(folder.join(SEAL)).ok()?).ok()?;
@@ -124,7 +124,7 @@ impl Store {
         full.then_some(Sealed { folder, seal })
     }
 
-    /// All pieces that are there and whole, in their order.
+    /// All complete pieces, in order.
     pub(super) fn all(&self) -> Vec<Sealed> {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
         let numbers: Vec<usize> = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
@@ -133,7 +133,7 @@ impl Store {
         all
     }
 
-    /// The pieces that are there and not what they were: their numbers and folders, in order.
+    /// The damaged pieces: numbers and folders, in order.
     pub(super) fn damaged(&self) -> Vec<(usize, PathBuf)> {
         let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
         let mut numbers: Vec<usize> = entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).collect();
@@ -156,7 +156,7 @@ impl Store {
     }
 }
 
-/// A piece that is being made.
+/// A piece in progress.
 pub(super) struct Draft {
     number: usize,
     partial: PathBuf,
@@ -164,7 +164,7 @@ pub(super) struct Draft {
 }
 
 impl Draft {
-    /// Begins a piece anew, whatever was there of it.
+    /// Begins a piece; remains of an earlier attempt are removed.
     pub(super) fn begin(store: &Store, number: usize) -> Result<Self, RunError> {
         let folder = store.at(number);
         let partial = folder.with_extension("partial");
@@ -177,12 +177,12 @@ impl Draft {
         Ok(Self { number, partial, folder })
     }
 
-    /// Where the log of a trial goes.
+    /// The path of a trial's log.
     pub(super) fn log(&self, trial: &str) -> PathBuf {
         self.partial.join(format!("{trial}.mcap"))
     }
 
-    /// Closes the logs of a piece that was stopped before its end: they can be read, but the piece is not whole.
+    /// Closes the logs of a stopped piece: they can be read, but the piece is incomplete.
     pub(super) fn abandon(self, outputs: Vec<Output>) -> Result<(), RunError> {
         for Output { mut log, thinned, .. } in outputs {
             log.totals(&thinned.totals)?;
@@ -191,7 +191,7 @@ impl Draft {
         Ok(())
     }
 
-    /// Closes the logs of a whole piece, writes its rows, and gives it its name.
+    /// Closes the logs of a complete piece, writes its rows, and renames its folder.
     pub(super) fn seal(self, first: usize, end: usize, outputs: Vec<Output>) -> Result<(), RunError> {
         let at = |name: &str| self.partial.join(name);
         let mut files: Vec<String> = vec![CSV.to_owned(), PARQUET.to_owned()];
@@ -220,7 +220,7 @@ impl Draft {
         });
         let files = sums.collect::<Result<_, RunError>>()?;
         let seal = Seal { format: FORMAT.to_owned(), piece: self.number, first, end, trials, files };
-        let text = serde_json::to_string(&seal).expect("a seal is plain data") + "\n";
+        let text = serde_json::to_string(&seal).expect("a seal has plain values") + "\n";
         fs::write(at(SEAL), text).map_err(|error| RunError::unwritable(&at(SEAL), error))?;
         fs::rename(&self.partial, &self.folder).map_err(|error| RunError::unwritable(&self.folder, error))
     }

@@ -1,4 +1,4 @@
-//! Pieces are made: each by one thread, whole.
+//! Computation of pieces, each by one thread.
 
 use std::sync::{
     Mutex,
@@ -16,12 +16,9 @@ use super::{
     partition::Piece,
     store::{Draft, Store},
 };
-use crate::{
-    log_decimation::Thinned,
-    results::{Row, Table},
-};
+use crate::{log_decimation::Thinned, results::Table};
 
-/// Makes all of `pieces`; `false` when the observer ended it before.
+/// Computes all `pieces`; `false` if the observer stopped it.
 pub(super) fn work(
     groups: &[Group<'_>],
     pieces: &[&Piece],
@@ -54,17 +51,17 @@ pub(super) fn work(
     }
 }
 
-/// What one trial writes of a piece.
+/// The output of one trial for a piece.
 pub(super) struct Output {
     pub(super) trial: String,
     pub(super) log: Writer,
     pub(super) thinned: Thinned,
     pub(super) table: Table,
-    /// The network that it laid, where that is kept.
+    /// The pose graph, if the trial keeps one.
     pub(super) pose_graph: Option<String>,
 }
 
-/// Makes one piece; `false` when it was stopped before its end, its logs then closed behind the last frame.
+/// Computes one piece; `false` if it was stopped. Its logs are then closed after the last frame.
 fn make(
     group: &Group<'_>,
     piece: &Piece,
@@ -113,7 +110,7 @@ fn make(
             if kept {
                 output.log.frame_with(&record, levels.pngs(trial.resolved.log.images))?;
             }
-            Row::of(&output.trial, &record).for_each(|row| output.table.add(&row));
+            output.table.add(&output.trial, &record);
             observer.frame(&output.trial);
         }
     }
@@ -124,7 +121,7 @@ fn make(
     Ok(true)
 }
 
-/// Leaves out what differs from run to run.
+/// Removes the durations, which differ from run to run.
 fn forget_times(record: &mut FrameRecord) {
     record.times = FrameTimes::default();
     record.targets.iter_mut().for_each(|target| target.times = TargetTimes::default());

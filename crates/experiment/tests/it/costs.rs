@@ -1,4 +1,4 @@
-//! Every experiment in `experiments/` says at its head what it costs in full.
+//! The cost comment at the head of every experiment in `experiments/`.
 
 use std::{
     collections::BTreeMap,
@@ -8,7 +8,7 @@ use std::{
 
 use seafix_experiment::{Plan, Trial};
 
-/// All experiment files below `folder`; the list of reports is none.
+/// All experiment files below `folder`, without the list of reports.
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -20,7 +20,8 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// What says how many frames a trial has: everything of its source, or, without what only changes how they look, its settings
+/// The key of a source's frame count: all of its settings, or only those outside of tables, which affect appearance
+/// only.
 /// outside of tables.
 fn key(trial: &Trial, full: bool) -> String {
     let mut source = trial.resolved.source.clone();
@@ -31,7 +32,8 @@ fn key(trial: &Trial, full: bool) -> String {
     format!("{source:?} {}", trial.resolved.seed)
 }
 
-/// Trials, and frames over all of them; every source is opened, or one of those that differ in tables alone.
+/// The number of trials and of frames over all of them. Every source is opened, or one of those that differ in tables
+/// only.
 fn counted(plan: &Plan, full: bool) -> (usize, usize) {
     // Trials of one source share its frames.
     let mut frames: BTreeMap<String, usize> = BTreeMap::new();
@@ -44,7 +46,9 @@ fn counted(plan: &Plan, full: bool) -> (usize, usize) {
     (plan.trials.len(), plan.trials.iter().map(of).sum())
 }
 
-/// `# Cost: 7 trials, 420 frames; 5 min of one core (an EPYC, other work beside), 1.3 GB of log; estimated.`, one line: time
+/// The form of the comment is `# Cost: 7 trials, 420 frames; 5 min of one core (an EPYC, other work beside), 1.3 GB of
+/// log; estimated.` in one line. Time and disk space are measured, or estimated by `--dry-run`. The test repeats the
+/// counts.
 /// and disk as measured, or as `--dry-run` estimates them. What can be counted is counted again.
 fn stated(full: bool) {
     let mut all = Vec::new();

@@ -1,4 +1,4 @@
-//! Data sets in the layouts of others: the same pairs, rig and truth as in our own.
+//! Foreign data set formats against the native one: the same pairs, rig and truth.
 
 use std::{
     fmt::Write as _,
@@ -19,19 +19,19 @@ fn own() -> Dataset {
     Dataset::open(&sample()).unwrap()
 }
 
-/// Rows of a rigid motion in YAML, over several lines as the sets have them.
+/// The rows of a rigid motion in YAML, over several lines as in the original data sets.
 fn yaml<A: Frame, B: Frame>(pose: &Transform<A, B>) -> String {
     let rows = pose.rows().map(|row| row.map(|number| format!("{number:?}")).join(", "));
     format!("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n", rows.join(",\n         "))
 }
 
-/// Where the left camera sits in the body of the EuRoC set, and the marker whose pose its truth is.
+/// The left camera's pose in the body of the EuRoC set, and the pose of the truth's marker.
 fn mounts() -> (Transform<Body, Camera>, Transform<Body, Camera>) {
     let at = |xi: [f64; 6]| Transform::exp(&xi.into());
     (at([0.3, -0.2, 1.1, 0.1, 0.2, -0.05]), at([-0.1, 0.4, 0.2, 0.0, -0.1, 0.3]))
 }
 
-/// The sample in the layout of EuRoC.
+/// The sample in EuRoC format.
 fn euroc(folder: &Path) {
     let own = own();
     let (body_from_left, body_from_marker) = mounts();
@@ -75,7 +75,7 @@ fn euroc(folder: &Path) {
     fs::write(home.join("data.csv"), table).unwrap();
 }
 
-/// The sample in the layout of KITTI, its cameras shifted against camera 0.
+/// The sample in KITTI format, with its cameras shifted from camera 0.
 fn kitti(root: &Path) -> PathBuf {
     let own = own();
     let folder = root.join("sequences/07");
@@ -95,7 +95,7 @@ fn kitti(root: &Path) -> PathBuf {
         fs::copy(&frame.left, folder.join(format!("image_2/{index:06}.png"))).unwrap();
         fs::copy(&frame.right, folder.join(format!("image_3/{index:06}.png"))).unwrap();
         writeln!(times, "{}.{:09}", frame.stamp_ns / 1_000_000_000, frame.stamp_ns % 1_000_000_000).unwrap();
-        // Camera 0 sees a point at x − shift where camera 2 has it at x.
+        // A point at x in camera 2 is at x − shift in camera 0.
         let left_from_zero = Transform::<Camera, Camera>::new(Default::default(), [shift, 0.0, 0.0].into());
         let rows = (frame.truth.unwrap() * left_from_zero).rows();
         writeln!(poses, "{}", rows[..3].concat().iter().map(|x| format!("{x:e}")).collect::<Vec<_>>().join(" "))
@@ -106,7 +106,7 @@ fn kitti(root: &Path) -> PathBuf {
     folder
 }
 
-/// The same pairs, rig and truth, to rounding.
+/// Asserts the same pairs, rig and truth, to rounding.
 fn same(found: &Dataset, tolerance: f64) {
     let own = own();
     assert_eq!(found.frames.len(), own.frames.len());
@@ -169,7 +169,7 @@ fn a_site_makes_them_sources() {
     fs::write(&file, "question = 'Same?'\nsource = { name = 'euroc', path = '.', site = 'site.toml' }\n").unwrap();
     let out = folder.path().join("out");
     run(&Plan::read(&file, &[]).unwrap(), &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
-    // Without a rough pose every object is attempted in every frame; those in view are found.
+    // Without a prior every object is attempted in every frame; those in view have a fix.
     let table = fs::read_to_string(out.join("results.csv")).unwrap();
     let columns: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     let (outcome, wrong) = ("outcome", "wrong");
@@ -202,14 +202,14 @@ fn faults_name_file_and_line() {
         "{distortion}"
     );
     assert!(of(sheet, "intrinsics: [", "intrinsics: [7.0, ").contains("`intrinsics` has 5 numbers"));
-    assert!(of(sheet, "resolution", "solution").contains("`resolution` is no list of numbers"));
+    assert!(of(sheet, "resolution", "solution").contains("`resolution` is not a list of numbers"));
     assert!(of(sheet, "data: [", "data: [7.0, ").contains("`T_BS` has 17 numbers"));
-    assert!(of(sheet, "camera_model: pinhole", "camera_model: [").contains("no YAML"));
+    assert!(of(sheet, "camera_model: pinhole", "camera_model: [").contains("invalid YAML"));
     let stamp = own().frames[1].stamp_ns.to_string();
-    assert!(of("cam0/data.csv", &stamp, "0").contains("not after the one before"));
+    assert!(of("cam0/data.csv", &stamp, "0").contains("not later than the previous one"));
     assert!(of("cam0/data.csv", &format!("{stamp}.png"), "../../x.png").contains("leads out"));
     assert!(of("cam0/data.csv", &format!("{stamp}.png"), "x.png").contains("does not exist"));
-    assert!(of("cam1/sensor.yaml", "T_BS", "T_SB").contains("`T_BS` is no list"));
+    assert!(of("cam1/sensor.yaml", "T_BS", "T_SB").contains("`T_BS` is not a list"));
 
     let folder = TempDir::new().unwrap();
     let sequence = kitti(folder.path());
@@ -222,5 +222,5 @@ fn faults_name_file_and_line() {
     let missing = Dataset::open(&sequence).map(|_| ()).unwrap_err()[0].to_string();
     assert!(missing.contains("times.txt:3") && missing.contains("image_3/000002.png"), "{missing}");
     let none = Dataset::open(folder.path()).map(|_| ()).unwrap_err()[0].to_string();
-    assert!(none.contains("that is no data set"), "{none}");
+    assert!(none.contains("a folder without a data set"), "{none}");
 }

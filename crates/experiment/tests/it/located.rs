@@ -1,4 +1,4 @@
-//! How far off a feature point's corner the front end says that it may be, against rendered truth.
+//! The front end's standard deviations of a corner's position against rendered truth.
 
 use std::path::{Path, PathBuf};
 
@@ -8,16 +8,16 @@ use seafix_experiment::{Plan, changed_pipeline};
 use seafix_geometry::StereoPixels;
 use seafix_vision::{FrontEndOutput, Threads};
 
-/// A feature point that both cameras see, and the pair of pixels nearest to where it is shown.
+/// A feature point in view of both cameras, and the pair of pixels closest to it.
 struct Corner {
-    /// Seen less true, (u left, v left, u right, v right) (px).
+    /// The measured minus the true position, (u left, v left, u right, v right) (px).
     error: [f64; 4],
-    /// The standard deviation that is claimed for u left (px), and for the disparity.
+    /// The stated standard deviation of u left (px), and of the disparity.
     claimed: [f64; 2],
 }
 
-/// The visible feature points of a passage that have a pair of pixels within 2 px of the left image of them, and how many
-/// have none.
+/// The visible feature points with a pair of pixels within 2 px of their left projection. The number of points without
+/// such a pair is given too.
 fn corners(sequence: &dyn Sequence, settings: &[&str]) -> (Vec<Corner>, usize) {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
     let front_end = changed_pipeline(&Pipeline::default(), &settings).unwrap().front_end().unwrap();
@@ -60,7 +60,8 @@ fn sequence(experiment: &str) -> Box<dyn Sequence> {
     plan.trials[0].source.open(plan.experiment.seed, &plan.folder).unwrap()
 }
 
-/// RMS of the left errors an axis and of the disparities' (px), and of both over what is claimed.
+/// The RMS of the left errors per axis and of the disparity errors (px). The ratios of both to the stated standard
+/// deviations follow.
 fn spread(corners: &[&Corner]) -> [f64; 4] {
     let left = corners.iter().flat_map(|c| [0, 1].map(|axis| (c.error[axis], c.error[axis] / c.claimed[0])));
     let disparity = corners.iter().map(|c| c.error[0] - c.error[2]).zip(corners.iter().map(|c| c.claimed[1]));
@@ -68,8 +69,8 @@ fn spread(corners: &[&Corner]) -> [f64; 4] {
     [rms(left.clone().map(|x| x.0)), rms(disparity.map(|x| x.0)), rms(left.map(|x| x.1)), rms(over)]
 }
 
-/// What no corner was fitted to lies off it by several times as much as what one was, says so, and does so in both images
-/// alike. Seen to fail without `peak-px`: its errors were 4 times what was claimed.
+/// A key point without a fitted corner has an error several times that of a fitted one. It states this error, which is
+/// equal in both images. Seen to fail without `peak-px`: its errors were 4 times the stated ones.
 #[test]
 fn a_key_point_states_how_far_off_its_corner_it_lies() {
     let sample = sequence("experiments/virtual-sample.toml");
@@ -84,7 +85,7 @@ fn a_key_point_states_how_far_off_its_corner_it_lies() {
     assert!((0.5..1.5).contains(&off_over) && (0.5..1.5).contains(&fit_over), "{off_over} {fit_over}");
 }
 
-/// A claim of less (px) is that of a fitted corner.
+/// A smaller stated standard deviation (px) is that of a fitted corner.
 const FITTED: f64 = 0.5;
 
 /// The table behind `peak-px`: `cargo test --release -p seafix-experiment located:: -- --ignored --nocapture`
@@ -92,7 +93,7 @@ const FITTED: f64 = 0.5;
 #[ignore = "table"]
 fn corners_of_a_dive() {
     let dive = sequence("experiments/dive.toml");
-    println!("RMS of 60 pairs: left an axis, disparity (px); both over what is claimed");
+    println!("RMS of 60 pairs: left per axis, disparity (px); both over the stated sigma");
     for (name, settings) in [("locator peak", &["locator=peak"][..]), ("default", &[])] {
         let (found, missed) = corners(&*dive, settings);
         let (fitted, rest): (Vec<&Corner>, Vec<&Corner>) = found.iter().partition(|corner| corner.claimed[0] < FITTED);

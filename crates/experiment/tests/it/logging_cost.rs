@@ -1,4 +1,4 @@
-//! What logging costs: prints, and judges nothing, for clocks differ.
+//! The cost of logging, printed without assertions because clocks differ.
 
 use std::{fs, path::Path, time::Instant};
 
@@ -6,8 +6,9 @@ use seafix_experiment::{Options, Plan, Silent, run};
 use seafix_log::{Writer, read};
 use tempfile::TempDir;
 
-/// The frames of the sample (1024×768) are logged at each level of images, read back, and written again under the clock, down to the
-/// disk: milliseconds a frame, their share of a frame's time at 10 Hz, and beside them what the method took for it.
+/// Measures the time of logging. The frames of the sample (1024×768) are logged at each level of images, read back, and
+/// written again to the disk. Printed are milliseconds a frame, their fraction of a frame's time at 10 Hz, and the time
+/// of the pipeline.
 ///
 /// `cargo test --release -p seafix-experiment logging_cost:: -- --ignored --nocapture`
 #[test]
@@ -57,7 +58,7 @@ fn the_cost_of_logging_at_ten_frames_a_second() {
         let method = log.frames.iter().map(method).sum::<f64>() / log.frames.len() as f64;
         let (median, bytes) = (spent[REPEATS / 2], fs::metadata(&again).unwrap().len() / log.frames.len() as u64);
         println!(
-            "images {images:10}: {median:6.2} ms a frame, {:4.1} % of a frame's time at 10 Hz; the method {method:.1} ms; {bytes} bytes a frame",
+            "images {images:10}: {median:6.2} ms a frame, {:4.1} % of a frame's time at 10 Hz; the pipeline {method:.1} ms; {bytes} bytes a frame",
             100.0 * median / FRAME_MS
         );
     }

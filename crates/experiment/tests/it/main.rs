@@ -1,6 +1,6 @@
 //! Experiments from file to result.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and prints its measurements")]
 
 mod costs;
 mod foreign;

@@ -1,4 +1,4 @@
-//! Problems as frames: in files and drawn, with truth and without.
+//! Coherence problems as frames: from files and generated, with truth and without.
 
 use std::{fs, path::Path};
 
@@ -21,7 +21,7 @@ fn rows(folder: &Path, experiment: &str) -> Vec<TargetRecord> {
     frames
         .into_iter()
         .map(|mut frame| {
-            assert_eq!(frame.targets.len(), 1, "a problem is about one object");
+            assert_eq!(frame.targets.len(), 1, "a problem has one object");
             let mut row = frame.targets.remove(0);
             row.times = TargetTimes::default();
             row
@@ -29,7 +29,7 @@ fn rows(folder: &Path, experiment: &str) -> Vec<TargetRecord> {
         .collect()
 }
 
-/// Problems of a family as `seafix generate` writes them, in folders below `folder`.
+/// The problems of a family as `seafix generate` writes them, in folders below `folder`.
 fn draw(folder: &Path, family: Family, count: u64) {
     let folder = folder.join(family.name());
     fs::create_dir_all(&folder).unwrap();
@@ -51,7 +51,7 @@ fn problems_in_files_are_those_that_were_generated() {
         let files = rows(folder.path(), FILES);
         let name = family.name();
         let generated = format!("source = {{ name = 'generated-problems', family = '{name}', frames = {count} }}");
-        // The reader of JSON takes numbers to the last bit but one: what came of them is the same, not their every digit.
+        // The JSON reader is exact except for the last bit: results are equal except for their last digits.
         let essence = |row: &TargetRecord| {
             let Evaluation { wrong, wrong_pairs, visible, identified, correct_pairs, .. } = row.evaluation;
             let counts = (wrong, wrong_pairs, visible, identified, correct_pairs);
@@ -71,8 +71,8 @@ fn truth_is_the_judge_s_alone() {
     let folder = TempDir::new().unwrap();
     draw(&folder.path().join("all"), Family::A, 12);
     let known = rows(folder.path(), FILES);
-    let truth = |number: usize| folder.path().join(format!("all/a/a{number:03}.truth.json"));
-    // Another truth changes the judgement, and nothing else.
+    let truth = |number: usize| folder.path().join(format!("all/paper-scale/a{number:03}.truth.json"));
+    // Another truth changes the evaluation and nothing else.
     let mut moved: serde_json::Value = serde_json::from_str(&fs::read_to_string(truth(4)).unwrap()).unwrap();
     moved["T_cam_obj"][0][3] = 7.0.into();
     fs::write(truth(4), moved.to_string()).unwrap();
@@ -109,7 +109,7 @@ fn every_frame_has_an_object_of_its_own() {
         assert_eq!(model.id, generated.id);
         assert_eq!(model.points.iter().map(|point| point.at).collect::<Vec<_>>(), generated.model);
     }
-    // What is no object by itself is nothing that a problem could be about.
+    // A coherence problem needs a single object as target.
     for kind in ["site", "joint"] {
         let said = run(&write(&format!("target = '{kind}'")), &Options::into(folder.path().join(kind)), &Silent);
         assert!(said.unwrap_err().to_string().contains("use target = \"object\""));
@@ -164,16 +164,17 @@ fn faults_name_the_file() {
     );
     assert!(said("").contains("needs pixels"));
     let sound = "solver = 'mahalanobis'";
-    fs::copy(all.join("a/a000.json"), all.join("a/a009.json")).unwrap();
-    assert!(said(sound).contains("two problems of one `id`"));
-    fs::write(all.join("a/a009.json"), "{").unwrap();
+    fs::copy(all.join("paper-scale/a000.json"), all.join("paper-scale/a009.json")).unwrap();
+    assert!(said(sound).contains("two problems with the same `id`"));
+    fs::write(all.join("paper-scale/a009.json"), "{").unwrap();
     assert!(said(sound).contains("a009.json:1"));
-    fs::remove_file(all.join("a/a009.json")).unwrap();
-    fs::write(all.join("a/a001.truth.json"), r#"{"T_cam_obj": [], "pairs": [], "pose_defined": false}"#).unwrap();
+    fs::remove_file(all.join("paper-scale/a009.json")).unwrap();
+    fs::write(all.join("paper-scale/a001.truth.json"), r#"{"T_cam_obj": [], "pairs": [], "pose_defined": false}"#)
+        .unwrap();
     assert!(said(sound).contains("a001.truth.json"));
     fs::remove_dir_all(&all).unwrap();
     assert!(said(sound).contains("no such file or folder"));
     fs::create_dir(&all).unwrap();
-    assert!(said(sound).contains("no problem in"));
+    assert!(said(sound).contains("no coherence problem in"));
     assert!(!folder.path().join("out").exists(), "nothing is written before inputs are checked");
 }

@@ -1,4 +1,4 @@
-//! Laws of replays: a log holds what its method was given, to the last bit.
+//! Laws of replays: a log holds the exact inputs of its pipeline.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,7 @@ use seafix_experiment::{Options, Plan, Replay, ReplayFrom, Silent, run};
 use seafix_log::{FrameRecord, FrameTimes, TargetTimes, read};
 use tempfile::TempDir;
 
-/// Sources of every kind, shortened, and what their frames are tried with.
+/// Sources of every kind, shortened, with a pipeline for their frames.
 const EXPERIMENTS: [(&str, &str); 7] = [
     ("points", "[source]\nname = 'virtual-points'\nframes = 6\n"),
     ("images", "[source]\nname = 'virtual-images'\nframes = 2\nrig.size = [512, 384]\nrig.focal = 250.0\n"),
@@ -51,7 +51,7 @@ fn logged(folder: &Path, experiment: &str, settings: &[&str]) -> (Plan, std::pat
     (plan, log)
 }
 
-/// The record of a replay that started from clouds has no images and no key points.
+/// The record of a replay from clouds has neither images nor key points.
 fn without_images(mut frames: Vec<FrameRecord>) -> Vec<FrameRecord> {
     for frame in &mut frames {
         (frame.images, frame.key_points) = (None, Vec::new());

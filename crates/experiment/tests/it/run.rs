@@ -1,4 +1,4 @@
-//! Laws of a run: its answers depend on the plan alone.
+//! Laws of a run: its results depend on the plan alone.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -10,7 +10,7 @@ const EXPERIMENT: &str = "question = 'Does the answer depend on the machine?'\ns
     [source]\nname = 'virtual-points'\nframes = 8\n\
     [[vary]]\nkey = 'pipeline.solver'\nvalues = ['triad', 'kabsch']\n";
 
-/// The logs of an experiment, without what differs from run to run: durations and the run's name.
+/// The logs of an experiment, without the quantities that differ from run to run: durations and the run's name.
 fn logs(folder: &Path, experiment: &str, settings: &[&str], threads: usize) -> Vec<TrialLog> {
     let file = folder.join("e.toml");
     fs::write(&file, experiment).unwrap();
@@ -52,7 +52,7 @@ fn a_further_frame_changes_no_earlier_one() {
     }
 }
 
-/// Seen to fail where the seed plays no part.
+/// Seen to fail when the seed has no effect.
 #[test]
 fn another_seed_is_another_dive() {
     let folder = TempDir::new().unwrap();
@@ -79,13 +79,14 @@ fn methods_are_compared_on_the_same_noise() {
     }
 }
 
-/// Five pairs of a dive, a fifth of a second apart, a fix every half second.
-const SESSION: &str = "question = 'Does the way between fixes hold?'\n\
+/// Five pairs of a dive at 5 Hz, with a fix every half second.
+const SESSION: &str = "question = 'Does the trajectory between fixes hold?'\n\
     [source]\nname = 'dive'\nframes = 5\nrate = 5.0\nstart = 30.4\n\
     rig.size = [512, 384]\nrig.focal = 250.0\nwater.attenuation = 0.15\n\
     [navigation]\npolicy = { name = 'interval', seconds = 0.5 }\n";
 
-/// A fix at the first pair and when half a second has passed; between them odometry carries the pose, and it stays right.
+/// A fix is taken at the first pair and after half a second; odometry carries the pose between them without a large
+/// error.
 #[test]
 fn a_pose_is_carried_between_fixes() {
     let folder = TempDir::new().unwrap();
@@ -106,10 +107,10 @@ fn a_pose_is_carried_between_fixes() {
     }
 }
 
-/// Black images where a fix is due: the pose stays known and waits, the frame says that it had no data, and the log how the
-/// state went on.
+/// Images are black when a fix is due: the pose is kept, the frame has no fix, and the log states how the state
+/// continued.
 ///
-/// Seen to fail when a frame without a motion is called rough and not due.
+/// Seen to fail when a frame without motion is in state `prior` and no fix is due.
 #[test]
 fn images_that_report_nothing_leave_the_pose_known() {
     let folder = TempDir::new().unwrap();
@@ -121,7 +122,7 @@ fn images_that_report_nothing_leave_the_pose_known() {
     let known = black.navigation.as_ref().unwrap();
     assert_eq!((&*black.targets[0].reason, known.due, &known.pose), ("no-data", true, &None), "{known:#?}");
     let events: Vec<&String> = log.frames.iter().flat_map(|frame| &frame.navigation.as_ref().unwrap().events).collect();
-    assert!(events.iter().all(|event| !event.contains("→ rough")), "{events:#?}");
+    assert!(events.iter().all(|event| !event.contains("→ prior")), "{events:#?}");
 }
 
 #[test]
@@ -140,16 +141,16 @@ fn settings_of_navigation_are_checked() {
     assert!(said(&format!("{dive}[pipeline]\ntarget = 'joint'\n[navigation]\n")).contains("target = \"object\""));
     let points = "question = 'why'\nsource = 'virtual-points'\n[navigation]\n";
     assert!(said(points).contains("navigation needs images"), "{}", said(points));
-    // An odometry that goes by readings is refused where there are none, by the plan or when the source is opened.
+    // An odometry that requires readings is rejected without them, by the plan or when the source is opened.
     let by_readings = "[navigation]\nodometry = 'dvl-gyro'\n";
     let none = said(&format!("question = 'why'\nsource = 'virtual-images'\n{by_readings}"));
-    assert!(none.contains("e.toml:4") && none.contains("which source `virtual-images` has not"), "{none}");
+    assert!(none.contains("e.toml:4") && none.contains("which source `virtual-images` does not have"), "{none}");
     let off = "faults = [{ device = 'doppler', kind = 'off', from = 0.0, to = 1e4, amount = 0.0 }]";
     let deaf = said(&format!("question = 'why'\n[source]\nname = 'dive'\nframes = 2\n{off}\n{by_readings}"));
-    assert!(deaf.contains("they are not both heard here") && deaf.lines().count() == 1, "{deaf}");
+    assert!(deaf.contains("which this source does not have") && deaf.lines().count() == 1, "{deaf}");
 }
 
-/// What is logged of images changes no result.
+/// The logging of images changes no result.
 #[test]
 fn images_may_be_left_out_of_the_log() {
     let folder = TempDir::new().unwrap();
@@ -166,7 +167,7 @@ fn images_may_be_left_out_of_the_log() {
     }
 }
 
-/// Every file of results of an experiment that is run without durations, by its name.
+/// All result files of an experiment without durations, by name.
 fn files(folder: &Path, experiment: &str, options: &Options) -> BTreeMap<String, Vec<u8>> {
     let file = folder.join("e.toml");
     fs::write(&file, experiment).unwrap();
@@ -178,7 +179,7 @@ fn files(folder: &Path, experiment: &str, options: &Options) -> BTreeMap<String,
     results.map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read(&path).unwrap())).collect()
 }
 
-/// Trials that share all of the front end and the search, the first half of the front end, or nothing; trials that
+/// Trials that share the complete front end and the search, the first half of the front end, or nothing. Trials that
 /// navigate share odometry and front end.
 const SHARING: &str = "question = 'Does it matter who computes a stage?'\n\
     [source]\nname = 'dive'\nframes = 2\nrate = 5.0\nstart = 30.4\n\
@@ -192,8 +193,8 @@ const SHARING: &str = "question = 'Does it matter who computes a stage?'\n\
     { label = 'other odometry', set = { navigation = { odometry = { name = 'stereo', window = 1 } } } },\
     ]\n";
 
-/// Searches that draw random numbers, for several targets in turn: what is drawn for one depends on the one before. Gates so
-/// narrow that some shells grow.
+/// Searches with random numbers, for several targets in turn: the numbers for a target depend on the one before. Gates
+/// are so narrow that some are expanded.
 const DRAWING: &str = "question = 'Does it matter who searches?'\nseed = 5\n\
     [source]\nname = 'virtual-points'\nframes = 6\npoints.clutter = 60\n\
     [pipeline]\nsearch = 'ransac'\n\
@@ -201,7 +202,7 @@ const DRAWING: &str = "question = 'Does it matter who searches?'\nseed = 5\n\
     [[vary]]\nkey = 'pipeline.expand-gates'\nvalues = [false, true]\n\
     [[vary]]\nkey = 'pipeline.gate.chi-square'\nvalues = [0.05, 0.3]\n";
 
-/// Seen to fail where trials with different locators share a front end, and where trials whose shells may grow share a
+/// Seen to fail when trials with different locators share a front end, and when trials with expanding gates share a
 /// search.
 #[test]
 fn trials_that_fraction_stages_answer_as_each_alone() {
@@ -217,7 +218,7 @@ fn trials_that_fraction_stages_answer_as_each_alone() {
     }
 }
 
-/// A stage that trials share has one time, marked in each of them; measured separately, none is marked.
+/// A stage that trials share has one duration, marked in each of them; measured separately, none is marked.
 #[test]
 fn times_of_shared_stages_are_marked() {
     let folder = TempDir::new().unwrap();
@@ -237,7 +238,7 @@ fn times_of_shared_stages_are_marked() {
     assert_eq!([marks(0), marks(1)], [[of(true, true, false); 2], [of(true, true, false); 2]]);
     assert_eq!(marks(2), [of(false, false, false); 2]);
     assert_eq!(marks(3), [of(true, false, true); 2]);
-    // A frame at which no fix is due has no front end.
+    // A frame without a due fix has no front end.
     assert_eq!(marks(4), [of(true, false, true), of(false, false, true)]);
     assert_eq!(marks(5), [of(true, false, false); 2]);
     for (default, solver) in shared[0].iter().zip(&shared[1]) {
@@ -249,8 +250,8 @@ fn times_of_shared_stages_are_marked() {
     assert!(times(true).iter().flatten().all(|times| times.shared == SharedStages::default()));
 }
 
-/// A kept run of an identity has the bytes of a fresh one, whole or in part. Seen to fail with an identity of the versions
-/// alone.
+/// A stored run has the bytes of a fresh one with the same identity. This holds as a whole and in part. Seen to fail
+/// with an identity of the versions alone.
 #[test]
 fn a_kept_run_is_what_would_be_made_now() {
     let folder = TempDir::new().unwrap();

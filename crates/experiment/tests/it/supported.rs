@@ -1,4 +1,4 @@
-//! What supports a fix stands in the log and in the table; a joint fix that fails says so.
+//! The integrity of a fix in the log and in the table, and the reason of a failed joint fix.
 
 use std::{
     collections::HashMap,
@@ -26,11 +26,11 @@ fn made(experiment: &str) -> (Vec<FrameRecord>, Vec<HashMap<String, String>>) {
     (log.frames, rows)
 }
 
-/// Its log and the rows of its table, which CSV and Parquet hold alike.
+/// The log and the rows of the table, which are equal in CSV and Parquet.
 fn run_of(experiment: &str) -> (TrialLog, Vec<HashMap<String, String>>) {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("e.toml");
-    fs::write(&file, format!("question = 'Why believe it?'\nseed = 5\n{experiment}")).unwrap();
+    fs::write(&file, format!("question = 'Why accept it?'\nseed = 5\n{experiment}")).unwrap();
     let plan = Plan::read(&file, &[]).unwrap();
     let out = folder.path().join("run");
     run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
@@ -92,10 +92,9 @@ fn what_supports_a_fix_stands_in_log_and_table() {
     }
 }
 
-/// What the log and the table say of a fix is what the fix itself says, to the last bit: the points that were logged, judged
-/// once more.
+/// The log and the table hold the exact numbers of the fix: the logged points are solved and tested again.
 ///
-/// Seen to fail when the position's level is logged as the attitude's.
+/// Seen to fail when the position's protection level is logged as the attitude's.
 #[test]
 fn the_log_and_the_table_state_what_the_fix_states() {
     let (log, rows) = run_of(
@@ -170,7 +169,7 @@ fn the_log_and_the_table_state_what_the_fix_states() {
             "scale_error_sigma",
         ];
         assert_eq!(columns.map(|name| row[name].parse::<f64>().ok())[..], fix_text[1..]);
-        // Residuals are C·H − P of each pair, and their root mean square is what is logged.
+        // Residuals are C·H − P of each pair, and their RMS is logged.
         for (pair, residual) in fix.pairs.iter().zip(&fix.residuals) {
             let at = fix.object_from_camera * cloud[pair.cloud].position.at;
             assert_eq!(at - model[pair.model].at, *residual);
@@ -180,43 +179,53 @@ fn the_log_and_the_table_state_what_the_fix_states() {
     }
 }
 
-/// Half of all true sets fail a test of so little confidence, together as well as alone.
+/// At a confidence of 0.4 more than half of all true sets fail the test, jointly as well as alone.
 #[test]
 fn a_joint_fix_that_fails_states_why() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 2\nobjects = 2\npoints = 12\nframes = 60\nsurvey-sigma = 0.002\n";
     let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nconfidence = 0.4\n"));
     let fixes = frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.outcome == Outcome::Fix);
-    let (joined, failed): (Vec<_>, Vec<_>) = fixes.partition(|target| target.detail.starts_with("joint fix over "));
+    let (joined, failed): (Vec<_>, Vec<_>) =
+        fixes.partition(|target| target.explanation.starts_with("joint fix over "));
     assert!(!failed.is_empty() && !joined.is_empty(), "{} failed, {} joined", failed.len(), joined.len());
     for target in failed {
-        assert!(target.detail.starts_with("no joint fix, the pose is that of the object alone: "), "{}", target.detail);
-        assert!(target.detail.contains("χ² = "), "{}", target.detail);
+        assert!(
+            target.explanation.starts_with("no joint fix, each object keeps its own pose: "),
+            "{}",
+            target.explanation
+        );
+        assert!(target.explanation.contains("χ² = "), "{}", target.explanation);
     }
 }
 
-/// An object of which too few points are seen takes part with those, and both say so; its own fix stays refused.
+/// The few points of an object without its own fix are used in the joint fix. The explanations of both objects state
+/// it. The object stays rejected.
 #[test]
 fn a_joint_fix_states_what_took_part() {
     let source = "[source]\nname = 'virtual-layouts'\nlayouts = 3\nobjects = 3\npoints = 14\nframes = 30\nsurvey-sigma = 0.001\n";
-    // Objects of five, five and four points, of which five are asked for.
-    let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nleast-points = 5\n"));
+    // The objects have five, five and four points, and five are required.
+    let (frames, _) = made(&format!("{source}[pipeline]\ntarget = 'joint'\n[pipeline.acceptance]\nmin-points = 5\n"));
     let (mut took_part, mut left_out) = (0, 0);
     for frame in &frames {
         for target in &frame.targets {
             match target.outcome {
                 Outcome::Fix => {
-                    assert!(target.detail.starts_with("joint fix over `layout"), "{}", target.detail)
+                    assert!(target.explanation.starts_with("joint fix over `layout"), "{}", target.explanation)
                 }
                 _ => {
-                    assert!(target.detail.starts_with("4 points were identified; 5 are needed"), "{}", target.detail);
-                    took_part += usize::from(target.detail.ends_with("; 4 points took part in the joint fix"));
-                    left_out += usize::from(target.detail.contains("; no part in the joint fix: "));
+                    assert!(
+                        target.explanation.starts_with("too few identified points: 4 found, 5 required"),
+                        "{}",
+                        target.explanation
+                    );
+                    took_part += usize::from(target.explanation.ends_with("; 4 points used in the joint fix"));
+                    left_out += usize::from(target.explanation.contains("; not in the joint fix: "));
                 }
             }
         }
-        let said = |part: &str| frame.targets.iter().any(|target| target.detail.contains(part));
-        assert_eq!(said("took part in the joint fix"), said("(4 points, not fixed by itself)"));
-        assert_eq!(said("no part in the joint fix"), said("; left out: "));
+        let said = |part: &str| frame.targets.iter().any(|target| target.explanation.contains(part));
+        assert_eq!(said("used in the joint fix"), said("(4 points, without a fix of its own)"));
+        assert_eq!(said("not in the joint fix"), said("; excluded: "));
     }
-    assert!(took_part > 15, "{took_part} of 30 took part, {left_out} did not");
+    assert!(took_part > 15, "{took_part} of 30 used, {left_out} excluded");
 }

@@ -1,7 +1,8 @@
-//! A version changes when results change: every component and every shared part of the code works on a small fixed problem,
-//! and a fingerprint of its answer stands beside its version in `versions.txt`.
+//! A change of results requires a change of version. Every component and every part of the shared code solves a small
+//! fixed problem, and `versions.txt` holds a fingerprint of the result beside the version.
 //!
-//! A change of results without a change of a version would let `seafix publish` keep a run that nothing makes any more.
+//! A change of results without a change of version would let `seafix publish` keep a stored run that no program
+//! reproduces.
 
 #![allow(clippy::unwrap_used, reason = "a test may stop at once")]
 
@@ -30,7 +31,7 @@ use seafix_vision::{
 const TABLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/it/versions.txt");
 const COMMAND: &str = "SEAFIX_UPDATE=1 cargo test -p seafix-experiment versions_";
 
-/// Sources that give what stands in files: `foreign.rs`, `problems.rs` and `replay.rs` hold them to that.
+/// The sources that read files; `foreign.rs`, `problems.rs` and `replay.rs` test them.
 const READERS: [&str; 5] = ["dataset", "euroc", "kitti", "mcap", "problems"];
 
 /// The parts of the code whose versions may explain another fingerprint of a part, by the beginnings of their names.
@@ -53,7 +54,7 @@ fn rests_on(part: &str) -> &'static [&'static str] {
             "shared acceptance" => &["shared geometry", "search", "solver"],
             "shared simulation" => &["shared geometry"],
             "shared renderer" => &["shared geometry", "shared simulation"],
-            // They are seen at work in a whole run.
+            // These parts are tested in a complete run.
             _ => &[""],
         },
         _ => &["shared geometry"],
@@ -63,7 +64,7 @@ fn rests_on(part: &str) -> &'static [&'static str] {
 /// A version and a fingerprint.
 type Line = (u32, String);
 
-/// Everything that is wrong with `now`, held against the committed `table`, and whether the table may be written anew.
+/// The faults of `now` against the committed `table`, and whether the table may be written again.
 fn faults(table: &BTreeMap<String, Line>, now: &BTreeMap<String, Line>) -> (Vec<String>, bool) {
     let raised = |part: &str| match (table.get(part), now.get(part)) {
         (Some((old, _)), Some((new, _))) => new > old,
@@ -78,17 +79,20 @@ fn faults(table: &BTreeMap<String, Line>, now: &BTreeMap<String, Line>) -> (Vec<
         let explained = raised(part)
             || now.keys().any(|other| raised(other) && rests_on(part).iter().any(|start| other.starts_with(start)));
         if version < old {
-            reported.push(format!("the VERSION of {part} fell from {old} to {version}; a version only rises"));
+            reported.push(format!("the VERSION of {part} fell from {old} to {version}; raise it"));
             writable = false;
         } else if print != known && !explained {
             reported.push(format!("results of {part} changed; raise its VERSION and run {COMMAND}"));
             writable = false;
         } else if (version, print) != (old, known) {
-            reported.push(format!("{part} has another version or rests on what has; run {COMMAND}"));
+            reported.push(format!("{part} or a part that it uses has another version; run {COMMAND}"));
         }
     }
     reported.extend(
-        table.keys().filter(|part| !now.contains_key(*part)).map(|part| format!("{part} is gone; run {COMMAND}")),
+        table
+            .keys()
+            .filter(|part| !now.contains_key(*part))
+            .map(|part| format!("{part} does not exist any more; run {COMMAND}")),
     );
     (reported, writable)
 }
@@ -124,7 +128,7 @@ fn another_result_asks_for_another_version() {
     let changed = of(&[("solver kabsch", 1, "x"), ("solver triad", 1, "b"), ("odometry icp", 1, "c")]);
     let reported = format!("results of solver kabsch changed; raise its VERSION and run {COMMAND}");
     assert_eq!(faults(&table, &changed), (vec![reported], false));
-    // An odometry owns solvers; one solver does not own another.
+    // An odometry contains solvers; one solver does not contain another.
     let raised = of(&[("solver kabsch", 2, "x"), ("solver triad", 1, "b"), ("odometry icp", 1, "y")]);
     assert!(faults(&table, &raised).1);
     let both = of(&[("solver kabsch", 2, "x"), ("solver triad", 1, "y"), ("odometry icp", 1, "c")]);
@@ -133,8 +137,8 @@ fn another_result_asks_for_another_version() {
     assert!(!faults(&table, &fallen).1);
 }
 
-/// The numbers and truth values of an answer, in order, to nine digits: words are names, and names are no results. The ninth
-/// digit is beyond what another processor's rounding reaches.
+/// The numbers and truth values of a result, in order, to nine digits; names are ignored. Rounding of another processor
+/// does not reach the ninth digit.
 fn fingerprint(answer: &impl Debug) -> String {
     print_of(&format!("{answer:?}"))
 }
@@ -291,7 +295,7 @@ fn fingerprints() -> BTreeMap<String, Line> {
     assert_eq!(all.len(), prints.len(), "a fingerprint for each component and shared part");
     let nothing = print_of("");
     let silent: Vec<_> = prints.iter().filter(|(_, print)| **print == nothing).map(|((_, name), _)| name).collect();
-    assert_eq!(silent, ["peak"], "an answer without a number tells no change");
+    assert_eq!(silent, ["peak"], "a result without a number reveals no change");
     let line = |(kind, name, version): (&str, &str, u32)| {
         let print = prints.get(&(kind.to_owned(), name.to_owned()));
         (
@@ -320,7 +324,7 @@ fn results(source: &str, rest: &str) -> String {
     let mut text = fs::read_to_string(out.join("results.csv")).unwrap();
     for trial in &plan.trials {
         let mut log = seafix_log::read(&out.join(format!("{}.mcap", trial.name))).unwrap();
-        // Pixels are many, and what methods make of them is in the rest.
+        // Pixels are ignored: they are many, and the results depend on them.
         log.frames.iter_mut().for_each(|frame| frame.images = None);
         text += &format!("{:?}", log.frames);
     }
@@ -332,7 +336,7 @@ fn pose(angle: f64) -> Transform<Object, Camera> {
     Transform::exp(&Vector6::new(0.3 + angle, -0.2, 0.5 - angle, 0.4, -0.1, -2.0 + angle))
 }
 
-/// A fixed small world: an object, a cloud with it, a rig, and three stereo pairs of a patterned plane.
+/// A small fixed world: an object, a cloud with it, a rig, and three stereo pairs of a patterned plane.
 struct World {
     rig: StereoRig,
     model: Vec<ModelPoint>,
@@ -416,7 +420,7 @@ impl World {
         Image::new(Self::SIZE[0], Self::SIZE[1], (0..Self::SIZE[0] * Self::SIZE[1]).map(pixel).collect()).unwrap()
     }
 
-    /// Corners of the patches near the image's middle, roughly.
+    /// The approximate corners of the patches near the centre of the image.
     fn corners(&self) -> Vec<Keypoint> {
         let corner = |k: i64| {
             let (right, down) = (0.17 * ((k % 6) as f64 - 2.0), 0.17 * ((k / 6) as f64 - 1.0));
@@ -428,12 +432,12 @@ impl World {
         (0..24).map(corner).collect()
     }
 
-    /// The same in the right image, a little off.
+    /// The same corners in the right image, with an error.
     fn shifted(&self, corners: &[Keypoint]) -> Vec<Keypoint> {
         let shifted = |(k, corner): (usize, &Keypoint)| {
             let across = (corner.at.u - Self::SIZE[0] as f64 / 2.0) / Self::FOCAL;
             let disparity = Self::FOCAL * Self::BASELINE * (1.0 - 0.2 * across) / 2.0;
-            // One in six is not where it should be.
+            // One in six is wrong.
             let off = if k % 6 == 3 { 6.0 } else { 0.1 };
             let at = Pixel { u: corner.at.u - disparity + 0.4 * noise(k as i64, 20), v: corner.at.v + off };
             Keypoint { at, ..*corner }
@@ -441,7 +445,7 @@ impl World {
         corners.iter().enumerate().map(shifted).collect()
     }
 
-    /// Descriptors that tell key points apart by their places in the list, more or less alike.
+    /// Descriptors that identify key points by their index in the list, with some similarity.
     fn described(&self, count: usize, spread: f64) -> Descriptors {
         let mut described = Descriptors::default();
         let numbers = described.numbers_mut(count, 16);
@@ -450,7 +454,8 @@ impl World {
         described
     }
 
-    /// Clean corners: a chequer-board, bright squares on dark ground beside it, and where about the corners are.
+    /// Clean corners: a chequer-board, bright squares on dark ground beside it, and approximate positions of the
+    /// corners.
     fn board() -> (Image, Vec<Keypoint>) {
         const SIDE: f64 = 20.3;
         let bright = |u: f64, v: f64| {
@@ -460,7 +465,7 @@ impl World {
         };
         let pixel = |index: usize| {
             let (u, v) = ((index % Self::SIZE[0]) as f64, (index / Self::SIZE[0]) as f64);
-            // The light of some two pixels, as a lens spreads it.
+            // A blur of some two pixels, as by a lens.
             let parts =
                 (0..144).map(|k| bright(u + f64::from(k % 12) / 6.0 - 0.917, v + f64::from(k / 12) / 6.0 - 0.917));
             (parts.sum::<f64>() / 144.0 + 2.0 * noise(index as i64, 40)) as f32
@@ -490,7 +495,7 @@ impl World {
     }
 
     fn problem(&self) -> Problem<'_> {
-        // For as long as the test runs: a problem borrows its parts.
+        // Leaked for the duration of the test, because a problem borrows its parts.
         let prior = Box::leak(Box::new(self.prior()));
         let all = Box::leak(Box::new(Candidates::all(self.model.len(), self.cloud.len())));
         Problem {
@@ -508,7 +513,7 @@ impl World {
         Prior { object_from_camera: Self::truth() * off, bound }
     }
 
-    /// Candidates by a gate, and an identification judged.
+    /// Candidates by a gate, and the test of an identification.
     fn accepted(&self) -> String {
         let prior = self.prior();
         let gate = Gate::default();

@@ -1,4 +1,4 @@
-//! One camera against OpenCV, and the edges of its domain by hand.
+//! Tests of one camera against OpenCV, and of the limits of its domain by hand.
 
 use seafix_geometry::{BadCamera, Camera, Pinhole, Pixel, Point};
 
@@ -15,7 +15,7 @@ fn ahead(x: f64, y: f64) -> Point<Camera> {
     Point::new(x, y, 1.0)
 }
 
-/// Seen to fail with the sign of p2 turned, and with 4 p1 x y.
+/// The test fails with the sign of p2 inverted, and with 4 p1 x y.
 #[test]
 fn opencv_projects_alike() {
     let points = numbers(OPENCV, "points");
@@ -53,7 +53,7 @@ fn opencv_undistorts_alike() {
     }
 }
 
-/// The fold is searched in steps of 0.005 (normalised).
+/// The fold is searched for in steps of 0.005 (normalised).
 #[test]
 fn a_lens_ends_where_its_radial_map_folds_back() {
     for name in names(TRIANGULATION, "fold ") {
@@ -65,14 +65,14 @@ fn a_lens_ends_where_its_radial_map_folds_back() {
             assert!(at(fold + 0.005 + 1e-6).is_none(), "{name} outside {fold}");
         }
     }
-    // Without distortion, and where the map never falls, nothing is too far off the axis.
+    // Without distortion, or with a map that never decreases, every angle below 90° is valid.
     assert!(camera(&[]).project(&ahead(1e6, 0.0)).is_some());
     assert!(camera(&[0.1, 0.0, 0.0, 0.0]).project(&ahead(300.0, 0.0)).is_some());
-    // A lens that folds beyond 84 degrees is taken to be one that does not.
+    // A lens that folds beyond 84 degrees counts as one that does not fold.
     assert!(camera(&[-0.003, 0.0, 0.0, 0.0]).project(&ahead(10.1, 0.0)).is_some());
 }
 
-/// At the fold of ρ = 1 − 0.28 r² the place is (2/3) r: a pixel beyond has no direction.
+/// At the fold of ρ = 1 − 0.28 r² the distorted radius is (2/3) r; a pixel beyond it has no direction.
 #[test]
 fn a_pixel_beyond_the_fold_has_no_direction() {
     let camera = camera(&[-0.28, 0.0, 0.0, 0.0]);
@@ -82,7 +82,7 @@ fn a_pixel_beyond_the_fold_has_no_direction() {
     assert!(camera.normalize(&Pixel { u: farthest + 0.01, v: 234.7 }).is_none());
 }
 
-/// A tangential term moves (0, y) along both axes: by p2 y² and p1 (3 y²), p1 = 0.01, p2 = 0.02, y = 1/2.
+/// A tangential term moves (0, y) along both axes: by p2 y² and p1 (3 y²), with p1 = 0.01, p2 = 0.02, y = 1/2.
 #[test]
 fn the_tangential_terms_by_hand() {
     let pixel = camera(&[0.0, 0.0, 0.01, 0.02]).project(&ahead(0.0, 0.5)).unwrap();
@@ -124,8 +124,8 @@ fn a_camera_reports_its_numbers() {
     assert_eq!(Pixel { u: 4.0, v: 2.5 }.distance(&Pixel { u: 4.0, v: 2.0 }), 0.5);
 }
 
-/// Lens models whose slope nearly vanishes on the way: full steps of Newton's iteration leap over the fold at 3.9, and shorter
-/// ones do not arrive.
+/// Lens models whose slope nearly vanishes: full steps of Newton's iteration cross the fold at 3.9, shorter ones do not
+/// converge.
 #[test]
 fn long_steps_of_the_iteration_are_shortened() {
     let there_and_back = |lens: &[f64], x: f64, y: f64| {
@@ -148,7 +148,7 @@ fn a_point_in_the_plane_of_the_camera_is_not_seen() {
     assert!(camera(&[]).project(&Point::<Camera>::new(1.0, 0.0, 0.0)).is_none());
     assert!(camera(&[]).project(&Point::<Camera>::new(0.0, 0.0, f64::NAN)).is_none());
     assert!(camera(&[]).project(&Point::<Camera>::new(0.0, 0.0, 1e-9)).is_some());
-    // So near the plane that its direction is no number.
+    // The point is so near the plane that its direction overflows.
     assert!(camera(&[]).project(&Point::<Camera>::new(1.0, 0.0, 1e-310)).is_none());
 }
 

@@ -1,4 +1,4 @@
-//! Motions, covariances and frames by hand.
+//! Tests of transforms, covariances and frames by hand.
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector6};
 use seafix_geometry::{
@@ -7,7 +7,7 @@ use seafix_geometry::{
     so3, triad,
 };
 
-/// A quarter turn about z, then (1, 2, 3).
+/// A rotation by 90° about z, then a translation by (1, 2, 3).
 fn quarter<A: seafix_geometry::Frame, B: seafix_geometry::Frame>() -> Transform<A, B> {
     Transform::from_rows(&[[0.0, -1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 3.0], [0.0, 0.0, 0.0, 1.0]])
         .unwrap()
@@ -34,10 +34,10 @@ fn a_matrix_is_taken_to_its_tolerance_and_no_farther() {
         m[(row, column)] += off;
         Transform::<Object, Camera>::from_matrix(&m)
     };
-    // A stretch by ε is a deviation of 2ε.
+    // A stretch by ε deviates from orthonormality by 2ε.
     assert!(with(0, 0, 0.49e-6).is_ok());
     assert!(matches!(with(0, 0, 0.51e-6), Err(NotRigid::NotOrthonormal(off)) if (off - 1.02e-6).abs() < 1e-10));
-    // A shear by ε is one of ε.
+    // A shear by ε deviates by ε.
     assert!(with(0, 1, 0.99e-6).is_ok());
     assert!(matches!(with(0, 1, 1.01e-6), Err(NotRigid::NotOrthonormal(_))));
     assert!(matches!(with(0, 1, -1.01e-6), Err(NotRigid::NotOrthonormal(_))));
@@ -50,7 +50,7 @@ fn a_matrix_is_taken_to_its_tolerance_and_no_farther() {
     assert!(matches!(with(3, 3, f64::NAN), Err(NotRigid::NotFinite { row: 3, column: 3, .. })));
     let mirrored = Transform::<Object, Camera>::from_matrix(&Matrix4::from_diagonal(&[1.0, 1.0, -1.0, 1.0].into()));
     assert_eq!(mirrored, Err(NotRigid::Reflection(-1.0)));
-    // A rotation that is off by less than the tolerance has a unit quaternion all the same.
+    // A rotation with a deviation below the tolerance still yields a unit quaternion.
     assert!((with(0, 0, 0.4e-6).unwrap().rotation().norm() - 1.0).abs() < 1e-15);
 }
 
@@ -58,13 +58,13 @@ fn a_matrix_is_taken_to_its_tolerance_and_no_farther() {
 fn an_error_is_the_motion_that_is_missing() {
     let (estimate, xi) = (quarter::<Object, Camera>(), Vector6::new(0.1, -0.2, 0.3, 1.0, 2.0, -3.0));
     assert!((estimate.error_to(&estimate.perturbed(&xi)) - xi).norm() < 1e-14);
-    // Half a turn has a logarithm, and its way there is V's: 2/π of it to the side.
+    // A rotation by π has a logarithm; its translation is V's: 2/π of it to the side.
     let half = Transform::<Object, Camera>::new(so3::exp(&Vector3::new(0.0, 0.0, std::f64::consts::PI)), Vector3::x());
     let log = half.log();
     assert!((log.fixed_rows::<3>(3) - Vector3::new(0.0, -std::f64::consts::FRAC_PI_2, 0.0)).norm() < 1e-14, "{log}");
 }
 
-/// Independent errors of 0.1 rad about and 3 m along each axis; a point at (0, 0, 3) is moved across by 0.1 · 3 besides.
+/// Independent errors of 0.1 rad and 3 m for each axis; a point at (0, 0, 3) moves sideways by 0.1 · 3 in addition.
 #[test]
 fn a_covariance_by_hand() {
     let covariance = Covariance6::<Object, Camera>::isotropic(0.1, 3.0);
@@ -80,8 +80,10 @@ fn a_covariance_by_hand() {
     assert_eq!((uneven.matrix[(0, 1)], uneven.matrix[(1, 0)]), (1.0, 1.0));
 }
 
-/// A turn about z by the noise a and a step along x by the same: the point at (0, d, 0) is moved by Exp(−ξ), a (d − 1) along x.
-/// With the sign of either part of J turned it is a (d + 1).
+/// A rotation about z and a translation along x by the same noise a may cancel at a point.
+///
+/// The point at (0, d, 0) moves by a (d − 1) along x, by Exp(−ξ). With the sign of either part of J inverted it would
+/// move by a (d + 1).
 #[test]
 fn a_turn_and_a_step_may_cancel_at_a_point() {
     let xi = Vector6::new(0.0, 0.0, 1.0, 1.0, 0.0, 0.0);
@@ -91,7 +93,8 @@ fn a_turn_and_a_step_may_cancel_at_a_point() {
     assert!((at - Matrix3::from_diagonal(&Vector3::new(0.04, 0.0, 0.0))).amax() < 1e-16);
 }
 
-/// Seen from the other side a turn about a far origin is a step: σ of a turn about z is d σ along y, and they go together.
+/// Seen from the other frame, a rotation about a distant origin is a translation: σ about z gives d σ along y, fully
+/// correlated.
 #[test]
 fn a_covariance_from_the_other_side() {
     let t = Transform::<Object, Camera>::new(so3::exp(&Vector3::zeros()), Vector3::new(3.0, 0.0, 0.0));
@@ -118,7 +121,7 @@ fn three_points_in_a_line_define_no_frame() {
     assert_eq!((found.sine, found.min), (0.0, 1e-9));
 }
 
-/// P1 = (1, 1, 1), P3 along y, P2 along x from it: x = (0, 1, 0), z = (1, 0, 0) × (0, 1, 0), y = z × x = (−1, 0, 0).
+/// P1 = (1, 1, 1), P3 along y and P2 along x from it: x = (0, 1, 0), z = (1, 0, 0) × (0, 1, 0), y = z × x = (−1, 0, 0).
 #[test]
 fn the_paper_s_frame_by_hand() {
     let [p1, p2, p3] = [[1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [1.0, 5.0, 1.0]].map(Point::<World>::from);
@@ -133,7 +136,7 @@ fn the_paper_s_frame_by_hand() {
     assert!(row_vector::eq1(&p1, &p2, &p2).is_err());
 }
 
-/// Chains of the paper against chains of columns.
+/// The paper's equations equal products of column-convention transforms.
 #[test]
 fn the_paper_s_equations_are_chains() {
     let t = |k: f64| Vector6::new(0.1 * k, -0.2, 0.05 * k, 1.0, k, -0.5);
@@ -153,9 +156,9 @@ fn the_paper_s_equations_are_chains() {
     assert!(body.inverse().apply(&c[0]).distance(&Point::origin()) < 1e-14);
     assert!(object.inverse().apply(&p[0]).distance(&Point::origin()) < 1e-14);
     let direct = row_vector::eq5(&body, &object);
-    assert!(direct.apply(&c[0]).distance(&p[0]) < 1e-14, "origins fall together");
+    assert!(direct.apply(&c[0]).distance(&p[0]) < 1e-14, "the origins coincide");
     let along = (direct.apply(&c[2]) - p[0]).cross(&(p[2] - p[0]));
-    assert!(along.norm() < 1e-13, "and the x axes do");
+    assert!(along.norm() < 1e-13, "the x axes coincide");
     assert!(row_vector::eq3(&[c[0], c[1], c[1]]).is_err() && row_vector::eq4(&[p[0], p[1], p[1]]).is_err());
 
     let (now_from_fix, object_from_fix) =

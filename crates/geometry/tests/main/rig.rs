@@ -1,4 +1,4 @@
-//! Two cameras against OpenCV and SciPy.
+//! Tests of stereo rigs against OpenCV and SciPy.
 
 use nalgebra::{Matrix3, Matrix4, UnitQuaternion, Vector3, Vector4};
 use seafix_geometry::{
@@ -11,7 +11,7 @@ use crate::{names, near, numbers};
 const OPENCV: &str = include_str!("../fixtures/opencv.txt");
 const TRIANGULATION: &str = include_str!("../fixtures/triangulation.txt");
 
-/// That of `opencv.py`.
+/// The rig of `opencv.py`.
 fn rig() -> StereoRig {
     let left =
         Pinhole::new([640, 480], [533.4, 541.7], [342.5, 234.7], &[-0.31, 0.12, -0.0021, 0.0016, -0.018]).unwrap();
@@ -62,16 +62,16 @@ fn opencv_has_the_same_distance_from_the_epipolar_line() {
     for i in 0..sampson.len() {
         let seen = StereoPixels { left: left[i], right: off[i] };
         let found = rig.epipolar_distance(&seen).unwrap();
-        assert!((found - sampson[i]).abs() < 1e-9, "{i}: {found}, not {}", sampson[i]);
+        assert!((found - sampson[i]).abs() < 1e-9, "{i}: {found}, expected {}", sampson[i]);
         let offset = rig.epipolar_offset(&seen).unwrap();
         assert_eq!(offset.abs(), found);
         signs.push(offset > 0.0);
     }
-    // Below the line is one side, above it the other.
+    // The sign distinguishes both sides of the epipolar line.
     assert_ne!(signs[0], signs[1]);
 }
 
-/// Pixels that disagree by pixels, with a covariance of which every entry counts.
+/// Pixels that disagree by several pixels, with a full covariance.
 #[test]
 fn scipy_has_the_same_least_squares_solution() {
     let rig = rig();
@@ -123,7 +123,7 @@ fn only_a_camera_beside_or_above_its_like_is_rectified() {
     assert_eq!(both(aside([0.0; 3], [-0.3, 0.0, 0.0])), (true, false));
     assert_eq!(both(aside([0.0; 3], [0.0, 0.3, 0.0])), (false, true));
     assert_eq!(both(aside([0.0; 3], [0.0, 0.0, 0.3])), (false, false));
-    // Off by rounding, and by more: as a share of the baseline.
+    // Deviations from a rectified rig by rounding and by more, relative to the baseline.
     assert_eq!(both(aside([0.0; 3], [-0.3, 2e-13, -2e-13])), (true, false));
     assert_eq!(both(aside([0.0; 3], [-3.0, 2e-12, -2e-12])), (true, false));
     assert_eq!(both(aside([0.0; 3], [2e-12, 3.0, -2e-12])), (false, true));
@@ -162,7 +162,7 @@ fn the_right_camera_turns_where_it_stands() {
 
 #[test]
 fn both_images_must_show_a_point() {
-    // 0.3 m beside, f = 500: at 1 m depth a point is 150 px farther left in the right image.
+    // With a baseline of 0.3 m and f = 500 px a point at 1 m depth is 150 px farther left in the right image.
     let rig = aside([0.0; 3], [-0.3, 0.0, 0.0]);
     let at = |u: f64, margin: f64| rig.sees(&Point::new((u - 511.5) / 500.0, 0.0, 1.0), margin).is_some();
     assert!(at(500.0, 20.0) && at(1000.0, 20.0) && at(172.0, 20.0));
@@ -175,7 +175,8 @@ fn pixels_err_by_their_standard_deviation() {
     assert_eq!(UncertainPixels::independent(at, 3.0).covariance, Matrix4::identity() * 9.0);
 }
 
-/// Rays at an angle φ give n² = sin² φ: 1e-14 is passed between 0.99e-7 and 1.01e-7 rad. The cameras see 0.3 m / Z under φ.
+/// Rays at an angle φ give n² = sin² φ: the limit 1e-14 lies between 0.99e-7 and 1.01e-7 rad. The cameras see a
+/// baseline of 0.3 m at depth Z under φ = 0.3 / Z.
 #[test]
 fn parallel_rays_meet_nowhere() {
     let rig = aside([0.0; 3], [-0.3, 0.0, 0.0]);
@@ -183,17 +184,17 @@ fn parallel_rays_meet_nowhere() {
         let exact = rig.project(&Point::new(0.15, 0.0, depth)).unwrap();
         rig.triangulate_midpoint(&UncertainPixels::independent(exact, 1e-9)).map(|found| found.point.coords.z)
     };
-    // A thousandth of a pixel, the step of the derivatives, is more than this disparity.
+    // The step of the derivatives, a thousandth of a pixel, exceeds this disparity.
     assert!(matches!(at(0.3 / 1.1e-7), Err(Untriangulable::Behind(_))));
     assert_eq!(at(0.3 / 0.95e-7), Err(Untriangulable::Parallel));
 }
 
-/// A point whose standard deviation is its distance is not measured: σ_z = z² σ_d / (f b), √2 σ = σ_d.
+/// A point with a standard deviation as large as its distance is rejected: σ_z = z² σ_d / (f b), √2 σ = σ_d.
 #[test]
 fn a_point_less_known_than_far_is_refused() {
     let rig = aside([0.0; 3], [-0.3, 0.0, 0.0]);
     let at = |fraction: f64| {
-        // At 30 m the depth's sigma is 6 σ_d m.
+        // At 30 m the standard deviation of the depth is 6 σ_d m.
         let exact = rig.project(&Point::new(0.15, 0.0, 30.0)).unwrap();
         let seen = UncertainPixels::independent(exact, fraction * 5.0 / std::f64::consts::SQRT_2);
         [rig.triangulate(&seen), rig.triangulate_midpoint(&seen), rig.triangulate_linear(&seen)]
@@ -204,7 +205,7 @@ fn a_point_less_known_than_far_is_refused() {
 
 #[test]
 fn rays_that_part_meet_behind() {
-    // A disparity of −10 px: the rays meet at −500 · 0.3 / 10 m.
+    // With a disparity of −10 px the rays meet at −500 · 0.3 / 10 m.
     let rig = aside([0.0; 3], [-0.3, 0.0, 0.0]);
     let at = StereoPixels { left: Pixel { u: 506.5, v: 383.5 }, right: Pixel { u: 516.5, v: 383.5 } };
     let seen = UncertainPixels::independent(at, 0.2);
@@ -213,7 +214,7 @@ fn rays_that_part_meet_behind() {
         let Err(Untriangulable::Behind(depth)) = found else { panic!("{found:?}") };
         assert!((depth + 15.0).abs() < 1e-3, "{depth}");
     }
-    // In front of the left camera alone: the right one looks back.
+    // The point is in front of the left camera only; the right one looks back.
     let back = aside([0.0, std::f64::consts::PI, 0.0], [-0.3, 0.0, 4.0]);
     let at = StereoPixels { left: Pixel { u: 511.5, v: 383.5 }, right: Pixel { u: 500.0, v: 383.5 } };
     let seen = UncertainPixels::independent(at, 0.2);
@@ -222,9 +223,10 @@ fn rays_that_part_meet_behind() {
     }
 }
 
-/// Rays that pass each other in front of the left camera and behind the right one, their midpoint before both: the left one
-/// looks along z from the origin, the right one stands at (0.3, 0, 0) and its ray b = (0.1, 0.9, −0.42) comes nearest at
-/// u = −0.3 bₓ / (bₓ² + b_y²) of b.
+/// Rays that approach in front of the left camera and behind the right one.
+///
+/// Their midpoint is in front of both cameras. The left ray runs along z from the origin. The right camera is at (0.3,
+/// 0, 0); its ray b = (0.1, 0.9, −0.42) is nearest at u = −0.3 bₓ / (bₓ² + b_y²) of b.
 #[test]
 fn a_ray_is_not_followed_backwards() {
     let b = Vector3::new(0.1, 0.9, -0.42);
@@ -237,6 +239,9 @@ fn a_ray_is_not_followed_backwards() {
     let seen = UncertainPixels::independent(StereoPixels { left, right }, 0.01);
     let u = -0.3 * b.x / (b.x * b.x + b.y * b.y) * b.norm();
     for found in [rig.triangulate(&seen), rig.triangulate_midpoint(&seen)] {
-        assert!(matches!(found, Err(Untriangulable::Behind(depth)) if (depth - u).abs() < 1e-9), "{found:?}, not {u}");
+        assert!(
+            matches!(found, Err(Untriangulable::Behind(depth)) if (depth - u).abs() < 1e-9),
+            "{found:?}, expected {u}"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Exponential, logarithm and Jacobians against 60 digits.
+//! Tests of exponential, logarithm and Jacobians against 60-digit arithmetic.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform, right_jacobian_inverse, so3};
@@ -7,7 +7,7 @@ use crate::{names, near, numbers};
 
 const SERIES: &str = include_str!("../fixtures/series.txt");
 
-/// Seen to fail with 1/12, 1/48 and 1/240 for the series' 1/24, 1/6 and 1/120.
+/// The test fails with 1/12, 1/48 and 1/240 in place of the series' 1/24, 1/6 and 1/120.
 #[test]
 fn a_turn_of_any_size_has_its_digits() {
     let mut sizes = 0;
@@ -15,9 +15,9 @@ fn a_turn_of_any_size_has_its_digits() {
         let phi = Vector3::from_vec(numbers(SERIES, &format!("phi {size}")));
         let turn = so3::exp(&phi);
         let wanted = numbers(SERIES, &format!("exp {size}"));
-        // The axis to its own digits: those of a small turn are as good as those of a large one.
+        // The axis is compared relative to its own size, so that small rotations are as precise as large ones.
         near(turn.imag().as_slice(), &wanted[1..], 4e-16, &format!("exp {size}"));
-        assert!((turn.w - wanted[0]).abs() < 3e-16, "exp {size}: {}, not {}", turn.w, wanted[0]);
+        assert!((turn.w - wanted[0]).abs() < 3e-16, "exp {size}: {}, expected {}", turn.w, wanted[0]);
         near(so3::log(&turn).as_slice(), phi.as_slice(), 4e-16, &format!("log {size}"));
         assert!((so3::angle(&turn) / phi.norm() - 1.0).abs() < 4e-16, "angle {size}");
         sizes += 1;
@@ -31,14 +31,14 @@ fn the_left_jacobian_is_its_sum() {
         let phi = Vector3::from_vec(numbers(SERIES, &format!("phi {size}")));
         let wanted = Matrix3::from_row_slice(&numbers(SERIES, &format!("jacobian {size}")));
         let found = so3::left_jacobian(&phi);
-        // Off the diagonal stand theta / 2 and theta^2 / 6.
+        // The off-diagonal terms are theta / 2 and theta^2 / 6.
         let theta = phi.norm();
         let parts = |jacobian: &Matrix3<f64>| {
             [(jacobian - jacobian.transpose()) * 0.5, (jacobian + jacobian.transpose()) * 0.5 - Matrix3::identity()]
         };
         let ([odd, even], [odd_wanted, even_wanted]) = (parts(&found), parts(&wanted));
         assert!((odd - odd_wanted).amax() < 1e-15 * theta, "{size}: {:e}", (odd - odd_wanted).amax());
-        // The closed form (theta - sin theta) / theta^3 loses digits above the series, theta^2 gives them back.
+        // The closed form (theta - sin theta) / theta^3 loses digits above the series; theta^2 restores them.
         assert!((even - even_wanted).amax() < 4e-16, "{size}: {:e}", (even - even_wanted).amax());
         let xi = Vector6::from_iterator(phi.iter().copied().chain([0.5, -0.7, 0.3]));
         let motion = Transform::<Object, Camera>::exp(&xi);
@@ -47,12 +47,12 @@ fn the_left_jacobian_is_its_sum() {
     }
 }
 
-/// V's symmetric part is θ²/6 − θ⁴/120 across the turn: a fault of the second term shows by its own size alone.
+/// V's symmetric part is θ²/6 − θ⁴/120 across the rotation axis: an error of the second term is visible by itself.
 #[test]
 fn the_series_second_terms_are_right() {
     let theta = 9.9e-4;
     let v = so3::left_jacobian(&Vector3::new(0.0, 0.0, theta));
-    // (1 - cos θ)/θ and sin θ/θ.
+    // The terms (1 − cos θ)/θ and sin θ/θ.
     let wanted = (theta / 2.0 - theta.powi(3) / 24.0, 1.0 - theta * theta / 6.0 + theta.powi(4) / 120.0);
     assert!((v.m21 - wanted.0).abs() < 1e-18 && (v.m12 + wanted.0).abs() < 1e-18, "{} {}", v.m21, wanted.0);
     assert!((v.m11 - wanted.1).abs() < 2.3e-16 && (v.m22 - wanted.1).abs() < 2.3e-16 && v.m33 == 1.0);
@@ -76,13 +76,13 @@ fn a_matrix_near_half_a_turn_keeps_its_axis() {
         let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle);
         let found = so3::log_of_matrix(turn.matrix());
         let off = (found - axis * angle).norm();
-        // Half a turn is one about either end of its axis.
+        // A rotation by π has two axes of opposite sign.
         let off = if angle == PI { off.min((found + axis * angle).norm()) } else { off };
         assert!(off < 1e-15 + 4e-15 * angle, "{angle}: {found} {off:e}");
     }
 }
 
-/// Both signs of a quaternion are one rotation.
+/// Both signs of a quaternion are the same rotation.
 #[test]
 fn the_long_orientation_is_not_taken() {
     let turn = so3::exp(&Vector3::new(0.0, 0.0, 1.5 * std::f64::consts::PI));
@@ -90,7 +90,7 @@ fn the_long_orientation_is_not_taken() {
     assert!((so3::angle(&turn) - 0.5 * std::f64::consts::PI).abs() < 1e-15);
 }
 
-/// No turn has no axis, and half a turn has two: the quaternion's.
+/// The identity has no axis; a rotation by π has two, and the quaternion selects one.
 #[test]
 fn the_ends_of_the_logarithm() {
     let half = |w: f64, axis: Vector3<f64>| {

@@ -1,4 +1,4 @@
-//! Samples of an image file: PNG, JPEG and PNM, told apart by their first bytes.
+//! Decoding of PNG, JPEG and PNM files, recognised by their first bytes.
 
 use std::{io::Cursor, path::Path};
 
@@ -9,23 +9,23 @@ use zune_jpeg::JpegDecoder;
 
 use super::pnm;
 
-/// The samples of an image, as its file has them.
+/// The samples of an image, as stored in its file.
 #[derive(Debug)]
 pub(super) struct Samples {
-    /// Row by row, the channels of a pixel together.
+    /// The samples row by row, with the channels of a pixel together.
     pub(super) values: Vec<u16>,
-    /// 1 grey, 2 grey and alpha, 3 red, green and blue, 4 these and alpha.
+    /// The number of channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
     pub(super) channels: usize,
-    /// Whether a sample has 16 bits, and not 8.
+    /// Whether a sample has 16 bits rather than 8.
     pub(super) deep: bool,
     /// The value of white, if the file states it.
     pub(super) white: Option<u16>,
 }
 
-/// The columns and rows that the header of an image file declares.
+/// The width and height in the header of an image file.
 ///
 /// # Errors
-/// The cause, if the bytes begin no image.
+/// The cause, if the bytes are no image.
 pub(super) fn size(bytes: &[u8]) -> Result<[u32; 2], String> {
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => {
@@ -45,10 +45,10 @@ pub(super) fn size(bytes: &[u8]) -> Result<[u32; 2], String> {
     }
 }
 
-/// Decodes an image file; its samples take at most `limit` bytes. Faults name `path`.
+/// Decodes an image file into at most `limit` bytes of samples. Faults name `path`.
 ///
 /// # Errors
-/// Bytes that are no complete image, or take more.
+/// Bytes that are no complete image, or samples beyond the limit.
 pub(super) fn samples(bytes: &[u8], path: &Path, limit: u64) -> Result<Samples, Fault> {
     let decoded = match bytes {
         [0x89, b'P', b'N', b'G', ..] => png_samples(bytes, limit),
@@ -62,10 +62,10 @@ pub(super) fn samples(bytes: &[u8], path: &Path, limit: u64) -> Result<Samples, 
     decoded.map_err(|cause| damaged(path, cause))
 }
 
-/// The fault of bytes that are no image.
+/// The fault of a file that is no image.
 pub(super) fn damaged(path: &Path, cause: String) -> Fault {
-    let remedy = "PNG, JPEG and PNM are read, grey or colour, 8 or 16 bits";
-    Fault::new("no image that can be decoded", path).value(cause).remedy(remedy)
+    let remedy = "give PNG, JPEG or PNM, grey or colour, 8 or 16 bits";
+    Fault::new("an image that cannot be decoded", path).value(cause).remedy(remedy)
 }
 
 fn png_samples(bytes: &[u8], limit: u64) -> Result<Samples, String> {
@@ -79,9 +79,9 @@ fn png_samples(bytes: &[u8], limit: u64) -> Result<Samples, String> {
         ColorType::GrayscaleAlpha => 2,
         ColorType::Rgb => 3,
         ColorType::Rgba => 4,
-        ColorType::Indexed => return Err("a palette that is not expanded".to_owned()),
+        ColorType::Indexed => return Err("the colour palette was not expanded".to_owned()),
     };
-    let size = reader.output_buffer_size().ok_or("an image larger than the memory")?;
+    let size = reader.output_buffer_size().ok_or("the image does not fit into memory")?;
     within(limit, size)?;
     let mut buffer = vec![0; size];
     reader.next_frame(&mut buffer).map_err(|error| error.to_string())?;
@@ -101,7 +101,7 @@ fn jpeg_samples(bytes: &[u8], limit: u64) -> Result<Samples, String> {
         _ => (ColorSpace::RGB, 3),
     };
     decoder.set_options(decoder.options().jpeg_set_out_colorspace(space));
-    within(limit, decoder.output_buffer_size().ok_or("an image larger than the memory")?)?;
+    within(limit, decoder.output_buffer_size().ok_or("the image does not fit into memory")?)?;
     let values = decoder.decode().map_err(|error| error.to_string())?;
     Ok(Samples { values: values.into_iter().map(u16::from).collect(), channels, deep: false, white: None })
 }
@@ -113,7 +113,7 @@ fn jpeg_decoder(bytes: &[u8]) -> JpegDecoder<ZCursor<&[u8]>> {
 
 fn within(limit: u64, size: usize) -> Result<(), String> {
     if size as u64 > limit {
-        return Err(format!("it takes {size} bytes of memory; the limit is {limit}"));
+        return Err(format!("it needs {size} bytes of memory, the limit is {limit}"));
     }
     Ok(())
 }

@@ -1,9 +1,9 @@
-//! What an image file holds, seen before it is decoded.
+//! Checks of an image file before it is decoded.
 
-/// Why an encoded image is not read, and the remedy; `None`: nothing is known against it.
+/// The reason not to read an encoded image, with its remedy; `None` if there is none.
 ///
-/// Decoders are lenient: they fill what is missing of a JPEG with grey, guess at inks, and give the
-/// first of moving pictures. A measurement is not made on such.
+/// Decoders are lenient: they fill the missing part of a JPEG with grey, guess the colours of inks, and return the
+/// first image of an animation. Such pixels are no measurements.
 pub(super) fn objection(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     match bytes {
         [0xFF, 0xD8, rest @ ..] => jpeg(rest),
@@ -12,13 +12,12 @@ pub(super) fn objection(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     }
 }
 
-const EARLY: (&str, &str) = ("an image that ends early", "copy the file again");
+const EARLY: (&str, &str) = ("a truncated image", "copy the file again");
 
-/// Goes from marker to marker up to the end of the image.
+/// Follows the markers of a JPEG to the end of the image.
 fn jpeg(mut bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     loop {
-        // The next marker: 0xFF and a byte that is neither filling nor, within data, a stuffed zero or a
-        // restart.
+        // The next marker is 0xFF and a byte other than fill, stuffed zero or restart.
         let at = bytes.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 1 | 0xD0..=0xD7 | 0xFF));
         let Some(at) = at else { return Some(EARLY) };
         let (marker, segment) = (bytes[at + 1], &bytes[at + 2..]);
@@ -26,10 +25,10 @@ fn jpeg(mut bytes: &[u8]) -> Option<(&'static str, &'static str)> {
             return None;
         }
         let [high, low, content @ ..] = segment else { return Some(EARLY) };
-        // The length counts its own two bytes.
+        // The length includes its own two bytes.
         let length = usize::from(u16::from_be_bytes([*high, *low])).saturating_sub(2);
         let frame = matches!(marker, 0xC0..=0xCF) && !matches!(marker, 0xC4 | 0xC8 | 0xCC);
-        // Depth, height, width, then the number of components.
+        // A frame segment holds depth, height, width and the number of components.
         if frame && content.get(5) == Some(&4) {
             return Some(("an image of four inks (CMYK)", "convert it to grey or RGB"));
         }
@@ -38,7 +37,7 @@ fn jpeg(mut bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     }
 }
 
-/// Goes from chunk to chunk up to the pixels.
+/// Follows the chunks of a PNG to the pixels.
 fn png(mut bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     while let [a, b, c, d, kind @ ..] = bytes {
         let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
@@ -48,7 +47,7 @@ fn png(mut bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         if kind.starts_with(b"IDAT") {
             return None;
         }
-        // The kind before the content, the checksum behind it.
+        // A chunk is length, kind, content and checksum.
         bytes = kind.get(length.checked_add(8)?..)?;
     }
     None
@@ -71,7 +70,7 @@ mod tests {
         for end in 2..complete.len() {
             assert_eq!(objection(&complete[..end]), Some(EARLY), "{end}");
         }
-        // What a camera hangs on behind the image is no part of it.
+        // A trailer after the image, as some cameras write, is ignored.
         assert_eq!(objection(&[&complete[..], b"trailer"].concat()), None);
     }
 }

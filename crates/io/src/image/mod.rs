@@ -1,4 +1,4 @@
-//! Image files in and out.
+//! Readers of image files.
 
 use std::{fs::File, io::Read, path::Path};
 
@@ -11,12 +11,12 @@ mod decode;
 mod encoded;
 mod pnm;
 
-/// How large an image may be before it is refused: checked before anything of that size is made.
+/// The limits of an image's size, checked before memory is allocated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageLimits {
-    /// The most pixels that a header may declare.
+    /// The maximum number of pixels in a header.
     pub pixels: u64,
-    /// The most memory that the decoder may take, and the largest file that is read (bytes).
+    /// The maximum size of the file and of the decoder's memory (bytes).
     pub bytes: u64,
 }
 
@@ -27,36 +27,36 @@ impl Default for ImageLimits {
     }
 }
 
-/// Reads a PNG, JPEG or PNM image as grey, 0 to 255 for black to white, as finely as its file has it;
-/// colour becomes luma (Rec. 709 weights). `expected` is the size that the calibration has, `bits` the
-/// depth of the pixels in images of 16 bits.
+/// Reads a PNG, JPEG or PNM image as grey values.
+///
+/// Values range from 0 (black) to 255 (white) at the full depth of the file. Colour becomes luma (Rec. 709).
+/// `expected` is the calibrated size, `bits` the number of significant bits in images of 16 bits.
 ///
 /// # Errors
-/// An unreadable, truncated or foreign file, a moving image, four inks, transparent pixels, pixels
-/// beyond the depth, a size other than expected or beyond `limits` (checked from the header, before
-/// anything is decoded).
+/// An unreadable, truncated or unsupported file, an animation, a CMYK image, transparent pixels, values above `bits`, a
+/// size other than expected or beyond `limits`. Sizes are checked in the header before decoding.
 pub fn read_image(path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits) -> Result<Image, Fault> {
     let mut bytes = Vec::new();
-    // A file may grow while it is read, and some have no size before.
+    // The size of a file may change during reading, and a pipe has none.
     let read = regular(path)?.take(limits.bytes.saturating_add(1)).read_to_end(&mut bytes);
     read.map_err(|error| unreadable(path, &error))?;
     if bytes.len() as u64 > limits.bytes {
-        let remedy = format!("at most {} bytes are read; {} allows more", limits.bytes, allows("max-bytes"));
+        let remedy = format!("the limit is {} bytes; {} raises it", limits.bytes, allows("max-bytes"));
         let size = std::fs::metadata(path).map_or(0, |metadata| metadata.len()).max(bytes.len() as u64);
         return Err(Fault::new("an image file too large", path).value(format!("{size} bytes")).remedy(remedy));
     }
     decode_image(&bytes, path, expected, bits, limits)
 }
 
-/// The file at `path`, open; devices, pipes and folders are not opened.
+/// Opens the regular file at `path`; devices, pipes and folders are rejected.
 ///
 /// # Errors
-/// What is there instead, or why it cannot be read.
+/// A path that is no regular file, or the cause of the failure.
 pub fn regular(path: &Path) -> Result<File, Fault> {
     let kind = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?.file_type();
     if !kind.is_file() {
         let kind = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
-        return Err(Fault::new("a path that is no file", path).value(kind).remedy("name a file"));
+        return Err(Fault::new("a path that is not a file", path).value(kind).remedy("name a file"));
     }
     File::open(path).map_err(|error| unreadable(path, &error))
 }
@@ -65,15 +65,15 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Fault {
     Fault::new(format!("cannot read ({error})"), path).remedy("check the path and its permissions")
 }
 
-/// How a limit is changed: by an option of a command or, in an experiment, by a setting of the source.
+/// The option of a command and the key of an experiment that change a limit.
 fn allows(limit: &str) -> String {
     format!("`--{limit}`, in an experiment `source.{limit}`,")
 }
 
-/// The same of the bytes of such a file; faults name `path`.
+/// Reads an image from the bytes of a file; faults name `path`.
 ///
 /// # Errors
-/// As [`read_image`].
+/// As for [`read_image`].
 pub fn decode_image(
     bytes: &[u8],
     path: &Path,
@@ -92,18 +92,18 @@ pub fn decode_image(
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), path))
 }
 
-/// The image of samples as a camera gave them, row by row: grey, or red, green and blue; `white` is the greatest.
+/// The image of raw samples of a camera, row by row: grey or RGB, with `white` as maximum.
 pub fn image_of_samples(samples: &[u16], [width, height]: [u32; 2], white: u16) -> Result<Image, Fault> {
     let channels = samples.len() / (width as usize * height as usize).max(1);
     let pixels = levels_of(samples, channels.max(1), width as usize, white, 0)?;
     Image::new(width as usize, height as usize, pixels).map_err(|error| Fault::new(error.to_string(), Path::new("")))
 }
 
-/// `expected` is the size that the calibration has.
+/// Checks the size of an image against the limits and the calibration.
 fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits: ImageLimits) -> Result<(), Fault> {
     if u64::from(width) * u64::from(height) > limits.pixels {
         return Err(Fault::new("an image too large", path).value(format!("{width}×{height}")).remedy(format!(
-            "at most {} pixels are read; {} allows more",
+            "the limit is {} pixels; {} raises it",
             limits.pixels,
             allows("max-pixels")
         )));
@@ -117,28 +117,28 @@ fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits
 fn size_mismatch(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
     Fault::new("an image of another size than the calibration", path)
         .value(format!("{width}×{height}, calibrated {w}×{h}"))
-        .remedy("give the images the rig was calibrated with, or correct `size`")
+        .remedy("use the images of the calibrated camera, or correct `size`")
 }
 
-/// The size that the header of an image file declares; `None` if there is no header to read.
+/// The size in the header of an image file; `None` without a readable header.
 pub fn declared_size(path: &Path) -> Option<[u32; 2]> {
-    /// Enough for what cameras put before a JPEG's frame: thumbnails and profiles.
+    /// This length covers the thumbnails and profiles that cameras write before a JPEG's frame.
     const HEADER: u64 = 4 << 20;
     let mut bytes = Vec::new();
     regular(path).ok()?.take(HEADER).read_to_end(&mut bytes).ok()?;
     decode::size(&bytes).ok()
 }
 
-/// The fault of an image whose header declares another size than `expected`; none where there is no header to read.
+/// The fault of an image whose header has another size than `expected`; `None` without a readable header.
 pub fn size_fault(path: &Path, expected: [u32; 2]) -> Option<Fault> {
     let size = declared_size(path)?;
     (size != expected).then(|| size_mismatch(path, size, expected))
 }
 
-/// Rec. 709's weights of red, green and blue, in ten thousandths.
+/// The weights of red, green and blue in Rec. 709, in ten-thousandths.
 const LUMA: [u32; 3] = [2126, 7152, 722];
 
-/// The brightness of every pixel, 0 to 255; `bits` is the depth of images of 16 bits.
+/// The luma of every pixel, 0 to 255; `bits` is the number of significant bits in images of 16 bits.
 fn grey_levels(samples: &Samples, width: usize, bits: u8) -> Result<Vec<f32>, Fault> {
     let full = if samples.deep { ((1_u32 << bits.min(16)) - 1) as u16 } else { u8::MAX.into() };
     let opaque = samples.white.unwrap_or(if samples.deep { u16::MAX } else { u8::MAX.into() });
@@ -151,18 +151,18 @@ fn levels_of(samples: &[u16], channels: usize, width: usize, white: u16, opaque:
     let colours = if channels > 2 { 3 } else { 1 };
     let pixels = samples.chunks_exact(channels);
     if pixels.clone().any(|pixel| pixel[colours..].iter().any(|&alpha| alpha < opaque)) {
-        return Err(Fault::new("an image with transparent pixels", here).remedy("give it without an alpha channel"));
+        return Err(Fault::new("an image with transparent pixels", here).remedy("remove the alpha channel"));
     }
     if pixels.clone().any(|pixel| pixel[..colours].iter().any(|&value| value > white)) {
         let greatest = |pixel: &[u16]| pixel[..colours].iter().copied().max().unwrap_or(0);
         let all = pixels.clone().map(greatest).enumerate();
         let (at, max) = all.max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).unwrap_or_default();
         let (x, y, min) = (at % width.max(1), at / width.max(1), if max < 4096 { 12 } else { 16 });
-        return Err(Fault::new("a pixel beyond the depth", here)
+        return Err(Fault::new("a pixel value above the bit depth", here)
             .value(format!("{max} at ({x}, {y}), white is {white}"))
-            .remedy(format!("its images have more bits than `bits` of dataset.toml says; give bits = {min}")));
+            .remedy(format!("set bits = {min} in dataset.toml")));
     }
-    // Integers up to here: a grey pixel comes out the same whether it is stored as grey or as colour.
+    // Integer arithmetic up to here gives the same value for a grey pixel stored as grey and as colour.
     let complete = f64::from(LUMA.iter().sum::<u32>()) * f64::from(white);
     let level = |pixel: &[u16]| {
         let luma: u32 = match pixel {
@@ -180,7 +180,7 @@ mod tests {
 
     use super::*;
 
-    /// An image file of these bytes, read back.
+    /// Writes the bytes to a file and reads the image back.
     fn read(name: &str, bytes: &[u8], size: [u32; 2], bits: u8) -> Result<Image, String> {
         within(ImageLimits::default(), name, bytes, size, bits)
     }
@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(said.lines().count(), 1);
     }
 
-    /// 8×6 pixels of this kind as PNG.
+    /// A PNG of 8×6 pixels.
     fn png(samples: &[u8], (color, depth): (ColorType, BitDepth)) -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 8, 6);
@@ -244,7 +244,7 @@ mod tests {
         assert_eq!(found.pixels()[0], 255.0);
         assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
         let said = read("a", &twelve, [8, 6], 8).unwrap_err();
-        assert!(said.contains("4095 at (0, 0), white is 255; ") && said.contains("give bits = 12"), "{said}");
+        assert!(said.contains("4095 at (0, 0), white is 255; ") && said.contains("set bits = 12"), "{said}");
     }
 
     #[test]
@@ -264,13 +264,13 @@ mod tests {
     fn what_is_no_still_image_of_light_is_refused_by_name() {
         let glass: Vec<u8> = (0..48).flat_map(|i| [100, 200 + i]).collect();
         refused("a.png", &png(&glass, (ColorType::GrayscaleAlpha, BitDepth::Eight)), &["transparent pixels"]);
-        // The chunk that announces frames stands behind the header's 33 bytes.
+        // The chunk that announces an animation follows the 33 bytes of signature and header.
         let mut moving = png(&[7; 48], GREY);
         let frames = [0, 0, 0, 8, b'a', b'c', b'T', b'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xF3, 0x8D, 0x93, 0x70];
         moving.splice(33..33, frames);
         refused("a.png", &moving, &["a moving image"]);
-        refused("a.png", b"GIF89a", &["PNG, JPEG and PNM"]);
-        refused("a.png", b"", &["PNG, JPEG and PNM"]);
+        refused("a.png", b"GIF89a", &["PNG, JPEG or PNM"]);
+        refused("a.png", b"", &["PNG, JPEG or PNM"]);
     }
 
     #[test]
@@ -278,17 +278,17 @@ mod tests {
         let samples: Vec<u8> = (0..48_usize).map(|i| (i * 37 % 251) as u8).collect();
         for (name, complete) in [("a.png", png(&samples, GREY)), ("a.jpg", jpeg(&samples)), ("a.pgm", pgm(&samples))] {
             assert!(read(name, &complete, [8, 6], 16).is_ok());
-            // The PNG's last chunk, 12 bytes, says no more than that there is none.
+            // The last chunk of a PNG, 12 bytes, holds no data.
             let last = if name == "a.png" { complete.len() - 13 } else { complete.len() - 1 };
             for end in [0, 1, 5, 20, last / 2, last - 10, last] {
                 assert!(read(name, &complete[..end], [8, 6], 16).is_err(), "{name}: {end} of {}", complete.len());
             }
         }
-        // The wrong extension does not matter: the content says what it is.
+        // The content decides the format, not the extension.
         assert!(read("a.jpg", &png(&samples, GREY), [8, 6], 16).is_ok());
     }
 
-    /// Pixels that are stored coarse to fine: 8×6 of them, each 5 more than the one before, by Adam7's seven passes.
+    /// Interlaced pixels (Adam7, seven passes): 8×6 pixels in steps of 5.
     #[test]
     fn an_interlaced_image_is_put_in_order() {
         let bytes = [
@@ -312,16 +312,13 @@ mod tests {
         let said = limited(47, enough).unwrap_err();
         assert!(
             said.contains(
-                "8×6; at most 47 pixels are read; `--max-pixels`, in an experiment `source.max-pixels`, allows more"
+                "8×6; the limit is 47 pixels; `--max-pixels`, in an experiment `source.max-pixels`, raises it"
             ),
             "{said}"
         );
         let said = limited(48, complete.len() as u64 - 1).unwrap_err();
-        assert!(
-            said.contains("bytes are read; `--max-bytes`, in an experiment `source.max-bytes`, allows more"),
-            "{said}"
-        );
-        // A small file that decodes to much more than it takes.
+        assert!(said.contains("bytes; `--max-bytes`, in an experiment `source.max-bytes`, raises it"), "{said}");
+        // A small file that decodes to much more memory.
         let flat = png(&[0; 48], GREY);
         assert!(within(ImageLimits { pixels: 48, bytes: 40 }, "a.png", &flat, [8, 6], 16).is_err());
     }
@@ -332,7 +329,7 @@ mod tests {
         refused(
             "a.pgm",
             b"P5 100000 100000 255\n1234",
-            &["an image too large", "100000×100000; at most 67108864 pixels"],
+            &["an image too large", "100000×100000; the limit is 67108864 pixels"],
         );
         let header = |width: u32, height: u32| {
             let mut bytes = png(&[7; 48], GREY);

@@ -1,4 +1,4 @@
-//! Netpbm images (PBM, PGM, PPM, PAM): a header that states what white is, then samples, none of them brighter.
+//! Netpbm images: PBM, PGM, PPM and PAM.
 
 use std::path::Path;
 
@@ -6,29 +6,29 @@ use seafix_component::Fault;
 
 use super::decode::{Samples, damaged};
 
-/// The part of a file before its samples.
+/// The header of a Netpbm file.
 #[derive(Debug)]
 pub(super) struct Header {
-    /// Columns and rows.
+    /// The width and height (px).
     pub(super) size: [u32; 2],
     channels: usize,
-    /// MAXVAL, the value of white; 1 of a bitmap.
+    /// The value of white (MAXVAL); 1 for a bitmap.
     white: u16,
     coding: Coding,
     /// The offset of the first sample.
     begin: usize,
 }
 
-/// The form of the samples.
+/// The coding of the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Coding {
     /// Decimal numbers.
     Text,
-    /// One byte, or two with the higher first where MAXVAL is above 255.
+    /// One byte, or two in big-endian order if MAXVAL is above 255.
     Binary,
-    /// Digits 0 (white) and 1 (black), with or without space between them.
+    /// The digits 0 (white) and 1 (black), with or without space between them.
     TextBits,
-    /// Bits, 1 for black; a row ends with its byte.
+    /// Bits, 1 for black; each row begins at a byte.
     PackedBits,
 }
 
@@ -36,7 +36,7 @@ impl Header {
     /// Reads the header of a file.
     ///
     /// # Errors
-    /// The cause, if it is none.
+    /// The cause, if the bytes are no such header.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
         let (channels, coding) = match bytes.get(..2) {
             Some(b"P1") => (1, Coding::TextBits),
@@ -52,28 +52,28 @@ impl Header {
         let mut numbers = [0, 0, 1];
         let mut begin = 2;
         for number in &mut numbers[..if bitmap { 2 } else { 3 }] {
-            let (offset, value) = words(&bytes[begin..]).next().ok_or("a header that ends early")?;
+            let (offset, value) = words(&bytes[begin..]).next().ok_or("the header is truncated")?;
             *number = value;
             begin += offset + bytes[begin + offset..].iter().take_while(|byte| byte.is_ascii_digit()).count();
         }
         let [width, height, white] = numbers;
-        // One space ends the header.
+        // A single white space ends the header.
         Self::checked(Self { size: [width, height], channels, white: maxval(white)?, coding, begin: begin + 1 })
     }
 
-    /// PAM: a line a key.
+    /// Reads the header of a PAM file, one key a line.
     fn read_pam(bytes: &[u8]) -> Result<Self, String> {
         const END: &[u8] = b"ENDHDR\n";
-        let end = bytes.windows(END.len()).position(|window| window == END).ok_or("a header without ENDHDR")?;
+        let end = bytes.windows(END.len()).position(|window| window == END).ok_or("the header has no ENDHDR")?;
         let text = std::str::from_utf8(&bytes[..end]).map_err(|error| error.to_string())?;
         let value = |key: &str| {
             let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(' '));
-            line.and_then(|value| value.trim().parse::<u32>().ok()).ok_or(format!("a header without {key}"))
+            line.and_then(|value| value.trim().parse::<u32>().ok()).ok_or(format!("the header has no {key}"))
         };
         let size = [value("WIDTH")?, value("HEIGHT")?];
         let channels = value("DEPTH")? as usize;
         if !(1..=4).contains(&channels) {
-            return Err(format!("{channels} samples a pixel; 1 to 4 are read"));
+            return Err(format!("{channels} samples a pixel, 1 to 4 are supported"));
         }
         let (white, begin) = (maxval(value("MAXVAL")?)?, end + END.len());
         Self::checked(Self { size, channels, white, coding: Coding::Binary, begin })
@@ -82,7 +82,7 @@ impl Header {
     fn checked(self) -> Result<Self, String> {
         let [width, height] = self.size;
         if width == 0 || height == 0 {
-            return Err(format!("an image of {width} × {height} pixels"));
+            return Err(format!("the image has {width} × {height} pixels"));
         }
         Ok(self)
     }
@@ -93,10 +93,10 @@ impl Header {
         width.saturating_mul(height).saturating_mul(self.channels)
     }
 
-    /// The samples of the file. Faults name `path`.
+    /// Reads the samples of the file. Faults name `path`.
     ///
     /// # Errors
-    /// The first sample above MAXVAL, with its place; samples that are missing.
+    /// The first sample above MAXVAL, or missing samples.
     pub(super) fn samples(&self, bytes: &[u8], path: &Path) -> Result<Samples, Fault> {
         let (body, count) = (bytes.get(self.begin..).unwrap_or_default(), self.count());
         let width = self.size[0] as usize;
@@ -128,27 +128,27 @@ impl Header {
             return Err(Fault::new("a sample above MAXVAL", path)
                 .on_line(line)
                 .value(format!("{} at ({x}, {y}), MAXVAL is {}", values[index], self.white))
-                .remedy("write the image again, or give its header the MAXVAL that its samples have"));
+                .remedy("write the image again or correct MAXVAL in its header"));
         }
         if values.len() < count {
-            return Err(damaged(path, format!("{} of {count} samples; the file ends early", values.len())));
+            return Err(damaged(path, format!("the file is truncated, {} of {count} samples are there", values.len())));
         }
         Ok(Samples { values, channels: self.channels, deep, white: Some(self.white) })
     }
 }
 
 fn maxval(value: u32) -> Result<u16, String> {
-    u16::try_from(value).ok().filter(|white| *white > 0).ok_or(format!("MAXVAL is {value}; it is 1 to 65535"))
+    u16::try_from(value).ok().filter(|white| *white > 0).ok_or(format!("MAXVAL is {value}, it must be 1 to 65535"))
 }
 
-/// The line of a file in text on which this sample stands.
+/// The line number of a sample in a text file.
 fn line_of(bytes: &[u8], begin: usize, sample: usize) -> Option<usize> {
     let (offset, _) = words(bytes.get(begin..)?).nth(sample)?;
     Some(1 + bytes[..begin + offset].iter().filter(|&&byte| byte == b'\n').count())
 }
 
-/// The decimal numbers of a text with their places; comments run from # to the end of the line. What is no number ends
-/// them.
+/// The decimal numbers of a text with their offsets, up to the first other word. A comment runs from # to the end of
+/// its line.
 fn words(bytes: &[u8]) -> impl Iterator<Item = (usize, u32)> + '_ {
     let mut at = 0;
     std::iter::from_fn(move || {

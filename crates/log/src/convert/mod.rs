@@ -15,8 +15,7 @@ pub(crate) use header::{header_message, header_record};
 pub(crate) use inputs::{inputs_message, inputs_record};
 pub(crate) use inspection::{inspection_message, inspection_record};
 pub(crate) use result::{
-    candidates_message, evaluation_message, evaluation_record, result_message, result_record, target_times,
-    timing_message,
+    candidates_message, evaluation_message, result_message, result_record, target_times, timing_message,
 };
 pub(crate) use totals::{totals_message, totals_record};
 

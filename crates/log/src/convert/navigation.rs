@@ -5,14 +5,8 @@ use crate::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, p
 
 /// The message that holds `navigation`.
 pub(super) fn navigation_message(navigation: &NavigationRecord) -> proto::Navigation {
-    let NavigationErrors {
-        tre_rms,
-        position_error,
-        attitude_error,
-        nees,
-        odometry_only_position_error,
-        odometry_only_attitude_error,
-    } = navigation.errors;
+    let mut errors = proto::NavigationErrors::default();
+    navigation.errors.write(&mut errors);
     let motion = navigation.odometry.motion.as_ref();
     proto::Navigation {
         state: navigation.state.clone(),
@@ -25,14 +19,7 @@ pub(super) fn navigation_message(navigation: &NavigationRecord) -> proto::Naviga
             covariance: motion.map_or_else(Vec::new, |(_, covariance)| flat(covariance)),
         }),
         events: navigation.events.clone(),
-        errors: Some(proto::NavigationErrors {
-            tre_rms,
-            position_error,
-            attitude_error,
-            nees,
-            odometry_only_position_error,
-            odometry_only_attitude_error,
-        }),
+        errors: Some(errors),
     }
 }
 
@@ -57,14 +44,7 @@ pub(super) fn navigation_record(message: proto::Navigation) -> Result<Navigation
         odometry_only: message.odometry_only.map(navigated_record).transpose()?,
         odometry: OdometryStep { lost: odometry.lost, motion: motion.zip(covariance) },
         events: message.events,
-        errors: NavigationErrors {
-            tre_rms: errors.tre_rms,
-            position_error: errors.position_error,
-            attitude_error: errors.attitude_error,
-            nees: errors.nees,
-            odometry_only_position_error: errors.odometry_only_position_error,
-            odometry_only_attitude_error: errors.odometry_only_attitude_error,
-        },
+        errors: NavigationErrors::of(&errors),
     })
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::Refere
         solver: target.solver.clone(),
         outcome: outcome_message(target.outcome).into(),
         reason: target.reason.clone(),
-        detail: target.detail.clone(),
+        explanation: target.explanation.clone(),
         object_from_camera: target.object_from_camera.as_ref().map(flat).unwrap_or_default(),
         covariance: target.covariance.as_ref().map(flat).unwrap_or_default(),
         pairs: pair_messages(&target.pairs),
@@ -39,33 +39,9 @@ pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::Refere
 }
 
 fn integrity_message(it: &Integrity) -> proto::Integrity {
-    proto::Integrity {
-        redundancy: it.redundancy.clone(),
-        chi2: it.chi2,
-        dof: it.dof,
-        chi2_limit: it.chi2_limit,
-        solution_separation: it.solution_separation,
-        solution_separation_two: it.solution_separation_two,
-        protection_position: it.protection_position,
-        protection_attitude: it.protection_attitude,
-        scale_error: it.scale_error,
-        scale_error_sigma: it.scale_error_sigma,
-    }
-}
-
-fn integrity_record(it: proto::Integrity) -> Integrity {
-    Integrity {
-        redundancy: it.redundancy,
-        chi2: it.chi2,
-        dof: it.dof,
-        chi2_limit: it.chi2_limit,
-        solution_separation: it.solution_separation,
-        solution_separation_two: it.solution_separation_two,
-        protection_position: it.protection_position,
-        protection_attitude: it.protection_attitude,
-        scale_error: it.scale_error,
-        scale_error_sigma: it.scale_error_sigma,
-    }
+    let mut message = proto::Integrity::default();
+    it.write(&mut message);
+    message
 }
 
 fn pair_messages(pairs: &[Pair]) -> Vec<proto::Pair> {
@@ -74,9 +50,9 @@ fn pair_messages(pairs: &[Pair]) -> Vec<proto::Pair> {
 
 fn outcome_message(outcome: Outcome) -> proto::Outcome {
     match outcome {
-        Outcome::Fix => proto::Outcome::Referenced,
+        Outcome::Fix => proto::Outcome::Fix,
         Outcome::Ambiguous => proto::Outcome::Ambiguous,
-        Outcome::Rejected => proto::Outcome::Unidentified,
+        Outcome::Rejected => proto::Outcome::Rejected,
         Outcome::Degenerate => proto::Outcome::Degenerate,
     }
 }
@@ -87,9 +63,9 @@ pub(crate) fn result_record(
     candidates: proto::Candidates,
 ) -> Result<TargetRecord, Malformed> {
     let outcome = match message.outcome() {
-        proto::Outcome::Referenced => Outcome::Fix,
+        proto::Outcome::Fix => Outcome::Fix,
         proto::Outcome::Ambiguous => Outcome::Ambiguous,
-        proto::Outcome::Unidentified => Outcome::Rejected,
+        proto::Outcome::Rejected => Outcome::Rejected,
         proto::Outcome::Degenerate => Outcome::Degenerate,
         proto::Outcome::Unspecified => return Err(Malformed(format!("outcome {} is unknown", message.outcome))),
     };
@@ -106,7 +82,7 @@ pub(crate) fn result_record(
         solver: message.solver,
         outcome,
         reason: message.reason,
-        detail: message.detail,
+        explanation: message.explanation,
         object_from_camera: matrix_if_any("object_from_camera", &message.object_from_camera)?,
         covariance: matrix_if_any("covariance", &message.covariance)?,
         candidates: candidates.lists.into_iter().map(|list| list.cloud).collect(),
@@ -118,7 +94,7 @@ pub(crate) fn result_record(
         nfa: message.nfa,
         pair_tests: message.pair_tests,
         residual_rms: message.residual_rms,
-        integrity: message.integrity.map(integrity_record),
+        integrity: message.integrity.as_ref().map(Integrity::of),
         evaluation: Evaluation::default(),
         times: TargetTimes::default(),
     })
@@ -143,47 +119,11 @@ pub(crate) fn candidates_message(frame: &FrameRecord, index: usize) -> proto::Ca
 /// The message that holds the evaluation of target `index` of `frame`.
 pub(crate) fn evaluation_message(frame: &FrameRecord, index: usize) -> proto::Evaluation {
     let target = &frame.targets[index];
-    let it = target.evaluation;
-    proto::Evaluation {
-        frame: frame.frame,
-        stamp_ns: frame.stamp_ns,
-        index: index as u32,
-        object: target.object.clone(),
-        wrong: it.wrong,
-        wrong_pairs: it.wrong_pairs,
-        visible: it.visible,
-        identified: it.identified,
-        correct_pairs: it.correct_pairs,
-        fit_rms: it.fit_rms,
-        fit_rms_unused: it.fit_rms_unused,
-        tre_rms: it.tre_rms,
-        position_error: it.position_error,
-        attitude_error: it.attitude_error,
-        nees: it.nees,
-        tre_crlb: it.tre_crlb,
-        position_crlb: it.position_crlb,
-        alert_limit: it.alert_limit,
-    }
-}
-
-/// The evaluation that `message` holds.
-pub(crate) fn evaluation_record(message: &proto::Evaluation) -> Evaluation {
-    Evaluation {
-        wrong: message.wrong,
-        wrong_pairs: message.wrong_pairs,
-        visible: message.visible,
-        identified: message.identified,
-        correct_pairs: message.correct_pairs,
-        fit_rms: message.fit_rms,
-        fit_rms_unused: message.fit_rms_unused,
-        tre_rms: message.tre_rms,
-        position_error: message.position_error,
-        attitude_error: message.attitude_error,
-        nees: message.nees,
-        tre_crlb: message.tre_crlb,
-        position_crlb: message.position_crlb,
-        alert_limit: message.alert_limit,
-    }
+    let (object, index) = (target.object.clone(), index as u32);
+    let mut message =
+        proto::Evaluation { frame: frame.frame, stamp_ns: frame.stamp_ns, index, object, ..Default::default() };
+    target.evaluation.write(&mut message);
+    message
 }
 
 /// The message that holds all times of `frame`.

@@ -688,7 +688,7 @@ pub struct ReferencingResult {
     pub reason: ::prost::alloc::string::String,
     /// Why not, in a sentence; of a fix, why the joint fix did not replace it.
     #[prost(string, tag = "9")]
-    pub detail: ::prost::alloc::string::String,
+    pub explanation: ::prost::alloc::string::String,
     /// 4 x 4, p_object = object_from_camera * p_camera; empty unless referenced.
     #[prost(double, repeated, tag = "10")]
     pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
@@ -802,11 +802,11 @@ pub struct CandidateList {
 pub enum Outcome {
     Unspecified = 0,
     /// A pose that passed every test.
-    Referenced = 1,
+    Fix = 1,
     /// Several poses explain the data equally well.
     Ambiguous = 2,
     /// No set of points was identified, or the set was not believed.
-    Unidentified = 3,
+    Rejected = 3,
     /// The identified points determine no pose.
     Degenerate = 4,
 }
@@ -818,9 +818,9 @@ impl Outcome {
     pub fn as_str_name(&self) -> &'static str {
         match self {
             Self::Unspecified => "OUTCOME_UNSPECIFIED",
-            Self::Referenced => "OUTCOME_REFERENCED",
+            Self::Fix => "OUTCOME_FIX",
             Self::Ambiguous => "OUTCOME_AMBIGUOUS",
-            Self::Unidentified => "OUTCOME_UNIDENTIFIED",
+            Self::Rejected => "OUTCOME_REJECTED",
             Self::Degenerate => "OUTCOME_DEGENERATE",
         }
     }
@@ -828,9 +828,9 @@ impl Outcome {
     pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
         match value {
             "OUTCOME_UNSPECIFIED" => Some(Self::Unspecified),
-            "OUTCOME_REFERENCED" => Some(Self::Referenced),
+            "OUTCOME_FIX" => Some(Self::Fix),
             "OUTCOME_AMBIGUOUS" => Some(Self::Ambiguous),
-            "OUTCOME_UNIDENTIFIED" => Some(Self::Unidentified),
+            "OUTCOME_REJECTED" => Some(Self::Rejected),
             "OUTCOME_DEGENERATE" => Some(Self::Degenerate),
             _ => None,
         }

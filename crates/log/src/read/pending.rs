@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::proto::foxglove::CompressedImage;
 
 use super::{foreign, source::Message};
-use crate::{FrameRecord, GreyImage, LogError, convert, png, proto, topic};
+use crate::{Evaluation, FrameRecord, GreyImage, LogError, convert, png, proto, topic};
 
 /// What has come of the frame that is being read.
 #[derive(Debug, Default)]
@@ -110,7 +110,7 @@ impl Pending {
                 return Err(format!("result {index} of frame {number} is mixed with another"));
             }
             let mut target = convert::result_record(result, candidates).map_err(|error| error.0)?;
-            target.evaluation = convert::evaluation_record(&evaluation);
+            target.evaluation = Evaluation::of(&evaluation);
             target.times = times;
             frame.targets.push(target);
         }

@@ -4,6 +4,7 @@ mod frame;
 mod header;
 mod inputs;
 mod inspection;
+mod mirror;
 mod navigation;
 mod region;
 mod target;

@@ -1,6 +1,6 @@
 //! What a navigator knew after a pair, and what it did.
 
-use super::{Matrix4, Matrix6};
+use super::{Matrix4, Matrix6, mirror::mirror};
 
 /// How an event ends that says how far an object stands from where it was surveyed, after the distance.
 pub const ELSEWHERE: &str = "m from its place";
@@ -45,19 +45,21 @@ pub struct OdometryStep {
     pub motion: Option<(Matrix4, Matrix6)>,
 }
 
-/// How the navigated poses compare with truth; `None` where truth or a pose is missing.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct NavigationErrors {
-    /// m2 of the navigated pose over the points of its object (m).
-    pub tre_rms: Option<f64>,
-    /// m3, position (m).
-    pub position_error: Option<f64>,
-    /// m3, attitude (rad).
-    pub attitude_error: Option<f64>,
-    /// Normalised estimation error squared, six degrees of freedom.
-    pub nees: Option<f64>,
-    /// m3 of the first fix carried by odometry alone: position (m).
-    pub odometry_only_position_error: Option<f64>,
-    /// Likewise, attitude (rad).
-    pub odometry_only_attitude_error: Option<f64>,
+mirror! {
+    /// How the navigated poses compare with truth; `None` where truth or a pose is missing.
+    #[derive(Debug, Clone, Copy, PartialEq, Default)]
+    pub struct NavigationErrors {
+        /// m2 of the navigated pose over the points of its object (m).
+        pub tre_rms: Option<f64>,
+        /// m3, position (m).
+        pub position_error: Option<f64>,
+        /// m3, attitude (rad).
+        pub attitude_error: Option<f64>,
+        /// Normalised estimation error squared, six degrees of freedom.
+        pub nees: Option<f64>,
+        /// m3 of the first fix carried by odometry alone: position (m).
+        pub odometry_only_position_error: Option<f64>,
+        /// Likewise, attitude (rad).
+        pub odometry_only_attitude_error: Option<f64>,
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use super::{Matrix4, Matrix6};
+use super::{Matrix4, Matrix6, mirror::mirror};
 
 /// One row of the results: a frame, a target, and what came of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +20,7 @@ pub struct TargetRecord {
     pub reason: String,
     /// Why not, in a sentence with numbers; where a joint fix was asked for, what took part in it, what did not and why,
     /// or why there is none. Empty of any other fix.
-    pub detail: String,
+    pub explanation: String,
     /// The estimated pose, when referenced.
     pub object_from_camera: Option<Matrix4>,
     /// Its covariance, of ξ in `T_true = T_est · Exp(ξ)`, camera frame, rotation first.
@@ -61,7 +61,7 @@ impl TargetRecord {
             solver: solver.to_owned(),
             outcome: Outcome::Rejected,
             reason: reason.to_owned(),
-            detail: String::new(),
+            explanation: String::new(),
             object_from_camera: None,
             covariance: None,
             candidates: Vec::new(),
@@ -155,63 +155,67 @@ pub struct Alternative {
     pub score: f64,
 }
 
-/// What supports a fix beyond its covariance.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Integrity {
-    /// `unmonitored` (three points), `detectable` (four), `excludable` (five and more).
-    pub redundancy: String,
-    /// χ² of the residuals at the most likely pose.
-    pub chi2: f64,
-    /// Its degrees of freedom.
-    pub dof: u64,
-    /// What it exceeds with one minus the confidence.
-    pub chi2_limit: f64,
-    /// How far the position moves at most (m) when one point is left out.
-    pub solution_separation: Option<f64>,
-    /// The same when two are.
-    pub solution_separation_two: Option<f64>,
-    /// The protection level of the position (m).
-    pub protection_position: Option<f64>,
-    /// That of the attitude (rad).
-    pub protection_attitude: Option<f64>,
-    /// By how much measured distances are longer than the model's, as a share of them.
-    pub scale_error: Option<f64>,
-    /// Its standard deviation.
-    pub scale_error_sigma: Option<f64>,
+mirror! {
+    /// What supports a fix beyond its covariance.
+    #[derive(Debug, Clone, PartialEq, Default)]
+    pub struct Integrity {
+        /// `unmonitored` (three points), `detectable` (four), `excludable` (five and more).
+        pub redundancy: String,
+        /// χ² of the residuals at the most likely pose.
+        pub chi2: f64,
+        /// Its degrees of freedom.
+        pub dof: u64,
+        /// What it exceeds with one minus the confidence.
+        pub chi2_limit: f64,
+        /// How far the position moves at most (m) when one point is left out.
+        pub solution_separation: Option<f64>,
+        /// The same when two are.
+        pub solution_separation_two: Option<f64>,
+        /// The protection level of the position (m).
+        pub protection_position: Option<f64>,
+        /// That of the attitude (rad).
+        pub protection_attitude: Option<f64>,
+        /// By how much measured distances are longer than the model's, as a share of them.
+        pub scale_error: Option<f64>,
+        /// Its standard deviation.
+        pub scale_error_sigma: Option<f64>,
+    }
 }
 
-/// How an attempt compares with truth; `None` where truth or a pose is missing.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Evaluation {
-    /// Referenced, and m2 beyond the alert limit.
-    pub wrong: Option<bool>,
-    /// A false pair was used.
-    pub wrong_pairs: Option<bool>,
-    /// Points of the target that both cameras really see.
-    pub visible: Option<u32>,
-    /// Pairs that were identified.
-    pub identified: Option<u32>,
-    /// Pairs whose cloud point lies within 2 px of the true projections, in both images.
-    pub correct_pairs: Option<u32>,
-    /// m1 over the correctly identified pairs, RMS (m): the residual C·H − P.
-    pub fit_rms: Option<f64>,
-    /// m1 without the points the solver used (m).
-    pub fit_rms_unused: Option<f64>,
-    /// m2 over all points of the target, RMS (m): the error of transferred model points.
-    pub tre_rms: Option<f64>,
-    /// m3: error of the left camera's position in the object frame (m).
-    pub position_error: Option<f64>,
-    /// m3: error of its attitude (rad).
-    pub attitude_error: Option<f64>,
-    /// Normalised estimation error squared, six degrees of freedom.
-    pub nees: Option<f64>,
-    /// The Cramér–Rao bound on m2 (m), where it is known.
-    pub tre_crlb: Option<f64>,
-    /// The Cramér–Rao bound on the position (m), where it is known.
-    pub position_crlb: Option<f64>,
-    /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
-    /// that are older than it, whose header has those of the targets.
-    pub alert_limit: Option<f64>,
+mirror! {
+    /// How an attempt compares with truth; `None` where truth or a pose is missing.
+    #[derive(Debug, Clone, Copy, PartialEq, Default)]
+    pub struct Evaluation {
+        /// Referenced, and m2 beyond the alert limit.
+        pub wrong: Option<bool>,
+        /// A false pair was used.
+        pub wrong_pairs: Option<bool>,
+        /// Points of the target that both cameras really see.
+        pub visible: Option<u32>,
+        /// Pairs that were identified.
+        pub identified: Option<u32>,
+        /// Pairs whose cloud point lies within 2 px of the true projections, in both images.
+        pub correct_pairs: Option<u32>,
+        /// m1 over the correctly identified pairs, RMS (m): the residual C·H − P.
+        pub fit_rms: Option<f64>,
+        /// m1 without the points the solver used (m).
+        pub fit_rms_unused: Option<f64>,
+        /// m2 over all points of the target, RMS (m): the error of transferred model points.
+        pub tre_rms: Option<f64>,
+        /// m3: error of the left camera's position in the object frame (m).
+        pub position_error: Option<f64>,
+        /// m3: error of its attitude (rad).
+        pub attitude_error: Option<f64>,
+        /// Normalised estimation error squared, six degrees of freedom.
+        pub nees: Option<f64>,
+        /// The Cramér–Rao bound on m2 (m), where it is known.
+        pub tre_crlb: Option<f64>,
+        /// The Cramér–Rao bound on the position (m), where it is known.
+        pub position_crlb: Option<f64>,
+        /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
+        /// that are older than it, whose header has those of the targets.
+        pub alert_limit: Option<f64>,
+    }
 }
 
 /// Times of the stages that serve one target (ms); `None` where a stage did not run.

@@ -130,7 +130,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
     let mut refused = TargetRecord::refused("B", "maximum-clique", "kabsch", "too-few");
-    refused.detail = "2 points".to_owned();
+    refused.explanation = "2 points".to_owned();
     let odd = number % 2 == 1;
     FrameRecord {
         frame: number,

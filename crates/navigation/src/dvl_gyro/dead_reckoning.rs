@@ -1,4 +1,4 @@
-//! The odometry at work.
+//! The session of dead reckoning.
 
 use std::time::Instant;
 
@@ -17,15 +17,15 @@ use crate::{
     odometry::Stamps,
 };
 
-/// The memory of one journey.
+/// The state of one session.
 pub(super) struct DeadReckoning<'a> {
     settings: &'a DvlGyro,
     body_from_camera: Transform<Body, Camera>,
     signals: DeviceSignals,
     stamps: Stamps,
-    /// A place so long ago that no reading can come any more that would change it.
+    /// A pose old enough that no late reading can change it.
     base: IntegratedPose,
-    /// The last place that was told, and up to when each device was known then.
+    /// The last reported pose, and the time up to which each device was known then.
     last: Option<(IntegratedPose, [u64; 2])>,
     segments: Vec<Segment>,
     outcomes: Vec<OdometryOutcome>,
@@ -38,7 +38,7 @@ impl OdometrySession for DeadReckoning<'_> {
             Device::Doppler => (&mut self.signals.doppler, self.settings.max_speed),
             Device::Gyro => (&mut self.signals.gyro, self.settings.max_turn_deg.to_radians()),
         };
-        // What is not a number is not below anything.
+        // The comparison is false for NaN.
         let believable = reading.value.norm() <= max && reading.covariance.iter().all(|x| x.is_finite());
         if believable && reading.stamp_ns >= self.base.stamp_ns {
             signal.insert(*reading);
@@ -87,7 +87,7 @@ impl<'a> DeadReckoning<'a> {
         }
     }
 
-    /// Begins a segment where the one before ended.
+    /// Begins a segment at the pose where the previous one ended.
     fn begin(&mut self, stamp_ns: u64, broken: Option<Lost>) -> OdometryOutcome {
         let here = self.last.map_or_else(Transform::identity, |(last, _)| last.start_from_body);
         self.base = IntegratedPose::new(stamp_ns, here);
@@ -96,7 +96,7 @@ impl<'a> DeadReckoning<'a> {
         OdometryOutcome::Began
     }
 
-    /// The way from the last place to `now`.
+    /// The motion from the last pose to the time `now`.
     fn follow(&mut self, now: u64, last: &IntegratedPose, known: [u64; 2]) -> OdometryOutcome {
         let max = self.settings.max_gap;
         let devices = [(Device::Doppler, &self.signals.doppler), (Device::Gyro, &self.signals.gyro)];
@@ -111,7 +111,7 @@ impl<'a> DeadReckoning<'a> {
                 false => OdometryOutcome::Skipped(lost),
             };
         }
-        let here = self.signals.carry(&self.base, now, known, self.settings).expect("both devices were heard");
+        let here = self.signals.carry(&self.base, now, known, self.settings).expect("both devices have readings");
         let local = self.local(last, &here);
         let waypoint = self.waypoint(&here, Some(local));
         self.segments.last_mut().expect("a segment was begun").poses.push(waypoint);
@@ -121,7 +121,7 @@ impl<'a> DeadReckoning<'a> {
         OdometryOutcome::Followed { sought: 0, found: 0 }
     }
 
-    /// The motion from one place to a later one.
+    /// The motion between two integrated poses, with its correlated errors.
     fn local(&self, last: &IntegratedPose, here: &IntegratedPose) -> RelativeMotion {
         let motion = last.start_from_body.inverse() * here.start_from_body;
         let across = motion.inverse().adjoint();
@@ -141,7 +141,7 @@ impl<'a> DeadReckoning<'a> {
         let keep = Vector4::new(1.0, fades, fades, fades);
         with.fixed_view_mut::<6, 4>(0, 0).copy_from(&(by * correlated * Matrix4::from_diagonal(&keep)));
         with.fixed_view_mut::<6, 6>(0, 4).copy_from(&here.held);
-        // What was held is known by the next pair.
+        // Extrapolation errors last for one step only; the next pair has the late readings.
         let keep = SVector::<f64, CORRELATED>::from_fn(|k, _| if k < 4 { keep[k] } else { 0.0 });
         RelativeMotion {
             motion: camera_from_body * motion * self.body_from_camera,
@@ -156,7 +156,7 @@ impl<'a> DeadReckoning<'a> {
         }
     }
 
-    /// Moves the base on, and forgets what is behind it.
+    /// Advances the base pose and drops older readings.
     fn settle(&mut self, now: u64) {
         let to = now.saturating_sub((self.settings.max_gap * 1e9) as u64);
         if to <= self.base.stamp_ns {
@@ -169,7 +169,7 @@ impl<'a> DeadReckoning<'a> {
         }
     }
 
-    /// What is told of a place: the camera, the world being that of the first pair.
+    /// The waypoint of an integrated pose; the world is the camera's frame at the first pair.
     fn waypoint(&self, place: &IntegratedPose, local: Option<RelativeMotion>) -> Waypoint {
         let world_from_camera =
             (self.body_from_camera.inverse() * place.start_from_body * self.body_from_camera).relabel();

@@ -1,4 +1,4 @@
-//! The motion of the body over a stretch of time, by what was heard of it.
+//! Integration of velocity and angular rate to a pose.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use seafix_geometry::{Body, Transform, so3};
@@ -8,26 +8,26 @@ use super::{
     signal::{Signal, Value, seconds},
 };
 
-/// The share of a pose's error in the log's scale and the gyro's bias.
+/// The derivative of a pose error by the log's scale error and the gyro's bias.
 pub(super) type Biased = SMatrix<f64, 6, 4>;
 
-/// What both devices said, in order of time.
+/// The readings of both devices, in order of time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct DeviceSignals {
     pub(super) doppler: Signal,
     pub(super) gyro: Signal,
 }
 
-/// Where the body is at one time, and how its place errs: ξ = by · (scale, bias) + what noise adds.
+/// The integrated pose of the body, with its error ξ = by · (scale, bias) + noise.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct IntegratedPose {
     pub(super) stamp_ns: u64,
-    /// The body, in the frame that the journey began with.
+    /// The body's pose in its initial frame.
     pub(super) start_from_body: Transform<Body, Body>,
     pub(super) by: Biased,
-    /// The covariance that readings add which were not known at the pose before.
+    /// The covariance due to readings that were unknown at the last reported pose.
     pub(super) settled: Matrix6<f64>,
-    /// The covariance that comes of holding the last readings.
+    /// The covariance due to extrapolation of the last readings.
     pub(super) held: Matrix6<f64>,
 }
 
@@ -39,8 +39,9 @@ impl IntegratedPose {
 }
 
 impl DeviceSignals {
-    /// From a place to a later time. Noise of a device counts from `new` on, the time up to which it was known before
-    /// (Doppler log, gyro).
+    /// The pose integrated to a later time.
+    ///
+    /// Noise counts from the times `new` (Doppler log, gyro), up to which each device was known before.
     pub(super) fn carry(
         &self,
         from: &IntegratedPose,
@@ -56,19 +57,20 @@ impl DeviceSignals {
         stamps.into_iter().try_fold(*from, |here, stamp| self.step(&here, stamp, new, settings))
     }
 
-    /// Over a stretch without a reading between its ends.
+    /// One integration step, without a reading between its ends.
     fn step(&self, from: &IntegratedPose, to: u64, new: [u64; 2], settings: &DvlGyro) -> Option<IntegratedPose> {
         let h = seconds(from.stamp_ns, to);
         let (velocity, rate) = (self.doppler.midway(from.stamp_ns, to)?, self.gyro.midway(from.stamp_ns, to)?);
         let lever = so3::skew(&Vector3::from(settings.at));
-        // v − ω × l.
+        // Velocity of the body origin: v − ω × l.
         let ahead = velocity.at + lever * rate.at;
         let mut xi = Vector6::zeros();
         xi.fixed_rows_mut::<3>(0).copy_from(&(rate.at * h));
         xi.fixed_rows_mut::<3>(3).copy_from(&(ahead * h));
         let motion = Transform::<Body, Body>::exp(&xi);
 
-        // The true rate is what the gyro says less its bias, the true velocity what the log says less its share of scale.
+        // The true rate is the measured one minus the bias; the true velocity is the measured one minus its scale
+        // error.
         let mut by_rate = SMatrix::<f64, 6, 3>::zeros();
         by_rate.fixed_view_mut::<3, 3>(0, 0).copy_from(&-Matrix3::identity());
         by_rate.fixed_view_mut::<3, 3>(3, 0).copy_from(&-lever);

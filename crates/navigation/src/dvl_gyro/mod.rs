@@ -12,43 +12,44 @@ use serde::{Deserialize, Serialize};
 use crate::{Odometry, OdometrySession};
 use dead_reckoning::DeadReckoning;
 
-/// Dead reckoning by a Doppler velocity log and a gyro: what a vehicle without cameras goes by.
+/// Dead reckoning by a Doppler velocity log (DVL) and a gyro.
 ///
-/// The body turns by the gyro's rate ω and moves by the log's velocity v: over a stretch h between two successive readings
-/// of either, both half-way on the line between theirs,
+/// The body rotates with the gyro's angular rate ω and moves with the log's velocity v. Over an interval h between two
+/// successive readings of either device, with both values interpolated at its middle,
 ///
-/// T ← T · Exp(h (ω, v − ω × l)), l the log's place in the body,
+/// T ← T · Exp(h (ω, v − ω × l)), with l the position of the log in the body frame.
 ///
-/// which errs by h². Readings may come late; they are put in order of time, and the motion that was told until then by
-/// holding the last ones is put right with the next pair. Images are not looked at.
+/// The global error of this midpoint rule is of order h². Late readings are sorted in by time: the motion that was
+/// extrapolated from the last readings is corrected with the next pair. Images are not used.
 ///
-/// The covariance has the noise of the readings, what velocity and rate may do between them, and, as errors that
-/// [last](crate::CorrelatedError), the log's scale and the gyro's bias (an Ornstein–Uhlenbeck process).
+/// The covariance includes the noise of the readings, random changes of velocity and rate between them and, as
+/// [correlated errors](crate::CorrelatedError), the scale error of the log and the bias of the gyro (an
+/// Ornstein–Uhlenbeck process).
 ///
-/// A device that is silent for more than `max-gap`, or says only what no vehicle does, breaks the segment.
+/// The segment breaks if a device is silent for more than `max-gap` or gives only impossible values.
 ///
-/// Source: Groves, *Principles of GNSS, inertial, and multisensor integrated navigation systems*, 2013, ch. 5 and 6; Schmidt,
-/// *Application of state-space methods to navigation problems*, 1966.
+/// Source: Groves, *Principles of GNSS, inertial, and multisensor integrated navigation systems*, 2013, ch. 5 and 6;
+/// Schmidt, *Application of state-space methods to navigation problems*, 1966.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DvlGyro {
-    /// Where the Doppler log sits in the vehicle: body frame (m).
+    /// Position of the Doppler log in the vehicle: body frame (m).
     pub at: [f64; 3],
-    /// Standard deviation of the log's scale error (relative).
+    /// Standard deviation of the log's scale error (relative), 0 to 0.5.
     pub scale: f64,
-    /// Standard deviation of the gyro's bias, each axis (degrees/h).
+    /// Standard deviation of the gyro's bias for each axis (degrees/h).
     pub instability: f64,
     /// Time constant of the bias (s).
     pub tau: f64,
-    /// How far the velocity wanders in a second in which nothing is heard, each axis (m/s a root of a second).
+    /// Random-walk density of the velocity between readings, for each axis (m/s/√s).
     pub unsteady: f64,
-    /// The same of the rate of turn (degrees/s a root of a second).
+    /// Random-walk density of the angular rate between readings, for each axis (degrees/s/√s).
     pub unsteady_turn_deg: f64,
-    /// A longer silence of either device breaks the segment, and a reading that comes later is of no use (s).
+    /// Maximum silence of a device (s); a longer one breaks the segment, and a reading delayed by more is ignored.
     pub max_gap: f64,
-    /// A faster velocity is not believed (m/s).
+    /// Maximum speed (m/s); a faster reading is rejected as an outlier.
     pub max_speed: f64,
-    /// A faster turn is not believed (degrees/s).
+    /// Maximum angular rate (degrees/s); a faster reading is rejected as an outlier.
     pub max_turn_deg: f64,
 }
 
@@ -70,9 +71,9 @@ impl Default for DvlGyro {
 
 impl Component for DvlGyro {
     const NAME: &'static str = "dvl-gyro";
-    const SUMMARY: &'static str = "dead reckoning by Doppler log and gyro, without images";
+    const SUMMARY: &'static str = "dead reckoning by Doppler velocity log and gyro, without images";
     const SOURCE: &'static str = "Groves, Principles of GNSS, inertial, and multisensor integrated navigation systems, \
-                                  2013; errors that last: Schmidt, Application of state-space methods to navigation \
+                                  2013; correlated errors: Schmidt, Application of state-space methods to navigation \
                                   problems, 1966";
 
     fn check(&self) -> Result<(), String> {

@@ -4,26 +4,28 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Reading;
 
-/// A device as heard so far. Between two readings its value is on the line between them, beyond them the nearest one's.
+/// The signal of a device: linear interpolation between readings, constant extrapolation beyond them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Signal {
     readings: Vec<Reading>,
 }
 
-/// The value of a device at a time, and how far off it may be.
+/// The value of a device at a time, with its noise.
 pub(super) struct Value {
     pub(super) at: Vector3<f64>,
-    /// What the noise of the readings adds to the covariance of the value's integral (a second).
+    /// Spectral density of the reading noise: its contribution to the covariance of the integral per second.
     pub(super) noise: Matrix3<f64>,
-    /// What a value that wanders by one unit a root of a second adds to it, an axis (a second).
+    /// Spectral density of the integral, for each axis, that a random walk of unit density contributes.
     pub(super) wander: f64,
-    /// Whether it is the last reading's, held: those to come will say what it was.
+    /// Whether the value is extrapolated from the last reading; later readings will correct it.
     pub(super) held: bool,
 }
 
 impl Signal {
-    /// Takes a reading in its place in time. One of an instant that has one already is left, and one that repeats its
-    /// neighbour's noise bit for bit: the device says nothing new.
+    /// Inserts a reading in order of time.
+    ///
+    /// A second reading of the same instant is ignored. So is a noisy reading with the same value as its neighbour, bit
+    /// for bit: the device repeats an old output.
     pub(super) fn insert(&mut self, reading: Reading) {
         let place = self.readings.partition_point(|other| other.stamp_ns < reading.stamp_ns);
         let next = self.readings.get(place);
@@ -36,7 +38,7 @@ impl Signal {
         self.readings.insert(place, reading);
     }
 
-    /// Forgets what is not needed from `stamp_ns` on: all but the last reading before it.
+    /// Drops the readings that are not needed from `stamp_ns` on: all but the last one before it.
     pub(super) fn forget(&mut self, stamp_ns: u64) {
         let place = self.readings.partition_point(|reading| reading.stamp_ns <= stamp_ns);
         self.readings.drain(..place.saturating_sub(1));
@@ -47,29 +49,30 @@ impl Signal {
         self.readings.last().map(|reading| reading.stamp_ns)
     }
 
-    /// Stamps within a stretch, its ends left out.
+    /// The stamps strictly between two times.
     pub(super) fn within(&self, from: u64, to: u64) -> impl Iterator<Item = u64> {
         let stamps = self.readings.iter().map(|reading| reading.stamp_ns);
         stamps.filter(move |stamp| (from + 1..to).contains(stamp))
     }
 
-    /// The longest time (s) between `from` and `to` that lies between two successive readings, or before the first or
-    /// behind the last of them.
+    /// The longest time (s) without a reading between `from` and `to`.
+    ///
+    /// The gaps before the first and after the last reading count as well.
     pub(super) fn silence(&self, from: u64, to: u64) -> f64 {
         let around = self.readings.partition_point(|reading| reading.stamp_ns <= from);
         let first = around.checked_sub(1).map_or(from, |before| self.readings[before].stamp_ns);
         let signals = self.readings[around..].iter().map(|reading| reading.stamp_ns).take_while(|stamp| *stamp < to);
         let (longest, last) = signals.fold((0, first), |(longest, last), stamp| (longest.max(stamp - last), stamp));
-        // What follows `to` may say how it went on until there.
+        // A reading after `to` bounds the last gap, because the value is interpolated up to it.
         let after = self.readings.iter().map(|reading| reading.stamp_ns).find(|stamp| *stamp >= to).unwrap_or(to);
         seconds(0, longest.max(after - last))
     }
 
-    /// The value half-way between two times; `None` before anything was heard.
+    /// The value in the middle of two times; `None` without a reading.
     ///
-    /// Between readings g seconds apart each counts from half-way to half-way: noise Σ g a second. A value that wanders
-    /// (a Wiener process tied to its readings) errs in its integral over g by g³/12, so by g²/12 a second. One that is
-    /// held for τ errs by Σ τ² and τ³/3, so by 2 Σ τ and τ² a second.
+    /// Between readings g seconds apart each reading counts from middle to middle: the noise density is Σ g. A random
+    /// walk pinned at the readings (Brownian bridge) gives the integral over g a variance of g³/12, a density of g²/12.
+    /// A value held for τ gives Σ τ² and τ³/3, densities of 2 Σ τ and τ².
     pub(super) fn midway(&self, from: u64, to: u64) -> Option<Value> {
         let middle = from + (to - from) / 2;
         let place = self.readings.partition_point(|reading| reading.stamp_ns <= middle);
@@ -96,7 +99,7 @@ impl Signal {
     }
 }
 
-/// From one stamp to a later one (s).
+/// The time from one stamp to a later one (s).
 pub(super) fn seconds(from: u64, to: u64) -> f64 {
     to.saturating_sub(from) as f64 * 1e-9
 }

@@ -1,4 +1,4 @@
-//! Fix and what was known, each by what is its own.
+//! Fusion of fix and known pose by their covariances, with considered model errors.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -9,18 +9,22 @@ use super::{
 };
 use crate::ObjectPose;
 
-/// Gates a fix by its innovation, then takes the pose of least covariance between both.
+/// The Schmidt–Kalman update: it gates a fix by its innovation, then takes the minimum-variance pose.
 ///
-/// With F = J_r(r)⁻¹ the innovation is r = log(T_known⁻¹ T_fix) = ξ_known − F ξ_fix. All fixes of an object err by what its
-/// model has wrong, so that the two errors have X = E\[ξ_known (F ξ_fix)ᵀ\] in common: models and surveys are
-/// considered as Schmidt does it ([`ConsiderStates`](crate::ConsiderStates)). A fix with rᵀ S⁻¹ r beyond χ²₆(`confidence`),
-/// S = Σ_known + F Σ_fix Fᵀ − X − Xᵀ, is rejected; else the gain is (Σ_known − X) S⁻¹. Taken as independent, sixty fixes
-/// would make a pose eight times surer than one, and the model is as wrong as before.
+/// With F = J_r(r)⁻¹ the innovation is r = log(T_known⁻¹ T_fix) = ξ_known − F ξ_fix. All fixes of an object contain the
+/// same model errors; known pose and fix therefore have the cross-covariance X = E\[ξ_known (F ξ_fix)ᵀ\]. Errors of
+/// models and surveys are considered as by Schmidt ([`ConsiderStates`](crate::ConsiderStates)). With S = Σ_known + F
+/// Σ_fix Fᵀ − X − Xᵀ a fix is rejected if rᵀ S⁻¹ r exceeds χ²₆(`confidence`); otherwise the gain is (Σ_known − X) S⁻¹.
+///
+/// Fixes treated as independent would make a pose after sixty fixes eight times more accurate than after one, although
+/// the model error is unchanged.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fuse {
-    /// The share of right fixes that passes the gate. One in a thousand that does not costs a fix; a wider gate lets an object
-    /// that stands 0.1 m off pass for one in its place in more than one dive of a hundred.
+    /// The fraction of correct fixes that passes the gate, between 0 and 1.
+    ///
+    /// The default of 0.999 loses one correct fix in a thousand. A wider gate accepts an object that is displaced by
+    /// 0.1 m in more than one dive of a hundred.
     pub confidence: f64,
 }
 
@@ -33,12 +37,12 @@ impl Default for Fuse {
 impl Component for Fuse {
     const NAME: &'static str = "fuse";
     const SUMMARY: &'static str =
-        "a fix that agrees is joined with what was known; what all fixes of a model have wrong is considered";
+        "a consistent fix is fused with the known pose; model and survey errors are consider states";
     const SOURCE: &'static str = "Schmidt, Application of state-space methods to navigation problems, 1966; on SE(3): \
                                   Barfoot, Furgale, Associating uncertainty with three-dimensional poses, 2014";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "between zero and one")
+        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "a number in (0, 1)")
     }
 }
 

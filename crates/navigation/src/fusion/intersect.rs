@@ -1,4 +1,4 @@
-//! Fix and what was known, whatever errors they share.
+//! Covariance intersection of fix and known pose.
 
 use nalgebra::Matrix6;
 use seafix_component::{Component, in_range};
@@ -10,16 +10,16 @@ use super::{
 };
 use crate::ObjectPose;
 
-/// Gates a fix by its innovation, then takes the covariance intersection of both.
+/// Covariance intersection: it gates a fix by its innovation, then combines both poses under unknown correlation.
 ///
-/// Fixes of one object share the errors of its model, of the calibration and of the light. Those of the model `fuse` knows;
-/// for the rest nobody has a number. The intersection
-/// Σ⁻¹ = ω Σ_known⁻¹ + (1 − ω) Σ_fix⁻¹, ω for the least det Σ, is at least as large as the true covariance whatever the
-/// two have in common.
+/// Fixes of one object share errors of its model, of the calibration and of the illumination. The fusion `fuse`
+/// accounts for the model's errors only; the others have no known covariance. The intersection Σ⁻¹ = ω Σ_known⁻¹ + (1 −
+/// ω) Σ_fix⁻¹, with the ω of minimum det Σ, is at least as large as the true covariance for every correlation of the
+/// two inputs.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Intersect {
-    /// The share of right fixes that passes the gate, as [`Fuse`](super::Fuse) has it.
+    /// The fraction of correct fixes that passes the gate, between 0 and 1; see [`Fuse`](super::Fuse).
     pub confidence: f64,
 }
 
@@ -31,12 +31,13 @@ impl Default for Intersect {
 
 impl Component for Intersect {
     const NAME: &'static str = "intersect";
-    const SUMMARY: &'static str = "a fix that agrees is joined with what was known, whatever errors they share";
+    const SUMMARY: &'static str =
+        "a consistent fix is combined with the known pose, valid for any correlation of their errors";
     const SOURCE: &'static str = "Julier, Uhlmann, A non-divergent estimation algorithm in the presence of unknown \
                                   correlations, American Control Conference 1997";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "between zero and one")
+        in_range(self.confidence > 0.0 && self.confidence < 1.0, "confidence", self.confidence, "a number in (0, 1)")
     }
 }
 
@@ -51,7 +52,7 @@ impl Fusion for Intersect {
     }
 }
 
-/// The ω in [0, 1] with the greatest det(ω A + (1 − ω) B): its logarithm is concave, a golden section finds it.
+/// The ω in [0, 1] of maximum det(ω A + (1 − ω) B), by golden-section search; its logarithm is concave.
 fn min_determinant(a: &Matrix6<f64>, b: &Matrix6<f64>) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_8;
     let log_det = |omega: f64| {

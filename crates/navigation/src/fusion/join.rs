@@ -1,4 +1,4 @@
-//! What all that join a fix with what was known have in common: the gate, and the poses between the two.
+//! The innovation gate, and the combinations of a fix with the known pose.
 
 use nalgebra::{Matrix6, Vector6};
 use seafix_geometry::{Covariance6, right_jacobian_inverse};
@@ -7,8 +7,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::Contradiction;
 use crate::{ConsiderStates, ObjectPose};
 
-/// Whether a fix agrees with what was known: rᵀ S⁻¹ r ≤ χ²₆(`confidence`), r = log(T_known⁻¹ T_fix), S its covariance as
-/// far as it is known what both have in common.
+/// The χ² gate of a fix: rᵀ S⁻¹ r ≤ χ²₆(`confidence`) with r = log(T_known⁻¹ T_fix).
+///
+/// S is the covariance of r, including the cross-covariance of both poses.
 pub(crate) fn gate(known: &ObjectPose, fix: &ObjectPose, confidence: f64) -> Result<(), Contradiction> {
     let six = ChiSquared::new(6.0).expect("six degrees of freedom");
     let limit = six.inverse_cdf(confidence);
@@ -20,14 +21,14 @@ pub(crate) fn gate(known: &ObjectPose, fix: &ObjectPose, confidence: f64) -> Res
     if nis <= limit { Ok(()) } else { Err(Contradiction { nis, limit }) }
 }
 
-/// r = log(T_known⁻¹ T_fix) = ξ_known − F ξ_fix, F = J_r(r)⁻¹, and how it goes with the error of what was known.
+/// The innovation r = log(T_known⁻¹ T_fix) = ξ_known − F ξ_fix with F = J_r(r)⁻¹, and its covariance.
 struct Innovation {
     r: Vector6<f64>,
-    /// F.
+    /// The matrix F.
     back: Matrix6<f64>,
-    /// X = E[ξ_known (F ξ_fix)ᵀ].
+    /// The cross-covariance X = E[ξ_known (F ξ_fix)ᵀ].
     common: Matrix6<f64>,
-    /// S = Σ_known + F Σ_fix Fᵀ − X − Xᵀ.
+    /// The covariance S = Σ_known + F Σ_fix Fᵀ − X − Xᵀ.
     covariance: Matrix6<f64>,
 }
 
@@ -42,16 +43,16 @@ impl Innovation {
     }
 }
 
-/// The pose of least covariance between the two, and what its error shares with models and surveys:
+/// The minimum-variance pose of the two, with its consider states:
 ///
 /// K = (Σ_known − X) S⁻¹, ξ = (I − K) ξ_known + K F ξ_fix about T_known Exp(K r).
 ///
-/// The covariance is that of this sum whatever K is (Joseph's form). `None` where S is singular.
+/// The covariance holds for every gain K (Joseph's form). `None` if S is singular.
 pub(super) fn consider_states(known: &ObjectPose, fix: &ObjectPose) -> Option<ObjectPose> {
     let Innovation { r, back, common, covariance } = Innovation::of(known, fix);
     let gain = covariance.cholesky()?.solve(&(known.covariance.matrix - common).transpose()).transpose();
     let step = gain * r;
-    // T_known Exp(ξ_known) = T_known Exp(step) Exp(ξ): ξ = J_r(step) (ξ_known − step).
+    // T_known Exp(ξ_known) = T_known Exp(step) Exp(ξ), hence ξ = J_r(step) (ξ_known − step).
     let about = right_jacobian_inverse(&step).try_inverse()?;
     let (stay, go) = (about * (Matrix6::identity() - gain), about * gain);
     let own = back * fix.covariance.matrix * back.transpose();
@@ -65,16 +66,17 @@ pub(super) fn consider_states(known: &ObjectPose, fix: &ObjectPose) -> Option<Ob
     })
 }
 
-/// What A ξ_known + B ξ_fix shares with models and surveys.
+/// The consider states of A ξ_known + B ξ_fix.
 fn sum_of(known: &ObjectPose, a: &Matrix6<f64>, fix: &ObjectPose, b: &Matrix6<f64>) -> ConsiderStates {
     known.consider_states.carried(a).plus(&fix.consider_states.carried(b))
 }
 
-/// Two rounds settle it: an innovation within the gate is a few standard deviations.
+/// Number of Gauss–Newton iterations; two suffice for an innovation within the gate.
 const ROUNDS: usize = 3;
 
-/// The pose with the least w₁ ‖log(T_known⁻¹ T)‖² + w₂ ‖log(T_fix⁻¹ T)‖², each in its own metric; `None` where a
-/// covariance is singular.
+/// The pose of minimum w₁ ‖log(T_known⁻¹ T)‖² + w₂ ‖log(T_fix⁻¹ T)‖², each norm in its own Mahalanobis metric.
+///
+/// `None` if a covariance is singular.
 pub(super) fn joined(known: &ObjectPose, fix: &ObjectPose, weights: [f64; 2]) -> Option<ObjectPose> {
     let known_information = known.covariance.matrix.try_inverse()? * weights[0];
     let fix_information = fix.covariance.matrix.try_inverse()? * weights[1];
@@ -95,7 +97,7 @@ pub(super) fn joined(known: &ObjectPose, fix: &ObjectPose, weights: [f64; 2]) ->
         pose = pose.perturbed(&-(information.cholesky()?.solve(&gradient))).renormalized();
     }
     let covariance = Covariance6::new(information.cholesky()?.inverse());
-    // Of each so much stays as it weighed.
+    // The gain of each input is its share of the information.
     let [stay, go] = pulls.map(|pull| covariance.matrix * pull);
     Some(ObjectPose {
         object_from_camera: pose,
@@ -105,7 +107,7 @@ pub(super) fn joined(known: &ObjectPose, fix: &ObjectPose, weights: [f64; 2]) ->
     })
 }
 
-/// The covariance of η in Exp(r) Exp(η) = Exp(r + J_r(r)⁻¹ η), as one of the sum.
+/// The covariance of J_r(r)⁻¹ η, with η the error in Exp(r) Exp(η) = Exp(r + J_r(r)⁻¹ η).
 pub(super) fn carried_back(covariance: &Matrix6<f64>, r: &Vector6<f64>) -> Matrix6<f64> {
     let jacobian = right_jacobian_inverse(r);
     jacobian * covariance * jacobian.transpose()

@@ -1,4 +1,4 @@
-//! The fix takes the place of what was known.
+//! Replacement of the known pose by the fix.
 
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use super::{Contradiction, Fusion};
 use crate::ObjectPose;
 
-/// Believes every fix, and nothing else from then on.
+/// Plain replacement: every fix is accepted, and the previous pose is discarded.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Replace {}
 
 impl Component for Replace {
     const NAME: &'static str = "replace";
-    const SUMMARY: &'static str = "every fix takes the place of what was known";
+    const SUMMARY: &'static str = "every fix replaces the known pose";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.4";
 }

@@ -1,4 +1,4 @@
-//! One cloud laid over another.
+//! Registration of one cloud to another.
 
 use std::collections::HashMap;
 
@@ -8,40 +8,42 @@ use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Transform, so3};
 use super::{Distance, Icp, grid::Grid};
 use crate::Lost;
 
-/// χ²₃ at 99 %: partners.
+/// The gate of a partner: the 99 % quantile of χ²₃.
 const GATE: f64 = 11.345;
-/// So many times more partners than the same cloud has elsewhere, where it has them by chance: away by half the reach to each side.
-/// The best place of a cloud that does not belong there has some more than any place.
+/// Minimum ratio of the number of partners to the number at wrong positions.
+///
+/// The wrong positions are half the reach to each side. Even a cloud of other ground has slightly more partners at its
+/// best position than elsewhere.
 const BEYOND_NFA: usize = 2;
-/// The reach narrows by this factor from step to step, down to its share `NARROWEST`.
+/// Factor by which the reach narrows at each level, down to the fraction `NARROWEST`.
 const NARROWING: f64 = 0.5;
 const NARROWEST: f64 = 0.005;
-/// A step that is shorter ends the iterations (rad, m).
+/// Convergence threshold: largest component of a step (rad, m).
 const SETTLED: f64 = 1e-9;
-/// Cubes in which offsets are counted, as a share of the reach.
+/// Edge length of the voxels in which offsets are counted, as a fraction of the reach.
 const OFFSETS: f64 = 0.1;
 
-/// A cloud, ready to be laid upon.
+/// A cloud, prepared for registration.
 #[derive(Debug)]
 pub(super) struct Ground {
     points: Vec<Vector3<f64>>,
-    /// The noise that each was measured with.
+    /// The measurement covariance of each point.
     noise: Vec<Matrix3<f64>>,
-    /// How far each may slip along its surface.
+    /// The covariance of each point along its local surface (plane-to-plane ICP).
     slip: Vec<Matrix3<f64>>,
     grid: Grid,
 }
 
-/// Where a cloud lies on another.
+/// The pose of a cloud relative to the key frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Registered {
     pub(super) key_from_now: Transform<Camera, Camera>,
     pub(super) covariance: Covariance6<Camera, Camera>,
-    /// Points with a partner.
+    /// Number of points with a partner.
     pub(super) partners: usize,
 }
 
-/// A pair of points: what is left between them, and the noise of that in the key frame.
+/// A pair of points: residual `left`, its measurement covariance and weight, in the key frame.
 struct Pair {
     jacobian: Matrix3x6<f64>,
     left: Vector3<f64>,
@@ -51,7 +53,7 @@ struct Pair {
 }
 
 impl Pair {
-    /// Their distance squared in the noise they were measured with.
+    /// The squared Mahalanobis distance of the pair, by its measurement noise.
     fn apart(&self) -> f64 {
         let weight = self.measured.try_inverse();
         weight.map_or(f64::INFINITY, |weight| self.left.dot(&(weight * self.left)))
@@ -70,12 +72,12 @@ impl Ground {
         Self { points, noise, slip, grid }
     }
 
-    /// How many points it has.
+    /// The number of points.
     pub(super) fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Lays `now` upon it, from `guess` on and, where that leads nowhere, from the offset that most pairs of points have.
+    /// Registers the cloud `now`, from `guess`; after a failure, from the offset with the most votes.
     pub(super) fn register(
         &self,
         settings: &Icp,
@@ -91,7 +93,7 @@ impl Ground {
     fn from(&self, settings: &Icp, now: &Self, guess: &Transform<Camera, Camera>) -> Result<Registered, Lost> {
         let mut pose = *guess;
         let mut width = 1.0;
-        // So wide that the first partners may be anywhere in reach; in the end the points' own noise alone.
+        // At first partners may lie anywhere within reach; at last only the points' own noise counts.
         while width > NARROWEST {
             width *= NARROWING;
             pose = self.fit(settings, now, pose, settings.reach * width);
@@ -100,7 +102,7 @@ impl Ground {
         self.judge(settings, now, pose)
     }
 
-    /// Nearest points and their best pose in turn; `width` is added to the noise (m).
+    /// Alternates between nearest points and the best pose (ICP); `width` (m) is added to the noise.
     fn fit(
         &self,
         settings: &Icp,
@@ -124,12 +126,12 @@ impl Ground {
         pose
     }
 
-    /// Each point of `now` with its nearest one here.
+    /// The nearest point of this cloud for each point of `now`.
     fn pairs(&self, settings: &Icp, now: &Self, pose: &Transform<Camera, Camera>, width: f64) -> Vec<Pair> {
         let (turn, move_) = (pose.rotation_matrix(), pose.translation());
         let even = self.noise.iter().chain(&now.noise).map(|noise| noise.trace() / 3.0).sum::<f64>()
             / (self.len() + now.len()).max(1) as f64;
-        // With the noise alone partners are as near as noise lets them be.
+        // Without additional width only the noise limits the distance of partners.
         let reach = if width > 0.0 { (4.0 * width).min(settings.reach) } else { settings.reach };
         let pair = |(k, at): (usize, &Vector3<f64>)| {
             let there = turn * at + move_;
@@ -145,14 +147,14 @@ impl Ground {
             let mut jacobian = Matrix3x6::zeros();
             jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&(-turn * so3::skew(at)));
             jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
-            // Of pairs within their noise all count alike; of those beyond it the nearest are kept.
+            // The Mahalanobis distance: trimming keeps the nearest pairs in this metric.
             let far = left.dot(&(weight * left));
             Some(Pair { jacobian, left, measured, weight, far })
         };
         now.points.iter().enumerate().filter_map(pair).collect()
     }
 
-    /// Whether the points say that they lie so, and how well that is known.
+    /// The registration with its covariance, if enough points confirm the pose.
     fn judge(&self, settings: &Icp, now: &Self, pose: Transform<Camera, Camera>) -> Result<Registered, Lost> {
         let pairs = self.partners(settings, now, &pose);
         let found = pairs.len();
@@ -171,7 +173,7 @@ impl Ground {
         let Some((_, normal)) = solved(&pairs) else { return Err(Lost::Weak(f64::INFINITY)) };
         let Some(inverse) = normal.try_inverse() else { return Err(Lost::Weak(f64::INFINITY)) };
         let covariance = match settings.distance {
-            // The fit does not weigh as the noise is: A⁻¹ (Σ Jᵀ W C W J) A⁻¹.
+            // The weights differ from the inverse covariance, hence the sandwich estimate A⁻¹ (Σ Jᵀ W C W J) A⁻¹.
             Distance::Point => {
                 let middle: Matrix6<f64> = pairs
                     .iter()
@@ -184,7 +186,7 @@ impl Ground {
             }
             Distance::Measured | Distance::Plane => inverse,
         };
-        // Partners that fit worse than their noise know less.
+        // A χ² above its expectation inflates the covariance.
         let chi2: f64 = pairs.iter().map(Pair::apart).sum();
         let dof = (3 * found) as f64 - 6.0;
         Ok(Registered {
@@ -194,14 +196,14 @@ impl Ground {
         })
     }
 
-    /// The pairs that are as near as their noise lets them be.
+    /// The pairs whose Mahalanobis distance passes the gate.
     fn partners(&self, settings: &Icp, now: &Self, pose: &Transform<Camera, Camera>) -> Vec<Pair> {
         let mut pairs = self.pairs(settings, now, pose, 0.0);
         pairs.retain(|pair| pair.apart() <= GATE);
         pairs
     }
 
-    /// `guess` moved by the offset that most pairs of points within reach agree on; `None` where there are none.
+    /// The `guess`, moved by the offset with the most votes of point pairs within reach; `None` without a pair.
     fn offset(
         &self,
         settings: &Icp,
@@ -224,7 +226,7 @@ impl Ground {
     }
 }
 
-/// The step ξ that is best for all pairs, and the normal matrix Σ Jᵀ W J.
+/// The Gauss–Newton step ξ of all pairs, and the normal matrix Σ Jᵀ W J.
 fn solved(pairs: &[Pair]) -> Option<(Vector6<f64>, Matrix6<f64>)> {
     let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
     for pair in pairs {
@@ -235,8 +237,10 @@ fn solved(pairs: &[Pair]) -> Option<(Vector6<f64>, Matrix6<f64>)> {
     Some((normal.cholesky()?.solve(&right), normal))
 }
 
-/// How far a point may slip along the surface of its neighbours: by their mean distance, in all directions of the plane of
-/// their scatter, not along its normal.
+/// The covariance of a point along its local surface.
+///
+/// Its standard deviation is the mean distance of the neighbours, in the plane of their scatter; there is none along
+/// the normal.
 fn slip(at: &Vector3<f64>, points: &[Vector3<f64>], grid: &Grid, settings: &Icp) -> Matrix3<f64> {
     let mut near: Vec<(usize, f64)> = grid.within(at, settings.reach).collect();
     near.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
@@ -263,7 +267,7 @@ mod tests {
 
     const SIGMA: f64 = 0.002;
 
-    /// Numbers that look random: evenly between −½ and ½.
+    /// A deterministic pseudo-random number, uniform between −½ and ½.
     fn noise(seed: u64) -> f64 {
         let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -271,7 +275,7 @@ mod tests {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     }
 
-    /// Points on a wavy ground, seen after `now_from_key`, with noise of `SIGMA`; those that `keep` says.
+    /// A cloud of a wavy ground, seen after `now_from_key`, with noise of `SIGMA`; `keep` selects its points.
     fn cloud(pose: &Transform<Camera, Camera>, seed: u64, keep: impl Fn(usize) -> bool) -> Vec<MeasuredPoint> {
         let ground = (0..300_usize).filter(|k| keep(*k)).map(|k| {
             let id = k as u64;
@@ -285,7 +289,8 @@ mod tests {
         ground.collect()
     }
 
-    /// Every distance finds the motion between two views that share three quarters of their points, within what it claims.
+    /// Every distance measure registers two views that share three quarters of their points, with a consistent
+    /// covariance.
     #[test]
     fn clouds_fall_into_place() {
         let truth = Transform::exp(&Vector6::new(0.01, -0.02, 0.03, 0.12, -0.05, 0.02));
@@ -296,17 +301,17 @@ mod tests {
             let now = Ground::new(&settings, &cloud(&truth.inverse(), 2, |k| k % 8 != 3));
             let registered = key.register(&settings, &now, &Transform::identity()).unwrap();
             let error = registered.key_from_now.error_to(&truth);
-            // Planes that slip tell less than points that do not.
+            // Point-to-plane registration is less accurate along the surface.
             let max = if distance == Distance::Plane { 1e-2 } else { 2e-3 };
             assert!(error.amax() < max, "{distance:?}: {error:?}");
             let nees = error.dot(&(registered.covariance.matrix.try_inverse().unwrap() * error));
-            // χ²₆ at 1 − 1e-5.
+            // The quantile of χ²₆ at 1 − 1e-5.
             assert!(nees < 34.9, "{distance:?}: {nees}");
             assert!(registered.partners > 200, "{distance:?}: {}", registered.partners);
         }
     }
 
-    /// Other ground is not taken for this one, whatever makes points near.
+    /// A cloud of other ground is rejected for every distance measure.
     #[test]
     fn other_ground_is_refused() {
         for distance in [Distance::Point, Distance::Measured, Distance::Plane] {

@@ -1,10 +1,10 @@
-//! The nearest point of a cloud within a reach.
+//! Nearest-neighbour search in a voxel grid.
 
 use std::collections::HashMap;
 
 use nalgebra::Vector3;
 
-/// Points in cubes as large as the reach: what is near lies in one cube or in those around it.
+/// Points in cubic voxels with the reach as edge length; neighbours lie in the same or an adjacent voxel.
 #[derive(Debug)]
 pub(super) struct Grid {
     points: Vec<Vector3<f64>>,
@@ -13,7 +13,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Of points that are asked for within `reach` (m).
+    /// A grid for queries within `reach` (m).
     pub(super) fn new(points: Vec<Vector3<f64>>, reach: f64) -> Self {
         let mut cubes: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
         for (index, at) in points.iter().enumerate() {
@@ -22,7 +22,9 @@ impl Grid {
         Self { points, side: reach, cubes }
     }
 
-    /// Every point within `reach`, at most the grid's own, with its distance squared; in an order that depends on the cloud alone.
+    /// All points within `reach` with their squared distances; `reach` must not exceed that of the grid.
+    ///
+    /// The order depends on the cloud alone.
     pub(super) fn within(&self, at: &Vector3<f64>, reach: f64) -> impl Iterator<Item = (usize, f64)> {
         let [x, y, z] = cube(at, self.side);
         let (at, max) = (*at, reach * reach);
@@ -35,7 +37,7 @@ impl Grid {
             .filter(move |(_, far)| *far <= max)
     }
 
-    /// The nearest point within `reach`; of two as near the first.
+    /// The nearest point within `reach`; the first one of equally near points.
     pub(super) fn nearest(&self, at: &Vector3<f64>, reach: f64) -> Option<(usize, f64)> {
         self.within(at, reach).min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)))
     }
@@ -51,7 +53,7 @@ mod tests {
 
     #[test]
     fn the_nearest_is_that_of_all() {
-        // A spiral, asked from places between its points and outside.
+        // Queries between and outside the points of a spiral.
         let spiral = |k: f64| Vector3::new(libm::cos(k), libm::sin(k), 0.05 * k) * (1.0 + 0.02 * k);
         let points: Vec<Vector3<f64>> = (0..200).map(|k| spiral(0.37 * f64::from(k))).collect();
         let grid = Grid::new(points.clone(), 0.5);

@@ -1,4 +1,4 @@
-//! Registration of successive clouds.
+//! Odometry by registration of successive clouds (ICP).
 
 mod align;
 mod grid;
@@ -12,75 +12,76 @@ use serde::{Deserialize, Serialize};
 use crate::{Odometry, OdometrySession};
 use tracker::IcpTracker;
 
-/// What makes two points near.
+/// The distance measure between two points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Distance {
-    /// Their distance: the closest points of Besl and McKay.
+    /// The Euclidean distance: point-to-point ICP by Besl and McKay.
     Point,
-    /// Their distance in the noise that each was measured with.
+    /// The Mahalanobis distance by the measurement noise of both points.
     #[default]
     Measured,
-    /// The same, and each may slip along the surface that its neighbours lie in: plane to plane.
+    /// The Mahalanobis distance with free movement along the local surfaces: plane-to-plane ICP.
     Plane,
 }
 
-/// Odometry by iterative closest points: nothing but the clouds of successive pairs, no image is compared with another.
+/// Odometry by the iterative closest point algorithm: it uses the clouds of successive pairs and compares no images.
 ///
-/// A cloud is laid over that of the last key frame: pairs of nearest points, the nearest `keep` of them fitted, by turns, with
+/// Each cloud is registered to that of the last key frame. The algorithm alternates between nearest points, of which
+/// the fraction `keep` is used, and the minimum of
 ///
 /// Σ eᵀ (C_k + R C Rᵀ)⁻¹ e, e = T p − q,
 ///
-/// C by [`Distance`] (generalised ICP). It starts from the motion before, and where that leads nowhere from the offset on which
-/// most pairs of points agree. What is fitted narrows from `reach` to the points' own noise. The answer holds where
-/// enough points have a partner within their measured noise, twice as many as the same cloud has by chance elsewhere;
-/// everything else is lost. The covariance is that of the fit, of both clouds' noise.
+/// with C given by [`Distance`] (generalised ICP). It starts from the previous motion and, after a failure, from the
+/// offset with the most votes of point pairs. The distance of partners narrows from `reach` to the points' own noise.
+/// The result is accepted if enough points have a partner within their measurement noise: twice as many as at wrong
+/// positions. The covariance is that of the fit, given the noise of both clouds.
 ///
-/// Corners are not found at the same place of a surface again, so it is a baseline: an odometry that looks into the images
-/// knows the motion better.
+/// A detector does not find corners at the same points of a surface again. This odometry is therefore a baseline;
+/// odometry that aligns images is more accurate.
 ///
 /// Source: Besl and McKay, *A method for registration of 3-D shapes*, 1992; Chetverikov et al., *The trimmed iterative
 /// closest point algorithm*, 2002; Segal, Haehnel and Thrun, *Generalized-ICP*, 2009.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Icp {
-    /// Prepare each image, one after the other.
+    /// Image filters, in the order of their application.
     pub filters: Vec<Choice>,
-    /// Finds key points in each image.
+    /// The detector of key points.
     pub detector: Choice,
-    /// Says where exactly they are.
+    /// The locator of key points.
     pub locator: Choice,
-    /// Describes their surroundings, for the matcher.
+    /// The descriptor of key points.
     pub descriptor: Choice,
-    /// Pairs left with right.
+    /// The matcher between left and right image.
     pub matcher: Choice,
-    /// Aligns each pair between the cameras.
+    /// The refinement of each match between the cameras.
     #[serde(deserialize_with = "read_refinement")]
     pub refinement: Choice,
-    /// Turns pairs into points.
+    /// The triangulator.
     #[serde(deserialize_with = "read_triangulator")]
     pub triangulator: Choice,
-    /// What makes two points near.
+    /// The distance measure between two points.
     pub distance: Distance,
-    /// Share of the nearest pairs that is fitted: points of one cloud that the other has not have no partner.
+    /// Fraction of the nearest pairs that is used, above 0 and at most 1; points without a counterpart are trimmed.
     pub keep: f64,
-    /// How far points may be from their partners at the start (m).
+    /// Maximum distance of partners at the start (m).
     pub reach: f64,
-    /// Iterations at most, of each of the steps in which the reach narrows.
+    /// Maximum number of iterations at each level of the narrowing reach.
     pub iterations: usize,
-    /// Neighbours that say how the surface lies.
+    /// Number of neighbours that determine the local surface, 3 to 100.
     pub neighbours: usize,
-    /// Fewer points with a partner are no answer.
+    /// Minimum number of points with a partner, at least 6.
     pub min_points: usize,
-    /// So is a smaller share of them.
+    /// Minimum fraction of points with a partner, 0 to 1.
     pub min_fraction: f64,
-    /// A pair becomes a key frame when less than this share of its points have a partner.
+    /// Fraction of points with a partner, 0 to 1, below which a pair becomes a key frame.
     pub keyframe_fraction: f64,
-    /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
+    /// Maximum standard deviation of the position over the three axes together (m); a less certain motion is rejected.
     pub max_sigma: f64,
-    /// A longer time without a pair that can be followed breaks the segment (s).
+    /// Maximum time between two usable pairs (s); a longer gap breaks the segment.
     pub max_gap: f64,
-    /// A faster motion is not believed (m/s).
+    /// Maximum speed (m/s); a faster estimate is rejected as an outlier.
     pub max_speed: f64,
 }
 
@@ -112,17 +113,17 @@ impl Default for Icp {
 
 impl Component for Icp {
     const NAME: &'static str = "icp";
-    const SUMMARY: &'static str = "successive clouds laid over each other by their nearest points";
+    const SUMMARY: &'static str = "iterative closest points over the clouds of successive pairs";
     const SOURCE: &'static str = "Besl, McKay, A method for registration of 3-D shapes, 1992; Chetverikov et al., The trimmed \
                                   iterative closest point algorithm, 2002; Segal, Haehnel, Thrun, Generalized-ICP, 2009";
 
     fn check(&self) -> Result<(), String> {
         self.front_end()?;
         let positive = |name, x: f64, what| in_range(x > 0.0 && x.is_finite(), name, x, what);
-        let fraction = |name, x: f64| in_range((0.0..=1.0).contains(&x), name, x, "a share from 0 to 1");
-        in_range(self.keep > 0.0 && self.keep <= 1.0, "keep", self.keep, "a share above 0, at most 1")?;
+        let fraction = |name, x: f64| in_range((0.0..=1.0).contains(&x), name, x, "a fraction from 0 to 1");
+        in_range(self.keep > 0.0 && self.keep <= 1.0, "keep", self.keep, "a fraction in (0, 1]")?;
         positive("reach", self.reach, "a positive length (m)")?;
-        in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
+        in_range(self.iterations > 0, "iterations", self.iterations, "at least 1")?;
         in_range((3..=100).contains(&self.neighbours), "neighbours", self.neighbours, "3 to 100")?;
         in_range(self.min_points >= 6, "min-points", self.min_points, "at least 6")?;
         fraction("min-fraction", self.min_fraction)?;

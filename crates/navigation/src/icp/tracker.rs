@@ -1,4 +1,4 @@
-//! The odometry at work.
+//! The session of ICP odometry.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ use crate::{
     unusable::RawImages,
 };
 
-/// The memory of one journey.
+/// The state of one session.
 pub(super) struct IcpTracker<'a> {
     settings: &'a Icp,
     front_end: FrontEnd,
@@ -27,29 +27,29 @@ pub(super) struct IcpTracker<'a> {
     output: FrontEndOutput,
     stamps: Stamps,
     raw: RawImages,
-    /// The key frame: its cloud, and where it is.
+    /// The key frame: its cloud and its pose.
     key: Option<(Ground, Transform<World, Camera>)>,
     last: Option<Last>,
-    /// A cloud that could not be laid anywhere, its stamp, its place among the outcomes, and why.
+    /// A cloud that could not be registered: the cloud, its stamp, its index among the outcomes, the reason.
     pending: Option<(Ground, u64, usize, Lost)>,
-    /// Why the way ended, while no cloud was good enough to begin the next segment.
+    /// The reason of the last break, until a usable cloud begins the next segment.
     broken: Option<Lost>,
     segments: Vec<Segment>,
     outcomes: Vec<OdometryOutcome>,
     times: Times,
 }
 
-/// The last cloud that was followed, relative to the key frame.
+/// The last registered cloud, relative to the key frame.
 struct Last {
     stamp_ns: u64,
     key_from_camera: Transform<Camera, Camera>,
-    /// Of that pose; zero for the key frame itself.
+    /// Covariance of that pose; zero for the key frame itself.
     covariance: Covariance6<Camera, Camera>,
-    /// The motion to it and how long that took (s).
+    /// The previous motion and its duration (s).
     motion: Option<(Transform<Camera, Camera>, f64)>,
 }
 
-/// The way from the last cloud to a new one.
+/// The motion from the last cloud to a new one.
 struct Step {
     registered: Registered,
     motion: Transform<Camera, Camera>,
@@ -110,7 +110,7 @@ impl<'a> IcpTracker<'a> {
         }
     }
 
-    /// Follows a cloud, or begins with it.
+    /// Processes a cloud: it continues the segment or begins a new one.
     fn take(&mut self, ground: Ground, stamp_ns: u64) {
         match self.follow(&ground, stamp_ns) {
             None => {
@@ -118,13 +118,13 @@ impl<'a> IcpTracker<'a> {
                 self.outcomes.push(outcome);
             }
             Some(Ok(step)) => {
-                // A cloud between that could not be laid was the exception.
+                // A single cloud between that failed was an outlier.
                 self.pending = None;
                 self.outcomes.push(OdometryOutcome::Followed { sought: ground.len(), found: step.registered.partners });
                 self.accept(ground, stamp_ns, &step);
             }
             Some(Err(lost)) => match (self.pending.take(), lost) {
-                // Two clouds say that there is no way on: a segment begins with the first of them.
+                // Two successive failures: a new segment begins with the first of the two clouds.
                 (Some((first, when, index, why)), _) => {
                     self.outcomes[index] = self.begin(first, when, Some(why));
                     self.take(ground, stamp_ns);
@@ -141,13 +141,13 @@ impl<'a> IcpTracker<'a> {
         }
     }
 
-    /// Begins a segment where the one before ended.
+    /// Begins a segment at the pose where the previous one ended.
     fn begin(&mut self, ground: Ground, stamp_ns: u64, broken: Option<Lost>) -> OdometryOutcome {
         let broken = self.broken.take().or(broken);
         (self.key, self.last) = (None, None);
         let (found, needed) = (ground.len(), self.settings.min_points);
         if found < needed {
-            // The reason waits for the cloud that does begin.
+            // The reason is kept until a usable cloud begins the segment.
             self.broken = broken;
             return OdometryOutcome::Skipped(Lost::FewPoints { found, needed });
         }
@@ -164,18 +164,18 @@ impl<'a> IcpTracker<'a> {
         OdometryOutcome::Began
     }
 
-    /// The way to a cloud; `None` where nothing was begun.
+    /// The motion to a cloud; `None` before the first segment.
     fn follow(&self, ground: &Ground, stamp_ns: u64) -> Option<Result<Step, Lost>> {
         let ((key, _), last) = (self.key.as_ref()?, self.last.as_ref()?);
         Some(registered(self.settings, key, last, ground, stamp_ns))
     }
 
-    /// Makes a cloud part of the journey.
+    /// Adds a cloud to the trajectory.
     fn accept(&mut self, ground: Ground, stamp_ns: u64, step: &Step) {
         let &Step { registered, motion, seconds } = step;
         let (Some((key, world_from_key)), Some(last)) = (&self.key, &self.last) else { return };
         let world_from_camera = (*world_from_key * registered.key_from_now).renormalized();
-        // Both poses lie on one key frame: what the last one erred by is undone by this step.
+        // Both poses refer to one key frame, so this step cancels the error of the last pose.
         let across = motion.inverse().adjoint();
         let before = last.covariance.matrix;
         let (mut by, mut with) = (CorrelatedSensitivities::zeros(), CorrelatedSensitivities::zeros());
@@ -186,7 +186,7 @@ impl<'a> IcpTracker<'a> {
         let fraction = registered.partners as f64 / key.len().min(ground.len()).max(1) as f64;
         let renewed = fraction < self.settings.keyframe_fraction;
         if renewed {
-            // The next step begins at a key frame of its own and undoes nothing.
+            // The next step starts at a new key frame and cancels no error.
             with = CorrelatedSensitivities::zeros();
             after = held(Matrix6::zeros());
         }
@@ -216,7 +216,7 @@ impl<'a> IcpTracker<'a> {
     }
 }
 
-/// The way from the last cloud to a new one, by the key frame's.
+/// The motion from the last cloud to a new one, by registration to the key frame.
 fn registered(settings: &Icp, key: &Ground, last: &Last, ground: &Ground, stamp_ns: u64) -> Result<Step, Lost> {
     let seconds = (stamp_ns - last.stamp_ns) as f64 * 1e-9;
     if seconds > settings.max_gap {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Policy, Situation};
 
-/// Tries in every frame.
+/// The policy that tries a fix in every frame.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EveryFrame {}

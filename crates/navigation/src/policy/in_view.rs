@@ -1,11 +1,11 @@
-//! A fix whenever an object is in view.
+//! A fix whenever an object should be in view.
 
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
 
 use super::{Policy, Situation};
 
-/// Tries when the pose that is known puts an object in view.
+/// The policy that tries a fix when the known pose puts an object in view.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InView {}

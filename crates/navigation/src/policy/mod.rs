@@ -1,4 +1,4 @@
-//! When to take the next fix.
+//! Re-referencing policies: when to try the next fix.
 
 mod every_frame;
 mod in_view;
@@ -14,22 +14,31 @@ pub use interval::Interval;
 pub use protection_level::ProtectionLevel;
 pub use travelled::Travelled;
 
-/// What a policy decides by.
+/// The navigation quantities that a policy may use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Situation {
-    /// Time since the last fix that was taken (s); infinite before the first.
+    /// Time since the last accepted fix (s); infinite before the first.
     pub seconds: f64,
-    /// Way since then (m); infinite before the first.
+    /// Path length since the last accepted fix (m); infinite before the first.
     pub metres: f64,
-    /// Standard deviation of the camera's position along its worst axis (m); infinite before the first.
+    /// Standard deviation of the camera position along its least accurate axis (m); infinite before the first fix.
     pub sigma: f64,
-    /// Whether the navigated or the rough pose puts an object in view.
+    /// Whether the navigated or the prior pose puts an object in view.
     pub in_view: bool,
 }
 
-/// Decides when a fix is tried. A fix costs a search; without one the error grows.
+/// A re-referencing policy: it decides when a fix is tried. A fix costs a search; without a fix the error grows.
+///
+/// ```
+/// use seafix_component::Choice;
+/// use seafix_navigation::{POLICIES, Situation};
+///
+/// let policy = POLICIES.build(&Choice::named("travelled").with("metres", 10.0)).unwrap();
+/// let after = |metres| Situation { seconds: 60.0, metres, sigma: 0.1, in_view: false };
+/// assert!(!policy.due(&after(5.0)) && policy.due(&after(15.0)));
+/// ```
 pub trait Policy: Send + Sync + std::fmt::Debug {
-    /// Whether to try now.
+    /// Whether a fix should be tried now.
     fn due(&self, situation: &Situation) -> bool;
 }
 

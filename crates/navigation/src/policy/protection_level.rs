@@ -1,4 +1,4 @@
-//! A fix when the pose is no longer good enough.
+//! A fix when the predicted protection level exceeds a limit.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -6,16 +6,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{Policy, Situation};
 
-/// Tries when the predicted protection level exceeds a limit.
+/// The policy that tries a fix when the predicted protection level exceeds `limit`.
 ///
-/// The radius that the position's error exceeds with probability `risk` is at most √χ²₃(1 − risk)
-/// times the standard deviation along the worst axis.
+/// The protection level is √χ²₃(1 − risk) times the standard deviation along the least accurate axis: an upper bound of
+/// the radius that the position error exceeds with probability `risk`.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ProtectionLevel {
-    /// The radius (m) at which a fix is due.
+    /// Maximum protection level (m), above 0.
     pub limit: f64,
-    /// The probability that the error is larger.
+    /// Integrity risk: the probability that the error exceeds the protection level, between 0 and 1.
     pub risk: f64,
 }
 
@@ -31,8 +31,8 @@ impl Component for ProtectionLevel {
     const SOURCE: &'static str = "RTCA DO-229, Minimum operational performance standards for GPS/WAAS, the notion";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.limit > 0.0 && self.limit.is_finite(), "limit", self.limit, "above zero")?;
-        in_range(self.risk > 0.0 && self.risk < 1.0, "risk", self.risk, "between zero and one")
+        in_range(self.limit > 0.0 && self.limit.is_finite(), "limit", self.limit, "a length above 0 (m)")?;
+        in_range(self.risk > 0.0 && self.risk < 1.0, "risk", self.risk, "a number in (0, 1)")
     }
 }
 

@@ -1,15 +1,15 @@
-//! A fix every so many metres.
+//! A fix at fixed intervals of the path length.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{Policy, Situation};
 
-/// Tries when the vehicle has come `metres` since the last fix.
+/// The policy that tries a fix when the vehicle has travelled `metres` since the last one.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Travelled {
-    /// The way (m) after which a fix is due.
+    /// Minimum path length since the last fix (m), 0 or more.
     pub metres: f64,
 }
 
@@ -21,12 +21,12 @@ impl Default for Travelled {
 
 impl Component for Travelled {
     const NAME: &'static str = "travelled";
-    const SUMMARY: &'static str = "a fix is tried so many metres after the last one";
+    const SUMMARY: &'static str = "a fix is tried when the path since the last one exceeds a length";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 3";
 
     fn check(&self) -> Result<(), String> {
-        in_range(self.metres >= 0.0 && self.metres.is_finite(), "metres", self.metres, "zero or above")
+        in_range(self.metres >= 0.0 && self.metres.is_finite(), "metres", self.metres, "a length of 0 or more (m)")
     }
 }
 

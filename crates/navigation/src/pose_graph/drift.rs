@@ -1,4 +1,4 @@
-//! What a motion and the errors that last through it say of each other.
+//! Odometry factors of the pose graph whose errors are correlated over several edges.
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
@@ -8,13 +8,13 @@ use crate::{
     correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
 };
 
-/// Numbers of a motion's error and of what lasts at its end.
+/// Dimension of a motion's error together with the correlated errors at its end.
 const BOTH: usize = 6 + CORRELATED;
 
 pub(super) type Square = SMatrix<f64, CORRELATED, CORRELATED>;
 pub(super) type Numbers = SVector<f64, CORRELATED>;
 
-/// The standard deviations in which errors that last are counted; 0 for those that are not there.
+/// The standard deviations that normalise the correlated errors; 0 for absent ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Units(Numbers);
 
@@ -23,20 +23,22 @@ impl Units {
         Self(spread.diagonal().map(f64::sqrt))
     }
 
-    /// What shares C = E\[ξ nᵀ\] in these units are in their own.
+    /// The cross-covariance E\[ξ mᵀ\] from its normalised form E\[ξ nᵀ\].
     pub(super) fn own(&self, sensitivities: &CorrelatedSensitivities) -> CorrelatedSensitivities {
         CorrelatedSensitivities::from_fn(|row, k| sensitivities[(row, k)] * self.0[k])
     }
 }
 
-/// A share of so much of every variance is noise whatever is measured: a scale that never changes would make its equations
-/// singular. Over a thousand legs it may wander by a thousandth of its standard deviation.
+/// The fraction of every variance that counts as additional independent noise.
+///
+/// A constant scale error would make the equations singular. Over a thousand edges this noise changes it by less than a
+/// thousandth of its standard deviation.
 const MIN: f64 = 1e-9;
 
-/// The spread of errors that last, in units of their own, and what they are known to before anything is measured.
+/// The units of the correlated errors and their prior information in these units.
 ///
 /// # Errors
-/// [`NoCovariance`].
+/// [`NoCovariance`] if the covariance is not positive semidefinite.
 pub(super) fn prior(spread: &CorrelatedCovariance) -> Result<(Units, Square), NoCovariance> {
     let spread = spread.matrix();
     let units = Units::of(&spread);
@@ -44,7 +46,7 @@ pub(super) fn prior(spread: &CorrelatedCovariance) -> Result<(Units, Square), No
     Ok((units, information))
 }
 
-/// M in units: what is not there stands alone with variance one, and touches nothing.
+/// The matrix in normalised units; an absent error has variance one and no correlation.
 fn normal(spread: &Square, units: &Units) -> Square {
     Square::from_fn(|i, j| match (units.0[i] * units.0[j], i == j) {
         (unit, _) if unit > 0.0 => spread[(i, j)] / unit + if i == j { MIN } else { 0.0 },
@@ -53,25 +55,24 @@ fn normal(spread: &Square, units: &Units) -> Square {
     })
 }
 
-/// A motion's error ξ and the errors n′ that last at its end, given those n at its beginning:
+/// The conditional distribution of a motion's error ξ and the final correlated errors n′.
 ///
-/// (ξ, n′) = F n + w, w with the information Λ.
-///
-/// It is what remains of their covariance once n is known.
+/// Given the initial errors n it is (ξ, n′) = F n + w, with w of information Λ (from the Schur complement of the joint
+/// covariance).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Drift {
     by: SMatrix<f64, BOTH, CORRELATED>,
     information: SMatrix<f64, BOTH, BOTH>,
 }
 
-/// A drift's residual and its derivatives by the pose where the motion begins, by that where it ends, by n and by n′.
+/// The number of unknowns of a factor: both poses, n and n′.
 pub(super) const SIDES: usize = 12 + 2 * CORRELATED;
 
 impl Drift {
-    /// Of a motion; the units of what lasts at its end.
+    /// The factor of a motion, and the units of the correlated errors at its end.
     ///
     /// # Errors
-    /// [`NoCovariance`].
+    /// [`NoCovariance`] if the correlated errors contradict the covariance of the motion.
     pub(super) fn of(motion: &RelativeMotion, correlated: &CorrelatedError) -> Result<(Self, Units), NoCovariance> {
         let (before, after) = (correlated.before.matrix(), correlated.after.matrix());
         let (from, to) = (Units::of(&before), Units::of(&after));
@@ -93,7 +94,7 @@ impl Drift {
         Ok((Self { by, information }, to))
     }
 
-    /// (ξ, n′) − F n.
+    /// The residual (ξ, n′) − F n.
     fn residual(&self, r: &Vector6<f64>, before: &Numbers, after: &Numbers) -> SVector<f64, BOTH> {
         let mut all = -self.by * before;
         for (k, value) in r.iter().chain(after.iter()).enumerate() {
@@ -102,13 +103,13 @@ impl Drift {
         all
     }
 
-    /// Its square in standard deviations.
+    /// The squared Mahalanobis norm of the residual.
     pub(super) fn disagreement(&self, r: &Vector6<f64>, before: &Numbers, after: &Numbers) -> f64 {
         let all = self.residual(r, before, after);
         all.dot(&(self.information * all))
     }
 
-    /// JᵀΛJ and JᵀΛr of the four sides, ξ having these derivatives by the two poses.
+    /// The normal equations JᵀΛJ and JᵀΛr; `poses` are the derivatives of ξ by the two poses.
     pub(super) fn equations(
         &self,
         r: &Vector6<f64>,

@@ -1,9 +1,9 @@
-//! `seafix-pose-graph/2`: a network as a file.
+//! The file format `seafix-pose-graph/2`: a pose graph as text.
 //!
-//! UTF-8 text, a JSON object a line. The first line names the format and how key frames were made of images; the last
-//! says how many lines there are between, so that what is cut off shows. Between them stand `object`s, `pose_node`s, `odometry_edge`s,
-//! `fix`es, `prior_pose`s and `loop`s, each kind in its order; what they refer to is a number from 0. Matrices are rows;
-//! numbers of a key frame are base64 of little-endian values.
+//! UTF-8 text with one JSON object per line. The first line (`head`) names the format and the settings that made the
+//! key frames; the last (`end`) states the number of lines between them, so that a truncated file is recognised.
+//! Between them stand the lines `object`, `node`, `edge`, `fix`, `prior` and `loop`, each kind in its order. References
+//! are indices from 0. Matrices are lists of rows; the numbers of a key frame are base64 of little-endian values.
 
 use std::path::Path;
 
@@ -63,8 +63,10 @@ struct RawPoseNode {
     keyframe: Option<RawKeyFrame>,
 }
 
-/// Of each point: x, y, z (m) and the six numbers xx, xy, xz, yy, yz, zz of its covariance (m²) as doubles; u and v as
-/// doubles, response and scale as singles; its descriptor as singles or words of 64 bits.
+/// The arrays of a key frame in base64.
+///
+/// For each point: x, y, z (m) and the components xx, xy, xz, yy, yz, zz of its covariance (m²) as 64-bit floats; u and
+/// v as 64-bit floats, response and scale as 32-bit floats; the descriptor as 32-bit floats or 64-bit words.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawKeyFrame {
@@ -89,12 +91,12 @@ struct RawOdometryEdge {
     to: usize,
     motion: Rows4,
     covariance: Rows6,
-    /// Absent where it errs independently of all others.
+    /// Absent if the error is independent of all others.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     correlated: Option<RawCorrelatedError>,
 }
 
-/// Numbers of `CorrelatedError`, under its names.
+/// The fields of `CorrelatedError`, under the same names.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawCorrelatedError {
@@ -134,7 +136,7 @@ impl RawCorrelatedError {
         let sensitivities = |rows: &[[f64; CORRELATED]; 6]| CorrelatedSensitivities::from_fn(|row, k| rows[row][k]);
         let spread = |raw: &RawCorrelatedCovariance| {
             let independent = Vector4::from(raw.independent);
-            let wrong = || ("no variances", format!("{:?}", raw.independent), "give numbers of 0 or more");
+            let wrong = || ("invalid variances", format!("{:?}", raw.independent), "give numbers of at least 0");
             match independent.iter().all(|x| x.is_finite() && *x >= 0.0) {
                 true => Ok(CorrelatedCovariance { independent, held: finite(&raw.held)? }),
                 false => Err(wrong()),
@@ -163,7 +165,7 @@ struct RawPriorPose {
 }
 
 impl PoseGraph {
-    /// The network as a file's text; `recognition` made its key frames.
+    /// The text of a pose-graph file; `recognition` holds the settings that made the key frames.
     pub fn text(&self, recognition: &Recognition) -> String {
         let head = Head { format: FORMAT.to_owned(), recognition: recognition.clone() };
         let mut lines = vec![Line::Head(Box::new(head))];
@@ -215,11 +217,11 @@ impl PoseGraph {
         text
     }
 
-    /// The network of a file's text.
+    /// The pose graph in the text of a file.
     ///
     /// # Errors
-    /// The first [`Fault`]: a line that is no record, a number out of place, another way of making key frames than
-    /// `recognition` (what was described otherwise is not recognised), an end that is missing.
+    /// The first [`Fault`]: an invalid line, a reference to a missing line, a missing end, or key frames described with
+    /// other settings than `recognition` (their descriptors would not match).
     pub fn read(file: &Path, text: &str, recognition: &Recognition) -> Result<Self, Fault> {
         let mut pose_graph = Self::default();
         let mut end = None;
@@ -230,21 +232,23 @@ impl PoseGraph {
                 let said = error.to_string();
                 let said = said.split(" at line ").next().unwrap_or_default().to_owned();
                 let cut = if index + 1 == count { "; is the file cut off?" } else { "" };
-                at("no line of a network").value(said).remedy(format!("write it again by `add-keyframes = true`{cut}"))
+                at("invalid line of a pose graph")
+                    .value(said)
+                    .remedy(format!("write the file again with `add-keyframes = true`{cut}"))
             })?;
             if (index == 0) != matches!(line, Line::Head(_)) {
-                return Err(at("the first line, and only the first, names the format")
+                return Err(at("the first line, and no other, must name the format")
                     .remedy(format!("give a file of format {FORMAT}")));
             }
             if end.is_some() {
-                return Err(at("a line after the end").remedy("one network a file"));
+                return Err(at("line after the end").remedy("store each pose graph in a file of its own"));
             }
             if let Line::End(lines) = line {
                 end = Some(lines);
                 if lines + 2 != index + 1 {
-                    return Err(at("lines are missing")
+                    return Err(at("missing lines")
                         .value(format!("{} of {lines}", index - 1))
-                        .remedy("take the whole file"));
+                        .remedy("copy the complete file"));
                 }
                 continue;
             }
@@ -252,29 +256,29 @@ impl PoseGraph {
         }
         match end {
             Some(_) => Ok(pose_graph),
-            None => Err(Fault::new("the network has no end", file).on_line(count).remedy("take the whole file")),
+            None => Err(Fault::new("missing end line", file).on_line(count).remedy("copy the complete file")),
         }
     }
 
-    /// Takes in a line; what is wrong with it, the value, the remedy.
+    /// Adds the content of a line; the error holds what is wrong, the value and the remedy.
     fn take(&mut self, line: Line, recognition: &Recognition) -> Result<(), (&'static str, String, &'static str)> {
         match line {
             Line::Head(head) => {
                 let Head { format, recognition: added } = *head;
                 if format != FORMAT {
-                    return Err(("another format", format, "give a file of format seafix-pose-graph/2"));
+                    return Err(("unknown format", format, "give a file of format seafix-pose-graph/2"));
                 }
                 if let Some(key) = added.described_unlike(recognition) {
                     return Err((
-                        "key frames were described otherwise than those they are to be compared with",
+                        "key frames were described with other settings than those of this pipeline",
                         key.to_owned(),
-                        "use the settings that the network was laid with, or lay it again",
+                        "use the settings that the pose graph was made with, or make it again",
                     ));
                 }
             }
             Line::Object(object) => {
                 if self.objects.iter().any(|(name, _)| *name == object.name) {
-                    return Err(("two objects of one name", object.name, "give each its own"));
+                    return Err(("duplicate object name", object.name, "give each object its own name"));
                 }
                 let place = ObjectPlacement {
                     world_from_object: pose::<World, Object>(&object.world_from_object)?,
@@ -285,9 +289,9 @@ impl PoseGraph {
             Line::Node(pose_node) => {
                 if !(pose_node.sigma >= 0.0) {
                     return Err((
-                        "no standard deviation",
+                        "invalid standard deviation",
                         pose_node.sigma.to_string(),
-                        "give a length of 0 or more (m)",
+                        "give a length of at least 0 (m)",
                     ));
                 }
                 let keyframe = pose_node.keyframe.as_ref().map(cooked).transpose()?;
@@ -323,7 +327,7 @@ impl PoseGraph {
                     covariance,
                 });
             }
-            Line::End(_) => unreachable!("the caller takes it"),
+            Line::End(_) => unreachable!("handled by the caller"),
         }
         Ok(())
     }
@@ -331,7 +335,7 @@ impl PoseGraph {
     fn odometry_edge(&self, raw: &RawOdometryEdge) -> Result<OdometryEdge, (&'static str, String, &'static str)> {
         let (from, to) = (among(raw.from, self.pose_nodes.len())?, among(raw.to, self.pose_nodes.len())?);
         if from == to {
-            return Err(("a motion from a station to itself", from.to_string(), "name two stations"));
+            return Err(("edge from a pose node to itself", from.to_string(), "name two nodes"));
         }
         let covariance = Covariance6::new(covariance(&raw.covariance)?);
         let correlated = raw.correlated.as_ref().map(RawCorrelatedError::cooked).transpose()?;
@@ -339,15 +343,15 @@ impl PoseGraph {
         if let Some(correlated) = &correlated
             && Drift::of(&motion, correlated).is_err()
         {
-            let value = format!("from station {from} to {to}");
-            return Err(("errors that last do not fit the covariance of their motion", value, "take the whole file"));
+            let value = format!("from node {from} to {to}");
+            return Err(("correlated errors contradict the motion's covariance", value, "copy the complete file"));
         }
         Ok(OdometryEdge { from, to, motion })
     }
 }
 
 impl Recognition {
-    /// The setting in which key points and descriptors of two recognitions differ.
+    /// The first setting in which the key points and descriptors of two recognitions differ.
     fn described_unlike(&self, other: &Self) -> Option<&'static str> {
         if self.filters != other.filters {
             return Some("filters");
@@ -364,24 +368,25 @@ impl Recognition {
 type Wrong = (&'static str, String, &'static str);
 
 fn among(index: usize, count: usize) -> Result<usize, Wrong> {
-    let wrong = || ("it refers to what does not stand before it", format!("{index} of {count}"), "take the whole file");
+    let wrong = || ("reference to a missing or later line", format!("{index} of {count}"), "copy the complete file");
     if index < count { Ok(index) } else { Err(wrong()) }
 }
 
 fn pose<A: Frame, B: Frame>(rows: &Rows4) -> Result<Transform<A, B>, Wrong> {
-    Transform::from_rows(rows).map_err(|error| ("no rigid motion", error.to_string(), "give a pose"))
+    Transform::from_rows(rows)
+        .map_err(|error| ("not a rigid transform", error.to_string(), "give a rotation matrix and a translation"))
 }
 
 fn finite(rows: &Rows6) -> Result<Matrix6<f64>, Wrong> {
     let matrix = Matrix6::from_fn(|row, column| rows[row][column]);
     let sound = matrix.iter().all(|x| x.is_finite()) && (0..6).all(|k| matrix[(k, k)] >= 0.0);
-    let wrong = || ("no covariance", format!("diagonal {:?}", matrix.diagonal().as_slice()), "give variances");
+    let wrong = || ("invalid covariance", format!("diagonal {:?}", matrix.diagonal().as_slice()), "give variances");
     if sound { Ok(matrix) } else { Err(wrong()) }
 }
 
 fn covariance(rows: &Rows6) -> Result<Matrix6<f64>, Wrong> {
     let matrix = finite(rows)?;
-    let wrong = || ("no covariance", "not positive definite".to_owned(), "give a covariance of full rank");
+    let wrong = || ("invalid covariance", "not positive definite".to_owned(), "give a covariance of full rank");
     if matrix.cholesky().is_some() { Ok(matrix) } else { Err(wrong()) }
 }
 
@@ -389,7 +394,7 @@ fn rows6(matrix: &Matrix6<f64>) -> Rows6 {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
 }
 
-/// Where the six numbers of a covariance stand.
+/// The row and column of the six stored components of a covariance.
 const UPPER: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 fn raw(keyframe: &KeyFrame) -> RawKeyFrame {
@@ -416,9 +421,9 @@ fn raw(keyframe: &KeyFrame) -> RawKeyFrame {
     }
 }
 
-/// What base64 holds, in pieces of `size` bytes, `count` of them where that is known.
+/// The bytes encoded in base64: `count` records of `size` bytes.
 fn pieces(text: &str, size: usize, count: usize) -> Result<Vec<u8>, Wrong> {
-    let wrong = |value: String| ("a key frame that does not hold what it says", value, "take the whole file");
+    let wrong = |value: String| ("corrupt key frame", value, "copy the complete file");
     let bytes = STANDARD.decode(text).map_err(|error| wrong(error.to_string()))?;
     if count.checked_mul(size) == Some(bytes.len()) {
         Ok(bytes)
@@ -431,7 +436,7 @@ fn cooked(raw: &RawKeyFrame) -> Result<KeyFrame, Wrong> {
     let doubles = |bytes: &[u8]| -> Vec<f64> {
         bytes.chunks_exact(8).map(|eight| f64::from_le_bytes(eight.try_into().expect("eight bytes"))).collect()
     };
-    let wrong = |value: &str| ("a key frame that does not hold what it says", value.to_owned(), "take the whole file");
+    let wrong = |value: &str| ("corrupt key frame", value.to_owned(), "copy the complete file");
     let numbers = doubles(&pieces(&raw.points, 72, raw.count)?);
     let points: Vec<UncertainPoint<Camera>> = numbers
         .chunks_exact(9)
@@ -461,7 +466,7 @@ fn cooked(raw: &RawKeyFrame) -> Result<KeyFrame, Wrong> {
         Kind::Bits => 8,
     };
     if raw.count == 0 || bytes.is_empty() || !bytes.len().is_multiple_of(raw.count * width) {
-        return Err(wrong("descriptors that do not fill a row a point"));
+        return Err(wrong("the descriptors do not fill one row for each point"));
     }
     let length = bytes.len() / (raw.count * width);
     let descriptors = match raw.kind {
@@ -513,7 +518,7 @@ mod tests {
         pose_graph
     }
 
-    /// A scale that makes a tenth of the motion's variance, and the rest of the numbers as a reading that is held has them.
+    /// Correlated errors with a scale that causes a tenth of the motion's variance, and a held reading.
     fn correlated() -> CorrelatedError {
         let (mut by, mut with) = (CorrelatedSensitivities::zeros(), CorrelatedSensitivities::zeros());
         (by[(3, 0)], with[(3, 0)]) = (0.1 + 0.2, (0.1 + 0.2) * 1e-6);
@@ -547,8 +552,8 @@ mod tests {
         let text = pose_graph().text(&recognition);
         let lines: Vec<&str> = text.lines().collect();
         let said = |text: &str| PoseGraph::read(Path::new("n.jsonl"), text, &recognition).unwrap_err().to_string();
-        assert!(said("").contains("no end in n.jsonl:0"), "{}", said(""));
-        assert!(said(&lines[..4].join("\n")).contains("no end in n.jsonl:4"));
+        assert!(said("").contains("missing end line in n.jsonl:0"), "{}", said(""));
+        assert!(said(&lines[..4].join("\n")).contains("missing end line in n.jsonl:4"));
         assert!(said(&text[..text.len() / 2]).contains("cut off"), "{}", said(&text[..text.len() / 2]));
         let without = |line: usize| {
             let mut rest = lines.clone();
@@ -556,19 +561,19 @@ mod tests {
             said(&rest.join("\n"))
         };
         assert!(without(0).contains("first line"), "{}", without(0));
-        assert!(without(5).contains("lines are missing in n.jsonl"), "{}", without(5));
-        assert!(without(3).contains("does not stand before it in n.jsonl:4: 1 of 1"), "{}", without(3));
+        assert!(without(5).contains("missing lines in n.jsonl"), "{}", without(5));
+        assert!(without(3).contains("missing or later line in n.jsonl:4: 1 of 1"), "{}", without(3));
         let with = |from: &str, to: &str| said(&text.replacen(from, to, 1));
-        assert!(with("network/1", "network/9").contains("another format in n.jsonl:1"));
-        assert!(with("\"sigma\":0.1", "\"sigma\":-0.1").contains("no standard deviation in n.jsonl:3: -0.1"));
-        assert!(with("\"count\":2", "\"count\":3").contains("does not hold what it says in n.jsonl:3"));
+        assert!(with("pose-graph/2", "pose-graph/9").contains("unknown format in n.jsonl:1"));
+        assert!(with("\"sigma\":0.1", "\"sigma\":-0.1").contains("invalid standard deviation in n.jsonl:3: -0.1"));
+        assert!(with("\"count\":2", "\"count\":3").contains("corrupt key frame in n.jsonl:3"));
         assert!(with("\"stamp_ns\"", "\"stamp\"").contains("unknown field"));
-        assert!(with("[1e-6,0.0", "[-1e-6,0.0").contains("no variances in n.jsonl:5: [-1e-6"));
-        assert!(with("[1e-6,0.0", "[1.0,0.0").contains("do not fit the covariance of their motion in n.jsonl:5: from"));
+        assert!(with("[1e-6,0.0", "[-1e-6,0.0").contains("invalid variances in n.jsonl:5: [-1e-6"));
+        assert!(with("[1e-6,0.0", "[1.0,0.0").contains("contradict the motion's covariance in n.jsonl:5: from"));
         let other =
             Recognition { points: 100, descriptor: seafix_component::Choice::named("orb"), ..recognition.clone() };
         let unlike = PoseGraph::read(Path::new("n.jsonl"), &text, &other).unwrap_err().to_string();
-        assert!(unlike.contains("described otherwise") && unlike.contains(": descriptor;"), "{unlike}");
+        assert!(unlike.contains("described with other settings") && unlike.contains(": descriptor;"), "{unlike}");
         assert_eq!(with("box", "b\u{7}x").lines().count(), 1);
     }
 }

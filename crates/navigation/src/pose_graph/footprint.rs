@@ -1,18 +1,21 @@
-//! The piece of the bottom that a key frame shows.
+//! The area of the seabed that a key frame shows.
 
 use nalgebra::Point2;
 use seafix_geometry::{Camera, Point, Transform, World};
 
-/// The convex hull of what is in view, laid on the horizontal plane of the world: corners in order, to the right hand.
+/// A footprint: the convex hull of the visible points, projected on the world's horizontal plane.
+///
+/// The corners are in order, with the inside to the left of every side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint(Vec<Point2<f64>>);
 
-/// Points farther from the bottom than so many robust standard deviations are not of it, and mostly wrong.
+/// Maximum distance of a point from the seabed, in robust standard deviations; points beyond it are outliers.
 const OFF: f64 = 4.0;
 
 impl Footprint {
-    /// The footprint of these points, seen from there. The bottom is as deep as the median of them; what lies far off it
-    /// is left out.
+    /// The footprint of points seen by a camera.
+    ///
+    /// The seabed's depth is the median depth of the points; points far from it are ignored.
     pub fn of(points: &[Point<Camera>], world_from_camera: &Transform<World, Camera>) -> Self {
         let seen: Vec<Point<World>> = points.iter().map(|point| *world_from_camera * *point).collect();
         let depths = seen.iter().map(|point| point.coords.z);
@@ -22,26 +25,26 @@ impl Footprint {
         Self(hull(near.map(|point| Point2::new(point.coords.x, point.coords.y)).collect()))
     }
 
-    /// Its area (m²).
+    /// The area (m²).
     pub fn area(&self) -> f64 {
         let n = self.0.len();
         let twice: f64 = (0..n).map(|i| cross(&self.0[i], &self.0[(i + 1) % n])).sum();
         0.5 * twice.abs()
     }
 
-    /// The mean of its corners; `None` where it has none.
+    /// The mean of the corners; `None` without corners.
     pub fn middle(&self) -> Option<Point2<f64>> {
         let sum = self.0.iter().fold(nalgebra::Vector2::zeros(), |sum, corner| sum + corner.coords);
         (!self.0.is_empty()).then(|| Point2::from(sum / self.0.len() as f64))
     }
 
-    /// The same, moved (m, m).
+    /// The footprint, moved by a vector (m).
     #[must_use]
     pub fn moved(&self, by: nalgebra::Vector2<f64>) -> Self {
         Self(self.0.iter().map(|corner| corner + by).collect())
     }
 
-    /// Which share of this one the other covers, 0 to 1 (Sutherland and Hodgman: cut by each side of the other).
+    /// The fraction (0 to 1) of this footprint that the other covers, by Sutherland–Hodgman clipping.
     pub fn covered_by(&self, other: &Self) -> f64 {
         let own = self.area();
         if !(own > 0.0) || other.0.len() < 3 {
@@ -79,7 +82,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The convex hull, its inside to the left of every side (Andrew's monotone chain).
+/// The convex hull by Andrew's monotone chain, with the inside to the left of every side.
 fn hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();

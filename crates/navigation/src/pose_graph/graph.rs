@@ -1,4 +1,4 @@
-//! The pose graph: poses that are known by what was measured between them.
+//! Sparse least-squares optimisation of a pose graph.
 
 use faer::{
     Mat, Side,
@@ -15,27 +15,28 @@ use crate::{
     correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
 };
 
-/// A pose of the graph. Objects stand in it as cameras do; their frames are renamed where they come in.
+/// A pose of the graph; object frames are relabelled as camera frames at the interface.
 type Pose = Transform<World, Camera>;
 
-/// Poses as nodes, measurements as factors:
+/// A factor graph: poses as nodes, measurements as factors.
 ///
-/// - `between`: r = log(Z⁻¹ A⁻¹ B), Z the measured motion from A to B;
-/// - `prior`: r = log(Z⁻¹ A), Z the pose itself as something else measured it.
+/// - `between`: r = log(Z⁻¹ A⁻¹ B), with Z the measured motion from A to B;
+/// - `prior`: r = log(Z⁻¹ A), with Z an independent measurement of the pose.
 ///
-/// Errors that [last](crate::CorrelatedError) are nodes too, and a motion that has them is a factor of four nodes, the poses and the
-/// errors at both ends of it (`drifting`).
+/// [Correlated errors](crate::CorrelatedError) are nodes as well; a motion with correlated errors is a factor of four
+/// nodes, its two poses and the errors at both ends (`drifting`).
 ///
-/// The estimate has the least Σ ρ(rᵀ Σ⁻¹ r). ρ is the identity, and for factors that may be wrong that of a switch:
-/// ρ(x) = s² x + (1 − s)² Φ with s = min(1, 2Φ/(Φ + x)), which gives up what contradicts everything else. Φ is the 99 %
-/// quantile of χ²₆: what is right keeps its whole weight.
+/// The estimate minimises Σ ρ(rᵀ Σ⁻¹ r). The loss ρ is the identity for trusted factors. Doubtful factors have dynamic
+/// covariance scaling: ρ(x) = s² x + (1 − s)² Φ with s = min(1, 2Φ/(Φ + x)), so that a factor that contradicts all
+/// others loses its weight. Φ is the 99 % quantile of χ²₆; a consistent factor keeps its full weight.
 ///
-/// A right loop after a long way contradicts the drifted start as much as a wrong one does. So the switch begins wide,
-/// with every factor believed, and narrows to Φ by halves (graduated non-convexity).
+/// After a long path a correct loop contradicts the drifted initial poses as much as a wrong one does. The optimisation
+/// therefore starts with full weight for every factor and halves the threshold until it reaches Φ (graduated
+/// non-convexity).
 ///
-/// Source: Grisetti et al., *A tutorial on graph-based SLAM*, 2010; the switch: Agarwal et al., *Robust map optimization
-/// using dynamic covariance scaling*, ICRA 2013; its narrowing: Yang, Antonante, Tzoumas and Carlone, *Graduated
-/// non-convexity for robust spatial perception*, 2020.
+/// Source: Grisetti et al., *A tutorial on graph-based SLAM*, 2010; Agarwal et al., *Robust map optimization using
+/// dynamic covariance scaling*, ICRA 2013; Yang, Antonante, Tzoumas and Carlone, *Graduated non-convexity for robust
+/// spatial perception*, 2020.
 #[derive(Debug, Clone, Default)]
 pub struct FactorGraph {
     nodes: Vec<Node>,
@@ -49,18 +50,18 @@ struct Node {
     held: bool,
 }
 
-/// Errors that last, as they are at one time.
+/// The correlated errors at one instant.
 #[derive(Debug, Clone)]
 struct Lasts {
     numbers: Numbers,
     units: Units,
-    /// What is known of them before anything is measured.
+    /// Their prior information, at the start of a chain of edges.
     prior: Option<Square>,
 }
 
 #[derive(Debug, Clone)]
 struct Factor {
-    /// The node it begins at; absent for a prior.
+    /// The first node; `None` for a prior.
     from: Option<usize>,
     to: usize,
     measured: Pose,
@@ -68,53 +69,53 @@ struct Factor {
     doubtful: bool,
 }
 
-/// How a factor counts.
+/// The weight of a factor.
 #[derive(Debug, Clone)]
 enum Weight {
-    /// By the information of its own error.
+    /// The information matrix of an independent error.
     Own(Box<Matrix6<f64>>),
-    /// Together with the errors that last at its beginning and at its end.
+    /// A factor with correlated errors, and the nodes of these errors at its start and end.
     Drifting(Box<Drift>, [usize; 2]),
 }
 
-/// A covariance that is none.
+/// A covariance that is not positive definite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the covariance is not positive definite")]
 pub struct NoCovariance;
 
-/// Steps at most, those not taken among them.
+/// Maximum number of iterations, rejected steps included.
 const STEPS: usize = 200;
-/// A step whose square in standard deviations is smaller is the last.
+/// Convergence threshold: squared Mahalanobis length of a step.
 const LAST: f64 = 1e-18;
-/// The same while the switch still narrows.
+/// Convergence threshold while the switch still narrows.
 const ROUGHLY: f64 = 1e-4;
 
-/// Φ of the switch.
+/// The threshold Φ of the switch.
 fn max() -> f64 {
     ChiSquared::new(6.0).expect("six degrees of freedom").inverse_cdf(0.99)
 }
 
 impl FactorGraph {
-    /// A new node, near this pose; its number.
+    /// Adds a node with an initial pose; returns its index.
     pub fn node(&mut self, near: Pose) -> usize {
         self.nodes.push(Node { pose: near, held: false });
         self.nodes.len() - 1
     }
 
-    /// Takes a node as exact.
+    /// Fixes a node at its pose.
     pub fn hold(&mut self, node: usize) {
         self.nodes[node].held = true;
     }
 
-    /// The pose of a node, as it is known by now.
+    /// The current pose of a node.
     pub fn pose(&self, node: usize) -> &Pose {
         &self.nodes[node].pose
     }
 
-    /// What measured a node's pose by itself; the number of the factor.
+    /// Adds an independent measurement of a node's pose; returns the index of the factor.
     ///
     /// # Errors
-    /// [`NoCovariance`].
+    /// [`NoCovariance`] if the covariance is not positive definite.
     pub fn prior(&mut self, node: usize, at: Pose, covariance: &Matrix6<f64>) -> Result<usize, NoCovariance> {
         let information = covariance.cholesky().ok_or(NoCovariance)?.inverse();
         let weight = Weight::Own(Box::new(information));
@@ -122,11 +123,12 @@ impl FactorGraph {
         Ok(self.factors.len() - 1)
     }
 
-    /// What measured the motion from one node to another, `from_from_to`; `doubtful`: it may be wrong altogether. The
-    /// number of the factor.
+    /// Adds a measured motion `from_from_to` between two nodes; returns the index of the factor.
+    ///
+    /// A `doubtful` motion may be an outlier and has a robust loss.
     ///
     /// # Errors
-    /// [`NoCovariance`].
+    /// [`NoCovariance`] if the covariance is not positive definite.
     pub fn between(
         &mut self,
         from: usize,
@@ -146,21 +148,23 @@ impl FactorGraph {
         Ok(self.factors.len() - 1)
     }
 
-    /// Errors that last, where a way begins: a node of them; its number.
+    /// Adds a node of correlated errors at the start of a chain of edges; returns its index.
     ///
     /// # Errors
-    /// [`NoCovariance`].
+    /// [`NoCovariance`] if their covariance is not positive semidefinite.
     pub(super) fn begin_correlated(&mut self, spread: &CorrelatedCovariance) -> Result<usize, NoCovariance> {
         let (units, prior) = drift::prior(spread)?;
         self.correlated.push(Lasts { numbers: Numbers::zeros(), units, prior: Some(prior) });
         Ok(self.correlated.len() - 1)
     }
 
-    /// What measured the motion from one node to another, with errors that last through it, those at its beginning the node
-    /// `before`: the node of those at its end. A motion without such errors is a factor of its own, and they end with it.
+    /// Adds a measured motion with correlated errors; returns the node of the errors at its end.
+    ///
+    /// `before` is the node of the errors at its start. A motion without correlated errors becomes an ordinary factor
+    /// and ends the chain.
     ///
     /// # Errors
-    /// [`NoCovariance`].
+    /// [`NoCovariance`] if a covariance is not positive definite.
     pub(super) fn drifting(
         &mut self,
         from: usize,
@@ -178,10 +182,10 @@ impl FactorGraph {
         Ok(Some(after))
     }
 
-    /// The most likely poses, by Levenberg's and Marquardt's steps on the sparse normal equations. A part of the graph
-    /// that nothing places has its first node held where it is.
+    /// The maximum-likelihood poses, by Levenberg–Marquardt on the sparse normal equations.
     ///
-    /// `None` where the equations have no solution.
+    /// A connected part of the graph without a prior or fixed node has its first node fixed (gauge). `None` if the
+    /// normal equations have no solution.
     pub fn solve(mut self) -> Option<GraphSolution> {
         let parts = self.parts();
         let held = self.gauge(&parts);
@@ -213,8 +217,9 @@ impl FactorGraph {
         Some(GraphSolution { graph: self, parts, places, factor: Some(factor), free })
     }
 
-    /// Steps to the least cost with the switch this wide, until one is shorter than `last`. `None` where the equations have
-    /// no solution.
+    /// Minimises the cost at switch threshold `wide`, until a step is shorter than `last`.
+    ///
+    /// `None` if the normal equations have no solution.
     fn descend(&mut self, places: &[Option<usize>], free: usize, wide: f64, last: f64) -> Option<()> {
         let mut damping = 0.0;
         let mut cost = self.cost(wide);
@@ -250,7 +255,7 @@ impl FactorGraph {
                 if damping < 1e-12 {
                     damping = 0.0;
                 }
-                // What is left is rounding.
+                // The remaining decrease is rounding.
                 let still = cost - next <= 1e-14 * cost && size < 1e-9;
                 cost = next;
                 if still {
@@ -270,7 +275,7 @@ impl FactorGraph {
         Some(())
     }
 
-    /// For each node the first node that it is connected to.
+    /// The connected component of each node, identified by its first node.
     fn parts(&self) -> Vec<usize> {
         let mut parent: Vec<usize> = (0..self.nodes.len()).collect();
         fn root(parent: &mut [usize], mut node: usize) -> usize {
@@ -288,7 +293,7 @@ impl FactorGraph {
         (0..self.nodes.len()).map(|node| root(&mut parent, node)).collect()
     }
 
-    /// Which nodes stand still.
+    /// For each node, whether it is fixed.
     fn gauge(&self, parts: &[usize]) -> Vec<bool> {
         let mut placed = vec![false; self.nodes.len()];
         for factor in self.factors.iter().filter(|factor| factor.from.is_none()) {
@@ -309,7 +314,7 @@ impl FactorGraph {
         }
     }
 
-    /// rᵀ Σ⁻¹ r.
+    /// The squared Mahalanobis norm rᵀ Σ⁻¹ r of a factor's residual.
     fn disagreement(&self, factor: &Factor) -> f64 {
         let r = self.residual(factor);
         match &factor.weight {
@@ -320,7 +325,7 @@ impl FactorGraph {
         }
     }
 
-    /// How many numbers are sought where so many poses move.
+    /// The number of unknowns with `free` movable poses.
     fn unknowns(&self, free: usize) -> usize {
         6 * free + CORRELATED * self.correlated.len()
     }
@@ -335,7 +340,7 @@ impl FactorGraph {
         each.chain(known).sum()
     }
 
-    /// The normal equations for all that move: the lower half of the matrix, and the right side.
+    /// The normal equations of all unknowns: the lower triangle of the matrix and the right-hand side.
     fn equations(
         &self,
         places: &[Option<usize>],
@@ -351,7 +356,7 @@ impl FactorGraph {
         for factor in &self.factors {
             let r = self.residual(factor);
             let slope = right_jacobian_inverse(&r);
-            // Z⁻¹ A⁻¹ B under A Exp(α), B Exp(β): r + J_r(r)⁻¹ (β − Ad(B⁻¹ A) α).
+            // With A Exp(α) and B Exp(β), the residual of Z⁻¹ A⁻¹ B is r + J_r(r)⁻¹ (β − Ad(B⁻¹ A) α).
             let mut sides: [Option<(usize, Matrix6<f64>)>; 2] = [None, None];
             sides[0] = places[factor.to].map(|place| (place, slope));
             if let Some(from) = factor.from {
@@ -423,7 +428,7 @@ impl Factor {
     }
 }
 
-/// Adds a block of 6×6 to the lower half.
+/// Adds a 6×6 block to the lower triangle.
 fn push(entries: &mut Vec<Triplet<usize, usize, f64>>, row: usize, column: usize, block: &Matrix6<f64>) {
     for j in 0..6 {
         let first = if row == column { j } else { 0 };
@@ -433,8 +438,9 @@ fn push(entries: &mut Vec<Triplet<usize, usize, f64>>, row: usize, column: usize
     }
 }
 
-/// Adds the gradient of a factor with these parts, (its first column, how many, the first of its unknowns), and the blocks
-/// of its square between two of them, to the lower half; those on the diagonal are left out.
+/// Adds the gradient and the off-diagonal blocks of a factor to the lower triangle.
+///
+/// Each part is its first column in the factor, its size, and its first unknown in the system.
 fn scatter(
     parts: &[(usize, usize, Option<usize>)],
     square: &SMatrix<f64, SIDES, SIDES>,
@@ -453,7 +459,7 @@ fn scatter(
     }
 }
 
-/// A graph at its most likely poses, and how well they are known.
+/// The optimised graph, with the covariances of its poses.
 #[derive(Debug, Clone)]
 pub struct GraphSolution {
     graph: FactorGraph,
@@ -469,13 +475,14 @@ impl GraphSolution {
         self.graph.pose(node)
     }
 
-    /// How well a node's pose is known, all else estimated too; nothing is as exact as what is held.
+    /// The marginal covariance of a node's pose; zero for a fixed node.
     pub fn covariance(&self, node: usize) -> Covariance6<World, Camera> {
         Covariance6::new(self.joint(&[self.block(node)]).fixed_view::<6, 6>(0, 0).into_owned())
     }
 
-    /// The motion from one node to another as the graph knows it, with what both errors have in common taken into
-    /// account: ξ = β − Ad(B⁻¹ A) α. `None` where nothing connects them.
+    /// The motion between two nodes with its covariance, including the cross-covariance of both poses.
+    ///
+    /// Its error is ξ = β − Ad(B⁻¹ A) α. `None` if the nodes are not connected.
     pub fn relative(&self, from: usize, to: usize) -> Option<RelativeMotion> {
         let placed = |node: usize| self.places[node].is_none() || self.graph.placed(&self.parts, self.parts[node]);
         if self.parts[from] != self.parts[to] && !(placed(from) && placed(to)) {
@@ -491,7 +498,7 @@ impl GraphSolution {
         Some(RelativeMotion::new(motion, Covariance6::new(by * joint * by.transpose())))
     }
 
-    /// What the error of the motion from one node to another shares with errors that last, E\[ξ mᵀ\].
+    /// The cross-covariance E\[ξ mᵀ\] of the motion between two nodes and the correlated errors m.
     pub(super) fn sensitivities(&self, from: usize, to: usize, correlated: usize) -> CorrelatedSensitivities {
         let first = 6 * self.free + CORRELATED * correlated;
         let joint = self.joint(&[self.block(from), self.block(to), (Some(first), CORRELATED)]);
@@ -500,28 +507,28 @@ impl GraphSolution {
         self.graph.correlated[correlated].units.own(&in_units)
     }
 
-    /// The first unknown of a node, where it moves, and how many it has.
+    /// The first unknown of a movable node, and the number of its unknowns.
     fn block(&self, node: usize) -> (Option<usize>, usize) {
         (self.places[node].map(|place| 6 * place), 6)
     }
 
-    /// rᵀ Σ⁻¹ r of a factor, six degrees of freedom.
+    /// The squared Mahalanobis norm rᵀ Σ⁻¹ r of a factor, χ² with six degrees of freedom.
     pub fn disagreement(&self, factor: usize) -> f64 {
         self.graph.disagreement(&self.graph.factors[factor])
     }
 
-    /// Whether a doubtful factor was given up: it keeps less than half of its weight.
+    /// Whether a doubtful factor was rejected: less than half of its weight remains.
     pub fn given_up(&self, factor: usize) -> bool {
         let s = self.graph.factors[factor].switch(self.disagreement(factor), max());
         s * s < 0.5
     }
 
-    /// The joint covariance of some blocks of unknowns, one below the other.
+    /// The joint covariance of several blocks of unknowns.
     fn joint(&self, blocks: &[(Option<usize>, usize)]) -> nalgebra::DMatrix<f64> {
         let size = blocks.iter().map(|(_, count)| count).sum();
         let mut all = nalgebra::DMatrix::zeros(size, size);
         let Some(factor) = &self.factor else { return all };
-        // (row of the answer, unknown).
+        // Pairs of (row of the result, unknown).
         let mut rows = Vec::with_capacity(size);
         let mut row = 0;
         for (first, count) in blocks {
@@ -538,7 +545,7 @@ impl GraphSolution {
     }
 }
 
-/// ξ = β − Ad(B⁻¹ A) α of the motion from A to B.
+/// The derivative of ξ = β − Ad(B⁻¹ A) α by (α, β).
 fn between(motion: &Transform<Camera, Camera>) -> SMatrix<f64, 6, 12> {
     let mut by = SMatrix::<f64, 6, 12>::zeros();
     by.fixed_view_mut::<6, 6>(0, 0).copy_from(&-motion.inverse().adjoint());
@@ -547,7 +554,7 @@ fn between(motion: &Transform<Camera, Camera>) -> SMatrix<f64, 6, 12> {
 }
 
 impl FactorGraph {
-    /// Whether something places this part of the graph in the world.
+    /// Whether a connected component has a prior or a fixed node.
     fn placed(&self, parts: &[usize], part: usize) -> bool {
         let prior = self.factors.iter().any(|factor| factor.from.is_none() && parts[factor.to] == part);
         prior || self.nodes.iter().zip(parts).any(|(node, own)| *own == part && node.held)
@@ -563,7 +570,7 @@ mod tests {
 
     use super::*;
 
-    /// A normal number from the sum of twelve even ones.
+    /// An approximately normal random number: the sum of twelve uniform ones.
     fn normal(rng: &mut ChaCha8Rng) -> f64 {
         (0..12).map(|_| rng.next_u32() as f64 / u32::MAX as f64).sum::<f64>() - 6.0
     }
@@ -584,7 +591,7 @@ mod tests {
         RelativeMotion::new(motion.relabel(), Covariance6::new(covariance(sigma)))
     }
 
-    /// Two rounds of a way of twelve legs that turns by thirty degrees in each.
+    /// Two rounds of twelve edges each; every edge turns by thirty degrees.
     fn rounds() -> Vec<Pose> {
         let odometry_edge = Pose::exp(&[0.02, 0.01, std::f64::consts::TAU / 12.0, 1.0, 0.0, 0.05].into());
         let mut path = vec![Pose::exp(&[0.1, -0.2, 0.3, 5.0, 6.0, 7.0].into())];
@@ -602,7 +609,8 @@ mod tests {
         loops: Vec<usize>,
     }
 
-    /// The rounds measured with noise times `scale`: a fix of the first pose, odometry, and so many loops.
+    /// The simulated graph of both rounds with noise times `scale`: a prior of the first pose, odometry, and `loops`
+    /// loops.
     fn sampled(seed: u64, scale: f64, loops: usize) -> Simulated {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = rounds();
@@ -679,7 +687,7 @@ mod tests {
             let error = local.motion.error_to(&(truth[3].inverse() * truth[21]));
             relative += error.dot(&(local.covariance.matrix.try_inverse().unwrap() * error));
         }
-        // A mean of 400 draws of six degrees of freedom: √(12/400).
+        // The mean of 400 samples of χ²₆ has a standard deviation of √(12/400).
         let bound = 4.0 * (12.0 / draws as f64).sqrt();
         for (k, sum) in sums.iter().enumerate() {
             assert!((sum / draws as f64 - 6.0).abs() < bound, "{k}: {}", sum / draws as f64);
@@ -693,7 +701,7 @@ mod tests {
             let before = sampled(500 + seed, 1.0, 0).graph.solve().unwrap();
             let after = sampled(500 + seed, 1.0, 4).graph.solve().unwrap();
             for k in 0..25 {
-                // In the frame of the first estimate, which the second has moved a little.
+                // Both covariances refer to their own estimate; the two frames differ slightly.
                 let gain = before.covariance(k).matrix - after.covariance(k).matrix;
                 let size = before.covariance(k).matrix.norm();
                 assert!(gain.symmetric_eigenvalues().min() > -1e-2 * size, "{seed} {k}");
@@ -709,7 +717,7 @@ mod tests {
             let Simulated { mut graph, truth, loops } = sampled(2000 + seed, 1.0, 3);
             let right = graph.clone().solve().unwrap();
             let mut rng = ChaCha8Rng::seed_from_u64(9000 + seed);
-            // From anywhere: half a metre to two metres off.
+            // A wrong loop, half a metre to two metres off.
             let mut off = noise(&mut rng, &[0.1, 0.1, 0.3, 1.0, 1.0, 0.3]);
             let length = off.fixed_rows::<3>(3).norm();
             off.fixed_rows_mut::<3>(3).scale_mut(length.clamp(0.5, 2.0) / length);

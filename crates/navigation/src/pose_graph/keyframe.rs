@@ -1,34 +1,34 @@
-//! A stereo pair reduced to what recognition needs.
+//! A stereo pair, reduced to the data of place recognition.
 
 use seafix_geometry::{Camera, MeasuredPoint, Point, UncertainPoint};
 use seafix_vision::{Descriptors, Keypoint};
 
-/// What one pair shows now: measured points, and what their surroundings look like.
+/// The measured points of a stereo pair, with their descriptors.
 #[derive(Debug, Clone)]
 pub struct StereoFeatures {
-    /// When it was taken (ns).
+    /// Time of exposure (ns).
     pub stamp_ns: u64,
-    /// Its points, each seen by both cameras.
+    /// The points, each seen by both cameras.
     pub cloud: Vec<MeasuredPoint>,
-    /// Where the left image shows them, in the same order.
+    /// The key points of the left image, in the order of the points.
     pub keypoints: Vec<Keypoint>,
-    /// What is around them there, in the same order.
+    /// The descriptors of the key points, in the same order.
     pub descriptors: Descriptors,
 }
 
-/// What is kept of a pair: points in the frame of its left camera, and what their surroundings look like.
+/// A key frame: points in the frame of its left camera, with their descriptors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyFrame {
-    /// Its points with their covariance.
+    /// The points with their covariance.
     pub points: Vec<UncertainPoint<Camera>>,
-    /// Where the left image showed them, in the same order.
+    /// The key points of the left image, in the order of the points.
     pub keypoints: Vec<Keypoint>,
-    /// What was around them there, in the same order.
+    /// The descriptors of the key points, in the same order.
     pub descriptors: Descriptors,
 }
 
 impl StereoFeatures {
-    /// What is worth keeping of it.
+    /// The key frame of this stereo pair.
     pub fn reduced(&self) -> KeyFrame {
         KeyFrame {
             points: self.cloud.iter().map(|point| point.position).collect(),
@@ -37,14 +37,14 @@ impl StereoFeatures {
         }
     }
 
-    /// Where its points are.
+    /// The positions of its points.
     pub fn places(&self) -> Vec<Point<Camera>> {
         self.cloud.iter().map(|point| point.position.at).collect()
     }
 }
 
 impl KeyFrame {
-    /// Where its points are.
+    /// The positions of its points.
     pub fn places(&self) -> Vec<Point<Camera>> {
         self.points.iter().map(|point| point.at).collect()
     }

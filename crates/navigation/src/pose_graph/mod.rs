@@ -1,4 +1,4 @@
-//! Reference points where no object is: key frames laid on the way, found again, and joined in a graph.
+//! The pose graph: key frames, odometry, fixes and loops, for navigation between objects.
 
 mod drift;
 mod file;
@@ -23,73 +23,73 @@ pub use keyframe::{KeyFrame, StereoFeatures};
 pub use recognition::{LoopCandidate, NotRecognized, PlaceRecognizer, Recognition, Recognized};
 pub use traverse::{Closure, PoseEstimate, PoseGraphSettings, Relocalization, Traverse};
 
-/// A place on the way that is a node of the graph.
+/// A pose node: the camera's pose at one instant of a dive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseNode {
-    /// When the camera was there (ns).
+    /// Time (ns).
     pub stamp_ns: u64,
-    /// Where that is, as known by now.
+    /// The pose, as estimated so far.
     pub world_from_camera: Transform<World, Camera>,
-    /// How well its position is known: one standard deviation over the three axes together (m).
+    /// Standard deviation of the position over the three axes together (m).
     pub sigma: f64,
-    /// What it looks like there, where that was kept.
+    /// The key frame at this node, if one was added.
     pub keyframe: Option<KeyFrame>,
 }
 
-/// The motion between two stations.
+/// The motion between two pose nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometryEdge {
-    /// The station where it begins.
+    /// Index of the first node.
     pub from: usize,
-    /// The station where it ends.
+    /// Index of the second node.
     pub to: usize,
-    /// `from_from_to`. Legs that follow each other share errors that [last](crate::CorrelatedError): the Doppler log's scale, the
-    /// gyro's bias.
+    /// The motion `from_from_to`.
+    ///
+    /// Consecutive edges share [correlated errors](crate::CorrelatedError): the scale of the Doppler log, the bias of
+    /// the gyro.
     pub motion: RelativeMotion,
 }
 
-/// A fix of an object, taken at a station.
+/// A fix of an object at a pose node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FixEdge {
-    /// The station.
+    /// Index of the node.
     pub pose_node: usize,
-    /// Where the camera was relative to the object.
+    /// The camera's pose relative to the object.
     pub navigated: Navigated,
 }
 
-/// A pose of a station from elsewhere: acoustics.
+/// A pose of a node from another sensor: acoustics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PriorPose {
-    /// The station.
+    /// Index of the node.
     pub pose_node: usize,
-    /// Its pose.
+    /// The pose.
     pub world_from_camera: Transform<World, Camera>,
-    /// The covariance of that.
+    /// Its covariance.
     pub covariance: Covariance6<World, Camera>,
 }
 
-/// Stations, what lies between them, and the objects of the site they hang on: all that is needed to say where every
-/// key frame is, and how well that is known.
+/// A pose graph: pose nodes, the measurements between them, and the objects of the site.
 ///
-/// It may be laid by one run and go on in another: what two runs have in common, objects and key frames that were found
-/// again, joins them in one graph.
+/// A later run may extend the graph of an earlier one: objects and key frames that both have seen connect them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PoseGraph {
-    /// Names and places of the objects.
+    /// Names and placements of the objects.
     pub objects: Vec<(String, ObjectPlacement)>,
-    /// The stations, in order of being laid.
+    /// The pose nodes, in the order of their addition.
     pub pose_nodes: Vec<PoseNode>,
-    /// What odometry measured between successive ones.
+    /// The motions that odometry measured between successive nodes.
     pub odometry_edges: Vec<OdometryEdge>,
-    /// Fixes of objects.
+    /// The fixes of objects.
     pub fixes: Vec<FixEdge>,
-    /// Poses from elsewhere.
+    /// The prior poses of other sensors.
     pub prior_poses: Vec<PriorPose>,
-    /// Key frames found again: `from` is the key frame.
+    /// Loop closures: the motion from a key frame's node (`from`) to the node that recognised it.
     pub loops: Vec<OdometryEdge>,
 }
 
-/// The graph of a network at its most likely poses.
+/// An optimised pose graph.
 #[derive(Debug, Clone)]
 pub struct Closed {
     solved: GraphSolution,
@@ -97,29 +97,28 @@ pub struct Closed {
     /// The factor of each loop.
     loops: Vec<usize>,
     fixes: Vec<usize>,
-    /// Of a station, the node of errors that last.
+    /// For each pose node, the node of its correlated errors.
     correlated: BTreeMap<usize, usize>,
 }
 
 impl PoseGraph {
-    /// A network without stations, at a site with these objects.
+    /// A pose graph without pose nodes, at a site with these objects.
     pub fn new(objects: Vec<(String, ObjectPlacement)>) -> Self {
         Self { objects, ..Self::default() }
     }
 
-    /// Lays a station; its number.
+    /// Adds a pose node; returns its index.
     pub fn add_node(&mut self, pose_node: PoseNode) -> usize {
         self.pose_nodes.push(pose_node);
         self.pose_nodes.len() - 1
     }
 
-    /// The most likely poses of all stations and objects, every measurement taken into account. Fixes and loops may be
-    /// wrong: those that contradict the rest are given up.
+    /// The maximum-likelihood poses of all nodes and objects; inconsistent fixes and loops are rejected.
     ///
-    /// An object without a survey covariance stands exactly. Errors of the odometry that last are estimated along with the
-    /// poses, from leg to leg as long as one begins where the other ends; a new chain knows nothing of them.
+    /// An object without a survey covariance is fixed. Correlated errors of the odometry are estimated along with the
+    /// poses, over a chain of consecutive edges; each chain has errors of its own.
     ///
-    /// `None` where the equations have no solution.
+    /// `None` if the equations have no solution.
     pub fn solve(&self) -> Option<Closed> {
         let mut graph = FactorGraph::default();
         for (_, place) in &self.objects {
@@ -165,8 +164,9 @@ impl PoseGraph {
         Some(Closed { solved: graph.solve()?, objects: first, loops, fixes, correlated })
     }
 
-    /// Closes its loops: every station moves to its most likely pose. What was found; `None` where the equations have no
-    /// solution, and nothing moves.
+    /// Optimises the graph and moves every pose node to its estimate.
+    ///
+    /// `None` if the equations have no solution; the graph is then unchanged.
     pub fn close(&mut self) -> Option<Closed> {
         let closed = self.solve()?;
         for (index, pose_node) in self.pose_nodes.iter_mut().enumerate() {
@@ -176,7 +176,7 @@ impl PoseGraph {
         Some(closed)
     }
 
-    /// The stations that are key frames.
+    /// The nodes with a key frame: index, node, key frame.
     pub fn keyframes(&self) -> impl Iterator<Item = (usize, &PoseNode, &KeyFrame)> {
         self.pose_nodes
             .iter()
@@ -186,22 +186,22 @@ impl PoseGraph {
 }
 
 impl Closed {
-    /// Where a station is.
+    /// The pose of a node.
     pub fn pose_node(&self, pose_node: usize) -> &Transform<World, Camera> {
         self.solved.pose(self.objects + pose_node)
     }
 
-    /// How well that is known.
+    /// Its covariance.
     pub fn covariance(&self, pose_node: usize) -> Covariance6<World, Camera> {
         self.solved.covariance(self.objects + pose_node)
     }
 
-    /// The motion from one station to another, with what both errors have in common taken into account.
+    /// The motion between two nodes, including the cross-covariance of both poses.
     pub fn relative(&self, from: usize, to: usize) -> Option<RelativeMotion> {
         self.solved.relative(self.objects + from, self.objects + to)
     }
 
-    /// A station relative to an object. `None` where nothing connects them.
+    /// The pose of a node relative to an object; `None` if nothing connects them.
     pub fn navigated(&self, object: usize, pose_node: usize) -> Option<Navigated> {
         let to = self.objects + pose_node;
         let RelativeMotion { motion, covariance, .. } = self.solved.relative(object, to)?;
@@ -217,12 +217,12 @@ impl Closed {
         })
     }
 
-    /// The loops that were given up: they contradict the rest.
+    /// The indices of the rejected loops.
     pub fn wrong_loops(&self) -> Vec<usize> {
         self.given_up(&self.loops)
     }
 
-    /// The fixes that were given up.
+    /// The indices of the rejected fixes.
     pub fn wrong_fixes(&self) -> Vec<usize> {
         self.given_up(&self.fixes)
     }
@@ -233,7 +233,7 @@ impl Closed {
     }
 }
 
-/// The covariance of the pose `world_from_camera` of a camera that is known relative to an object.
+/// The pose `world_from_camera` and its covariance, of a camera with a known pose relative to an object.
 pub(crate) fn in_world(navigated: &Navigated, places: &[ObjectPlacement]) -> (Transform<World, Camera>, Matrix6<f64>) {
     let place = &places[navigated.object];
     let here = navigated.object_pose.object_from_camera;

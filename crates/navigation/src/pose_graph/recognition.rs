@@ -1,4 +1,4 @@
-//! A key frame found again by what it shows.
+//! Place recognition: a key frame is found again by its descriptors.
 
 use nalgebra::{Matrix3, Vector3};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -20,57 +20,57 @@ use crate::{
     },
 };
 
-/// How key frames are recognised.
+/// The settings of place recognition.
 ///
-/// Points of the pair in hand are paired with those of a key frame by their descriptors; the motion that most pairs agree
-/// on is sought by sample consensus and is refined by maximum likelihood: four pixel residuals a point, weighed by the
-/// noise of the pair and by the full covariance of the key frame's point, whose depth errs far more than its direction. (A
-/// registered [`Solver`](seafix_referencing::Solver) takes a model's point as equally exact in all directions; it serves
-/// inside the consensus.) What is found must agree with the prior, and not by chance: the expected number of motions that
-/// as many of the pairs would agree on if they were paired at random stays below a budget.
+/// Points of the current pair are matched with those of a key frame by their descriptors. RANSAC finds the motion with
+/// most inliers. Maximum likelihood refines it: four pixel residuals for each point, weighted by the noise of the pair
+/// and by the full covariance of the key frame's point, whose depth is far less accurate than its direction. (A
+/// registered [`Solver`](seafix_referencing::Solver) assumes isotropic model errors; it serves inside RANSAC only.) The
+/// result must agree with the prior, and its number of false alarms (a contrario), the expected number of motions on
+/// which as many random matches agree, must stay below a limit.
 ///
-/// Source: Fischler and Bolles, *Random sample consensus*, 1981; the number by chance: Moisan and Stival, *A probabilistic
-/// criterion to detect rigid point matches*, IJCV 2004.
+/// Source: Fischler and Bolles, *Random sample consensus*, 1981; Moisan and Stival, *A probabilistic criterion to
+/// detect rigid point matches*, IJCV 2004.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Recognition {
-    /// Prepare each image, one after the other.
+    /// Image filters, in the order of their application.
     pub filters: Vec<Choice>,
-    /// Finds key points in each image.
+    /// The detector of key points.
     pub detector: Choice,
-    /// Says where exactly they are.
+    /// The locator of key points.
     pub locator: Choice,
-    /// Describes their surroundings; the vehicle may come back on another heading: not upright.
+    /// The descriptor; not upright, because the vehicle may return on another heading.
     pub descriptor: Choice,
-    /// Pairs left with right.
+    /// The matcher between left and right image.
     pub matcher: Choice,
-    /// Aligns each pair between the cameras.
+    /// The refinement of each match between the cameras.
     pub refinement: Choice,
-    /// Turns pairs into points.
+    /// The triangulator.
     pub triangulator: Choice,
-    /// Pairs points with those of a key frame, by their descriptors.
+    /// The matcher between the current pair and a key frame, by descriptors alone.
     pub between: Choice,
-    /// The motion of three points, for the consensus.
+    /// The minimal solver of RANSAC, for three points.
     pub minimal: Choice,
-    /// The motion of all that agree.
+    /// The solver for all inliers of RANSAC.
     pub solver: Choice,
-    /// Points of a pair at most, the strongest.
+    /// Maximum number of points of a pair; the strongest are used.
     pub points: usize,
-    /// How far from its expected place, in the mean of both images, a point may be seen and still agree (px).
+    /// Inlier threshold of RANSAC: RMS distance over both images from the predicted position (px).
     pub consensus_px: f64,
-    /// Draws at most.
+    /// Maximum number of RANSAC samples.
     pub draws: usize,
-    /// Fewer points that agree are no recognition.
+    /// Minimum number of inliers of a recognition, at least 6.
     pub min_points: usize,
-    /// The expected number of recognitions by chance, over all key frames that are tried for a pair.
+    /// Maximum number of false alarms, over all key frames that are tried for a pair.
     pub budget: f64,
-    /// The share of right recognitions that agree with the prior.
+    /// The fraction of correct recognitions that passes the gate of the prior, between 0 and 1.
     pub confidence: f64,
-    /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
+    /// Maximum standard deviation of the position over the three axes together (m); a less certain motion is rejected.
     pub max_sigma: f64,
-    /// Key frames that are tried for a pair at most.
+    /// Maximum number of key frames that are tried for a pair.
     pub candidates: usize,
-    /// What is drawn at random follows from this.
+    /// Seed of the random samples.
     pub seed: u64,
 }
 
@@ -102,14 +102,14 @@ impl Default for Recognition {
 }
 
 impl Recognition {
-    /// What cannot be built or worked with, as a sentence.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// The sentence.
+    /// A sentence that names the invalid setting.
     pub fn check(&self) -> Result<(), String> {
         let stages = self.stages()?;
         if !stages.between.compares_descriptors() {
-            return Err("between: of a key frame only descriptors are kept; choose `mutual-ratio`".to_owned());
+            return Err("between: a key frame keeps descriptors and no images; choose `mutual-ratio`".to_owned());
         }
         let positive = |name, x: f64, what| in_range(x > 0.0 && x.is_finite(), name, x, what);
         positive("consensus-px", self.consensus_px, "a positive number of pixels")?;
@@ -123,7 +123,7 @@ impl Recognition {
         in_range(self.candidates > 0, "candidates", self.candidates, "at least 1")
     }
 
-    /// The odometry's stages with these components.
+    /// The stages of stereo odometry with these components.
     fn stages(&self) -> Result<StereoStages, String> {
         let Self { filters, detector, locator, descriptor, .. } = self.clone();
         let Self { matcher, refinement, triangulator, between, minimal, solver, .. } = self.clone();
@@ -145,72 +145,72 @@ impl Recognition {
     }
 }
 
-/// A key frame that was found again.
+/// A recognised key frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recognized {
-    /// Which: its place among those that were offered.
+    /// Its index among the candidates.
     pub keyframe: usize,
-    /// Where the camera is relative to it, `keyframe_from_camera`.
+    /// The motion `keyframe_from_camera`.
     pub motion: RelativeMotion,
-    /// Points that look alike.
+    /// Number of descriptor matches.
     pub matches: usize,
-    /// Those that agree with the motion.
+    /// Number of matches that agree with the motion.
     pub found: usize,
-    /// log₁₀ of the expected number of recognitions as good by chance.
+    /// log₁₀ of the number of false alarms.
     pub nfa: f64,
 }
 
-/// Why no key frame was found again.
+/// The reason why no key frame was recognised.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NotRecognized {
-    /// There is none where the camera may be.
-    #[error("no key frame was laid where the camera may be")]
+    /// No key frame that may be in view.
+    #[error("no key frame may be in view")]
     Nowhere,
-    /// Too few points look alike.
-    #[error("{found} points look like points of the key frame; {needed} are needed")]
+    /// Too few matches.
+    #[error("{found} points match the key frame; at least {needed} are needed")]
     FewMatches {
-        /// How many do.
+        /// Number of matches.
         found: usize,
-        /// How many are needed.
+        /// Minimum number of matches.
         needed: usize,
     },
-    /// No motion explains enough of them.
-    #[error("no motion explains more than {found} of {matches} points that look alike; {needed} are needed")]
+    /// No motion that explains enough matches.
+    #[error("no motion explains more than {found} of {matches} matches; at least {needed} are needed")]
     NoConsensus {
-        /// How many the best motion explains.
+        /// Number of matches that the best motion explains.
         found: usize,
-        /// Of how many.
+        /// Number of matches.
         matches: usize,
-        /// How many are needed.
+        /// Minimum number of explained matches.
         needed: usize,
     },
-    /// As many would agree by chance.
+    /// An agreement that random matches would reach as well.
     #[error(
-        "{found} of {matches} points agree; by chance 10^{expected:.1} motions are as good, at most {budget:e} may be"
+        "{found} of {matches} matches agree: the number of false alarms is 10^{expected:.1}; the limit is {budget:e}"
     )]
     AContrario {
-        /// How many agree.
+        /// Number of matches that agree.
         found: usize,
-        /// Of how many.
+        /// Number of matches.
         matches: usize,
-        /// log₁₀ of how many motions are as good by chance.
+        /// log₁₀ of the number of false alarms.
         expected: f64,
-        /// How many may be.
+        /// Maximum number of false alarms.
         budget: f64,
     },
-    /// The motion is not determined well enough.
-    #[error("the motion from the key frame is known to {0:.3} m only")]
+    /// A motion with a position uncertainty above the limit (m).
+    #[error("the motion from the key frame is too uncertain: its position has a standard deviation of {0:.3} m")]
     Weak(f64),
-    /// The motion contradicts the prior.
-    #[error("what was found contradicts what was known: {0}")]
+    /// A motion that contradicts the prior.
+    #[error("the recognised pose contradicts the prior: {0}")]
     Contradicts(Contradiction),
-    /// Two key frames say different things.
-    #[error("key frames {0} and {1} are both recognised, and contradict each other")]
+    /// Two recognised key frames that contradict each other.
+    #[error("key frames {0} and {1} are both recognised and contradict each other")]
     Ambiguous(usize, usize),
 }
 
 impl NotRecognized {
-    /// How near it came to an answer.
+    /// The stage of recognition at which this reason applies; later stages are nearer to success.
     fn progress(&self) -> usize {
         match self {
             Self::Nowhere => 0,
@@ -227,13 +227,13 @@ impl NotRecognized {
 /// A key frame that may be in view.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopCandidate<'a> {
-    /// What is kept of it.
+    /// The key frame.
     pub keyframe: &'a KeyFrame,
-    /// Where the camera should be relative to it, `keyframe_from_camera`.
+    /// The predicted motion `keyframe_from_camera`.
     pub prior: RelativeMotion,
 }
 
-/// Recognises key frames of one rig.
+/// A place recognizer for the key frames of one rig.
 #[derive(Debug)]
 pub struct PlaceRecognizer<'a> {
     settings: &'a Recognition,
@@ -241,15 +241,15 @@ pub struct PlaceRecognizer<'a> {
     rig: &'a StereoRig,
     output: FrontEndOutput,
     work: Workspace,
-    /// Stands for images that are not kept.
+    /// A placeholder for the images of key frames, which are not kept.
     blank: Image,
 }
 
 impl<'a> PlaceRecognizer<'a> {
-    /// Ready to work; the result does not depend on who works.
+    /// A recognizer with these settings; the result does not depend on the number of threads.
     ///
     /// # Panics
-    /// When the settings were not checked.
+    /// If the settings were not checked.
     pub fn new(settings: &'a Recognition, rig: &'a StereoRig, threads: Threads) -> Self {
         Self {
             settings,
@@ -261,18 +261,19 @@ impl<'a> PlaceRecognizer<'a> {
         }
     }
 
-    /// What a pair shows.
+    /// The measured points of a pair with their descriptors.
     pub fn stereo_features(&mut self, pair: &StereoPair<'_>) -> StereoFeatures {
         let seen = Seen::new(pair, &self.stages, self.rig, &mut self.output, &mut self.work);
         let (cloud, keypoints, descriptors) = seen.strongest(self.settings.points);
         StereoFeatures { stamp_ns: pair.stamp_ns, cloud, keypoints, descriptors }
     }
 
-    /// Which of the candidates the pair shows, and from where. `between` says how two of them lie to each other, as far as
-    /// that is known: `first_from_second`.
+    /// The candidate that the pair shows, and the motion from it.
+    ///
+    /// `between` gives the known motion `first_from_second` between two candidates, if there is one.
     ///
     /// # Errors
-    /// [`NotRecognized`], of the candidate that came nearest to an answer.
+    /// The [`NotRecognized`] of the candidate that came nearest to recognition.
     pub fn recognize(
         &mut self,
         stereo_features: &StereoFeatures,
@@ -293,7 +294,7 @@ impl<'a> PlaceRecognizer<'a> {
         let Some(best) = found.first() else { return Err(reason) };
         for other in &found[1..] {
             let Some(known) = between(best.keyframe, other.keyframe) else { continue };
-            // Over the other key frame the camera is where the best one says.
+            // The camera's pose relative to the best key frame, by way of the other one.
             let over = as_object_pose(&known).after(&other.motion);
             if gate(&over, &as_object_pose(&best.motion), self.settings.confidence).is_err() {
                 return Err(NotRecognized::Ambiguous(best.keyframe, other.keyframe));
@@ -340,8 +341,8 @@ impl<'a> PlaceRecognizer<'a> {
         if !(nfa <= libm::log10(settings.budget)) {
             return Err(NotRecognized::AContrario { found, matches, expected: nfa, budget: settings.budget });
         }
-        // All pairs, not those of the consensus alone: it counts pixels, and where the views lie apart what the depths err by
-        // is pixels too. A choice by residuals would make the pose seem better known than it is.
+        // All matches are used, not only the inliers of RANSAC. RANSAC counts pixels, and with a change of viewpoint
+        // depth errors cause pixel errors too. A selection by residuals would make the covariance too small.
         let mut seen: Vec<Found> = pairs
             .iter()
             .filter_map(|&(kept, seen)| {
@@ -374,8 +375,11 @@ impl<'a> PlaceRecognizer<'a> {
         Ok(Recognized { keyframe: index, motion, matches, found: seen.len(), nfa })
     }
 
-    /// log₁₀ of the expected number of motions that `found` of `matches` random pairs agree on: each set of `size`
-    /// pairs gives one, and another pair agrees when it falls on the disc of twice the squared distance that is allowed.
+    /// log₁₀ of the number of false alarms: the expected number of motions on which `found` of `matches` random pairs
+    /// agree.
+    ///
+    /// Each set of `size` pairs gives one motion. Another pair agrees if it falls on a disc with twice the allowed
+    /// squared radius.
     fn nfa(&self, matches: usize, found: usize, size: usize, tried: usize) -> f64 {
         let [width, height] = self.rig.left().size();
         let disc = std::f64::consts::PI * 2.0 * self.settings.consensus_px * self.settings.consensus_px;
@@ -392,12 +396,12 @@ impl<'a> PlaceRecognizer<'a> {
     }
 }
 
-/// A motion from a key frame, as a pose relative to an object: the key frame takes its place.
+/// The motion from a key frame, with the key frame in the role of the object.
 fn as_object_pose(local: &RelativeMotion) -> ObjectPose {
     ObjectPose::new(local.motion.relabel::<Object, Camera>(), Covariance6::new(local.covariance.matrix))
 }
 
-/// A point as direction and inverse depth (x/z, y/z, 1/z), with the covariance of that.
+/// The inverse-depth coordinates (x/z, y/z, 1/z) of a point, with their covariance.
 fn inverse_depth(point: &UncertainPoint<Camera>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let p = point.at.coords;
     if !(p.z > 0.0) {

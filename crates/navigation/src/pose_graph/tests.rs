@@ -1,4 +1,4 @@
-//! Key frames of a ground made of points: recognised where they are, refused where they are not, and closed.
+//! Place recognition and loop closing over a simulated ground of points.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use rand_chacha::{
@@ -17,16 +17,16 @@ use super::{
 };
 use crate::{Navigated, ObjectPlacement, ObjectPose, RelativeMotion};
 
-/// Numbers of a descriptor.
+/// Length of a descriptor.
 const LENGTH: usize = 32;
-/// Standard deviation of a pixel's coordinate (px).
+/// Standard deviation of a pixel coordinate (px).
 const PX: f64 = 0.3;
 
 fn even(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low + (high - low) * f64::from(rng.next_u32()) / f64::from(u32::MAX)
 }
 
-/// A normal number from the sum of twelve even ones.
+/// An approximately normal random number: the sum of twelve uniform ones.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| even(rng, 0.0, 1.0)).sum::<f64>() - 6.0
 }
@@ -40,7 +40,7 @@ fn rig() -> StereoRig {
     StereoRig::new(camera, camera, Transform::new(so3::exp(&Vector3::zeros()), Vector3::new(-0.25, 0.0, 0.0))).unwrap()
 }
 
-/// A piece of ground, each of its points with its looks.
+/// A simulated ground: points with descriptors.
 struct Ground {
     points: Vec<(Point<World>, Vec<f32>)>,
 }
@@ -54,7 +54,7 @@ impl Ground {
         Self { points: points.collect() }
     }
 
-    /// What the rig sees of it from there.
+    /// The view of the rig from a pose.
     fn seen(
         &self,
         rng: &mut ChaCha8Rng,
@@ -89,12 +89,12 @@ fn appearance(rng: &mut ChaCha8Rng) -> Vec<f32> {
     numbers.iter().map(|x| (x / norm) as f32).collect()
 }
 
-/// From above the origin, looking down.
+/// A pose 3.5 m above the ground, looking down.
 fn above(x: f64, y: f64, heading: f64) -> Transform<World, Camera> {
     Transform::new(so3::exp(&Vector3::new(0.0, 0.0, heading)), Vector3::new(x, y, -3.5))
 }
 
-/// A prior that errs as it says.
+/// A prior with an error that follows its covariance.
 fn prior(rng: &mut ChaCha8Rng, truth: &Transform<Camera, Camera>) -> RelativeMotion {
     let covariance = Covariance6::isotropic(0.05, 0.3);
     RelativeMotion::new(truth.perturbed(&normal6(rng, 0.05, 0.3)), covariance)
@@ -130,7 +130,7 @@ fn a_key_frame_is_found_again_from_another_side_and_has_an_error_as_it_states() 
     assert!((mean - 6.0).abs() < 4.0 * (12.0 / found as f64).sqrt(), "{mean}");
 }
 
-/// So many pieces of other ground are refused.
+/// Checks that `draws` other grounds are rejected.
 fn refused(draws: u64) {
     let (rig, settings) = (rig(), Recognition::default());
     let mut recognizer = PlaceRecognizer::new(&settings, &rig, Threads::One);
@@ -138,7 +138,7 @@ fn refused(draws: u64) {
         let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
         let ground = Ground::new(&mut rng, 150, [4.0, 3.0]);
         let mut other = Ground::new(&mut rng, 150, [4.0, 3.0]);
-        // Every other ground looks like this one, point for point, but the points lie otherwise.
+        // Every second ground has the same descriptors, point for point, at other positions.
         if seed % 2 == 0 {
             other
                 .points
@@ -174,7 +174,7 @@ fn the_same_appearance_elsewhere_contradict_what_is_known() {
     let reported = recognizer.recognize(&stereo_features, &[at(far)], NOTHING);
     assert!(matches!(reported, Err(NotRecognized::Contradicts(_))), "{reported:?}");
     assert_eq!(recognizer.recognize(&stereo_features, &[], NOTHING), Err(NotRecognized::Nowhere));
-    // Twice the same ground, a metre apart as far as is known: the camera cannot be over both.
+    // Two identical grounds, known to be a metre apart: the camera cannot be above both.
     let apart = |a: usize, b: usize| {
         let x = a as f64 - b as f64;
         Some(RelativeMotion::new(
@@ -187,8 +187,10 @@ fn the_same_appearance_elsewhere_contradict_what_is_known() {
     assert!(recognizer.recognize(&stereo_features, &[at(near), at(near)], NOTHING).is_ok());
 }
 
-/// Forty half metres out and back again, one fix at the beginning: the last pose, its error and covariance as the network
-/// and as odometry alone have them, and how many key frames were laid and found again.
+/// The result of a simulated dive of forty half-metre steps out and back.
+///
+/// There is one fix, at the start. The result holds the error and covariance of the last pose, by the pose graph and by
+/// odometry alone, and the numbers of added and recognised key frames.
 struct Dived {
     pose_graph: (Vector6<f64>, Matrix6<f64>),
     odometry: (Vector6<f64>, Matrix6<f64>),
@@ -199,7 +201,7 @@ struct Dived {
 
 const STEP: (f64, f64) = (1e-3, 5e-3);
 const FIX: (f64, f64) = (1e-3, 5e-3);
-/// Points of the ground: few are quick.
+/// Number of ground points of the short tests.
 const FEW: usize = 1000;
 
 fn dive(seed: u64, points: usize, rig: &StereoRig, settings: &PoseGraphSettings, earlier: Option<&PoseGraph>) -> Dived {
@@ -261,16 +263,16 @@ fn nees((error, covariance): &(Vector6<f64>, Matrix6<f64>)) -> f64 {
     error.dot(&(covariance.try_inverse().unwrap() * error))
 }
 
-/// So many ways back over key frames end where they began, and err as they say.
+/// Checks that `draws` return paths over key frames end at the start, with a consistent covariance.
 ///
-/// Seen to fail when the motion from a key frame is 5 cm off.
+/// The test fails if the motion from a key frame has an error of 5 cm.
 fn returns(draws: u64, points: usize) {
     let (rig, settings) = (rig(), PoseGraphSettings { min_loop_distance: 5.0, ..PoseGraphSettings::default() });
     let (mut sum, mut squares, mut alone) = (0.0, 0.0, 0.0);
     for seed in 0..draws {
         let dived = dive(seed, points, &rig, &settings, None);
-        assert!((4..=12).contains(&dived.added), "{seed}: {} laid", dived.added);
-        assert!(dived.relocalized >= 5, "{seed}: {} found again", dived.relocalized);
+        assert!((4..=12).contains(&dived.added), "{seed}: {} added", dived.added);
+        assert!(dived.relocalized >= 5, "{seed}: {} recognised", dived.relocalized);
         sum += nees(&dived.pose_graph);
         squares += dived.pose_graph.0.fixed_rows::<3>(3).norm_squared();
         alone += dived.odometry.0.fixed_rows::<3>(3).norm_squared();
@@ -288,7 +290,7 @@ fn a_path_back_over_key_frames_ends_where_it_began() {
 }
 
 #[test]
-#[ignore = "long: 300 pieces of other ground, 24 dives"]
+#[ignore = "long: 300 other grounds, 24 dives"]
 fn key_frames_and_returns_in_many_draws() {
     refused(300);
     returns(24, 2500);
@@ -298,11 +300,11 @@ fn key_frames_and_returns_in_many_draws() {
 fn a_later_run_goes_on_in_the_pose_graph_of_an_earlier_one() {
     let (rig, settings) = (rig(), PoseGraphSettings { min_loop_distance: 1000.0, ..PoseGraphSettings::default() });
     let first = dive(100, FEW, &rig, &settings, None);
-    assert_eq!(first.relocalized, 0, "all of its own key frames are too young");
+    assert_eq!(first.relocalized, 0, "its own key frames are below the minimum loop distance");
     let text = first.kept.text(&settings.recognition);
     let read = PoseGraph::read(std::path::Path::new("n"), &text, &settings.recognition).unwrap();
     let second = dive(101, FEW, &rig, &settings, Some(&read));
-    assert!(second.relocalized >= 10, "{} found again", second.relocalized);
+    assert!(second.relocalized >= 10, "{} recognised", second.relocalized);
     let sigma = |one: &(Vector6<f64>, Matrix6<f64>)| one.1.fixed_view::<3, 3>(3, 3).trace();
     assert!(sigma(&second.pose_graph) < 0.25 * sigma(&second.odometry));
     assert!(nees(&second.pose_graph) < 25.0, "{}", nees(&second.pose_graph));

@@ -1,4 +1,4 @@
-//! A run along a network: key frames are laid on the way, and found again.
+//! Navigation along a pose graph: key frames are added and recognised during a dive.
 
 use std::collections::BTreeMap;
 
@@ -14,24 +14,33 @@ use super::{
 };
 use crate::{Navigated, ObjectPlacement, RelativeMotion, StereoPair};
 
-/// When key frames are laid and sought.
+/// The settings that control adding and matching of key frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PoseGraphSettings {
-    /// A key frame is laid where those there are cover less than this share of what is in view,
+    /// Coverage threshold, above 0 and at most 1.
+    ///
+    /// A key frame is added where no existing one covers this fraction of the view.
     pub overlap: f64,
-    /// or where the pose is known so many times better than at each of those that cover it.
+    /// Ratio of position standard deviations, above 1.
+    ///
+    /// A key frame is also added where every covering one is less accurate than the current pose by this factor.
     pub covariance_ratio: f64,
-    /// Key frames are sought no sooner than this after the last time (s), and only where no object was fixed,
+    /// Minimum time (s) between two searches for key frames; no search takes place in a frame with a fix.
     pub loop_interval: f64,
-    /// and none that was laid less than so much of this run's way ago (m): odometry knows that better.
+    /// Minimum path length (m) between adding a key frame and matching it again; over shorter paths odometry is more
+    /// accurate.
     pub min_loop_distance: f64,
-    /// A key frame is tried that may cover this share of what is in view.
+    /// Minimum coverage of the view by a candidate key frame, above 0 and at most 1.
+    ///
+    /// The coverage is the largest one within the position uncertainty.
     pub min_overlap: f64,
-    /// Fixes of an object with less time between them are of one visit (s), and only the best of a visit counts: the others
-    /// share its errors, of the model, of the light, of the view. The same holds for key frames found again.
+    /// Minimum time (s) between two visits of an object or key frame.
+    ///
+    /// Only the most accurate fix or loop of a visit enters the graph; the others share its errors (model,
+    /// illumination, viewpoint).
     pub visit_gap: f64,
-    /// How they are recognised.
+    /// The settings of place recognition.
     pub recognition: Recognition,
 }
 
@@ -50,58 +59,59 @@ impl Default for PoseGraphSettings {
 }
 
 impl PoseGraphSettings {
-    /// What cannot be worked with, as a sentence.
+    /// Checks the settings.
     ///
     /// # Errors
-    /// The sentence.
+    /// A sentence that names the invalid setting.
     pub fn check(&self) -> Result<(), String> {
-        let fraction = |name, x: f64| in_range(x > 0.0 && x <= 1.0, name, x, "a share above 0, up to 1");
+        let fraction = |name, x: f64| in_range(x > 0.0 && x <= 1.0, name, x, "a fraction above 0, at most 1");
         fraction("overlap", self.overlap)?;
         fraction("min-overlap", self.min_overlap)?;
         in_range(self.covariance_ratio > 1.0, "covariance-ratio", self.covariance_ratio, "a number above 1")?;
         let not_negative = |name, x: f64, what| in_range(x >= 0.0 && x.is_finite(), name, x, what);
-        not_negative("loop-interval", self.loop_interval, "a time of 0 or more (s)")?;
-        not_negative("min-loop-distance", self.min_loop_distance, "a length of 0 or more (m)")?;
-        not_negative("visit-gap", self.visit_gap, "a time of 0 or more (s)")?;
+        not_negative("loop-interval", self.loop_interval, "a time of at least 0 (s)")?;
+        not_negative("min-loop-distance", self.min_loop_distance, "a length of at least 0 (m)")?;
+        not_negative("visit-gap", self.visit_gap, "a time of at least 0 (s)")?;
         self.recognition.check().map_err(|said| format!("recognition.{said}"))
     }
 }
 
-/// What is known of the camera at an instant.
+/// The camera's pose at one instant, as known to navigation.
 #[derive(Debug, Clone)]
 pub struct PoseEstimate {
-    /// When (ns).
+    /// Time (ns).
     pub stamp_ns: u64,
-    /// The navigated pose, where there is one.
+    /// The navigated pose relative to an object, if there is one.
     pub navigated: Option<Navigated>,
-    /// The rough pose, where there is one.
+    /// The prior pose in the world, if there is one.
     pub prior_pose: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
 }
 
-/// What became of an instant.
+/// The result of one instant.
 #[derive(Debug, Clone, Default)]
 pub struct Closure {
-    /// The station that was laid as a key frame.
+    /// The pose node that became a key frame.
     pub added: Option<usize>,
-    /// What came of the search, where there was one.
+    /// The result of the search for key frames, if one took place.
     pub sought: Option<Result<Relocalization, NotRecognized>>,
 }
 
-/// A key frame that was found again.
+/// A relocalization: a recognised key frame and the resulting pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Relocalization {
-    /// Its station.
+    /// The pose node of the key frame.
     pub pose_node: usize,
-    /// How it was recognised.
+    /// The recognition.
     pub recognized: Recognized,
-    /// The camera relative to an object, by all that the network knows now; `None` where nothing connects them, or where
-    /// the loop contradicts the rest of the network and was given up.
+    /// The camera's pose relative to an object, by the optimised graph.
+    ///
+    /// `None` if nothing connects them, or if the loop contradicts the rest of the graph and was rejected.
     pub navigated: Option<Navigated>,
-    /// Whether the loop was given up.
+    /// Whether the loop was rejected.
     pub given_up: bool,
 }
 
-/// The last fix of an object that counts.
+/// The best fix of the current visit of an object.
 #[derive(Debug, Clone, Copy)]
 struct Visit {
     fix: usize,
@@ -109,8 +119,9 @@ struct Visit {
     seconds: f64,
 }
 
-/// The last time a key frame was found again, as long as the vehicle is over it: its points err alike each time, so only
-/// the best of a pass counts.
+/// The best loop of the current pass over a key frame.
+///
+/// The errors of a key frame's points are the same each time, so only the best loop of a pass enters the graph.
 #[derive(Debug, Clone, Copy)]
 struct Pass {
     index: usize,
@@ -118,34 +129,34 @@ struct Pass {
     seconds: f64,
 }
 
-/// A fix or a loop must be so much better than the best of its visit or pass to take its place.
+/// Maximum ratio of standard deviations at which a fix or loop replaces the best one so far.
 const CLEARLY: f64 = 0.8;
 
-/// A run along a network.
+/// A dive along a pose graph.
 #[derive(Debug)]
 pub struct Traverse<'a> {
     settings: &'a PoseGraphSettings,
     recognizer: PlaceRecognizer<'a>,
     pose_graph: PoseGraph,
-    /// Of each station, what it shows and at which length of this run's way it was laid; earlier runs' long before.
+    /// For each pose node, its footprint; `added_at` holds the path length at which it was added, −∞ for earlier runs.
     footprints: Vec<Option<Footprint>>,
     added_at: Vec<f64>,
-    /// The last station, while the motion since is known.
+    /// The last pose node, while the motion since then is known.
     last: Option<usize>,
-    /// The motion since then.
+    /// The motion since the last pose node.
     since: RelativeMotion,
     path: f64,
     seconds: f64,
     sought_at: f64,
-    /// Points of the last glance: what will be in view near by.
+    /// The points of the last processed pair: a prediction of the view nearby.
     outline: Vec<Point<Camera>>,
     visits: Vec<Option<Visit>>,
-    /// By the key frame's station.
+    /// The current pass over each key frame, by pose node.
     passes: BTreeMap<usize, Pass>,
 }
 
 impl<'a> Traverse<'a> {
-    /// Sets out in `pose_graph`, empty or laid by an earlier run.
+    /// A new dive that extends `pose_graph`, empty or from an earlier run.
     pub fn begin(settings: &'a PoseGraphSettings, pose_graph: PoseGraph, rig: &'a StereoRig, threads: Threads) -> Self {
         let visits = vec![None; pose_graph.objects.len()];
         let added_at = vec![f64::NEG_INFINITY; pose_graph.pose_nodes.len()];
@@ -168,18 +179,18 @@ impl<'a> Traverse<'a> {
         traverse
     }
 
-    /// The network as it is by now.
+    /// The current pose graph.
     pub fn pose_graph(&self) -> &PoseGraph {
         &self.pose_graph
     }
 
-    /// The network, its loops closed.
+    /// The final pose graph, with all loops closed.
     pub fn finish(mut self) -> PoseGraph {
         self.pose_graph.close();
         self.pose_graph
     }
 
-    /// Some time and the motion in it; without a motion a new chain begins.
+    /// Propagates the pose by a motion over `seconds`; without a motion a new chain of edges begins.
     pub fn advance(&mut self, seconds: f64, motion: Option<&RelativeMotion>) {
         self.seconds += seconds;
         match motion {
@@ -191,17 +202,18 @@ impl<'a> Traverse<'a> {
         }
     }
 
-    /// An object stands elsewhere than was believed.
+    /// Replaces the placement of a displaced object.
     pub fn displaced(&mut self, object: usize, place: ObjectPlacement) {
         self.pose_graph.objects[object].1 = place;
     }
 
-    /// A new instant: its fixes are taken in, a key frame is sought where one may be, and one is laid where there is none.
+    /// Processes an instant: it adds fixes, searches for key frames in view, and adds a key frame where none covers the
+    /// view.
     pub fn visit(&mut self, pair: &StereoPair<'_>, estimate: &PoseEstimate, fixes: &[Navigated]) -> Closure {
         self.visit_by(estimate, fixes, |recognizer| recognizer.stereo_features(pair))
     }
 
-    /// The same, what is in view being made when it is asked for.
+    /// Processes an instant, with the features computed on demand.
     pub(super) fn visit_by(
         &mut self,
         estimate: &PoseEstimate,
@@ -237,14 +249,14 @@ impl<'a> Traverse<'a> {
         closure
     }
 
-    /// Where the camera is, as far as is known.
+    /// The camera's pose in the world, if it is known.
     fn world(&self, estimate: &PoseEstimate) -> Option<Transform<World, Camera>> {
         let by_odometry = self.last.map(|last| self.pose_graph.pose_nodes[last].world_from_camera * self.since.motion);
         let by_object = || estimate.navigated.as_ref().map(|navigated| in_world(navigated, &self.places()).0);
         by_odometry.or_else(by_object).or_else(|| estimate.prior_pose.map(|(world, _)| world))
     }
 
-    /// How well: one standard deviation of the position (m).
+    /// The standard deviation of the camera's position (m).
     fn sigma(&self, estimate: &PoseEstimate) -> f64 {
         let position = |matrix: &nalgebra::Matrix6<f64>| matrix.fixed_view::<3, 3>(3, 3).trace().sqrt();
         let by_odometry =
@@ -262,7 +274,7 @@ impl<'a> Traverse<'a> {
         self.pose_graph.objects.iter().map(|(_, place)| *place).collect()
     }
 
-    /// Takes in a fix, if it is the best of its visit.
+    /// Adds a fix if it is the best of its visit.
     fn fix(&mut self, estimate: &PoseEstimate, navigated: &Navigated) {
         let sigma = navigated.object_pose.covariance.position_sigma();
         let visit =
@@ -282,7 +294,7 @@ impl<'a> Traverse<'a> {
         self.visits[navigated.object] = Some(Visit { fix: index, sigma, seconds: self.seconds });
     }
 
-    /// The station of this instant, laid if there is none yet.
+    /// The pose node of this instant, added if necessary.
     fn pose_node(&mut self, estimate: &PoseEstimate) -> usize {
         if let Some(last) = self.last.filter(|last| self.pose_graph.pose_nodes[*last].stamp_ns == estimate.stamp_ns) {
             return last;
@@ -299,7 +311,7 @@ impl<'a> Traverse<'a> {
         self.added_at.push(self.path);
         match self.last {
             Some(from) => self.pose_graph.odometry_edges.push(OdometryEdge { from, to: pose_node, motion: self.since }),
-            // A chain hangs on something: until an object is fixed or a key frame recognised, on acoustics.
+            // The first node of a chain has the acoustic prior, until an object or key frame is recognised.
             None => {
                 if let Some((world_from_camera, covariance)) = estimate.prior_pose {
                     self.pose_graph.prior_poses.push(PriorPose { pose_node, world_from_camera, covariance });
@@ -311,10 +323,11 @@ impl<'a> Traverse<'a> {
         pose_node
     }
 
-    /// Key frames that may show what is in view when it is known so well, how much of it they cover at best, and how far
-    /// their middle is from where it should be.
+    /// The key frames that may be in view, given the position uncertainty `sigma`.
+    ///
+    /// Each has its maximum coverage of the view and the distance between the centres of both footprints.
     fn may_show(&self, view: &Footprint, sigma: f64) -> impl Iterator<Item = (usize, f64, f64)> {
-        /// So many standard deviations off.
+        /// Maximum distance in standard deviations.
         const FAR: f64 = 3.0;
         let each = self.footprints.iter().zip(&self.pose_graph.pose_nodes).zip(&self.added_at).enumerate();
         each.filter_map(move |(index, ((footprint, pose_node), added_at))| {
@@ -327,7 +340,7 @@ impl<'a> Traverse<'a> {
         })
     }
 
-    /// Whether a key frame should be laid.
+    /// Whether a key frame should be added.
     fn wanted(&self, view: &Footprint, estimate: &PoseEstimate) -> bool {
         let covering = self.footprints.iter().zip(&self.pose_graph.pose_nodes).filter_map(|(footprint, pose_node)| {
             let fraction = view.covered_by(footprint.as_ref()?);
@@ -337,7 +350,7 @@ impl<'a> Traverse<'a> {
         best > self.settings.covariance_ratio * self.sigma(estimate)
     }
 
-    /// Seeks a key frame; `None` where there is nothing to seek.
+    /// Searches for key frames in view; `None` without a candidate.
     fn seek(
         &mut self,
         stereo_features: &StereoFeatures,
@@ -348,7 +361,7 @@ impl<'a> Traverse<'a> {
         self.may_show(&view, self.sigma(estimate)).next()?;
         let pose_node = self.pose_node(estimate);
         let closed = self.pose_graph.solve()?;
-        // Those that cover most of it come first, and of these the nearest.
+        // Candidates are sorted by coverage, then by distance.
         let mut near: Vec<(usize, f64, f64)> = self.may_show(&view, self.sigma(estimate)).collect();
         near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.2.total_cmp(&b.2)).then(a.0.cmp(&b.0)));
         near.truncate(self.settings.recognition.candidates);
@@ -398,7 +411,7 @@ impl<'a> Traverse<'a> {
         Some(Ok(Relocalization { pose_node: from, recognized, navigated, given_up }))
     }
 
-    /// The camera relative to the object that it is navigated by, or to the one it is known best to.
+    /// The camera's pose relative to its current object, or else to the object with the smallest covariance.
     fn best(&self, closed: &Closed, pose_node: usize, estimate: &PoseEstimate) -> Option<Navigated> {
         if let Some(known) = &estimate.navigated {
             return closed.navigated(known.object, pose_node);
@@ -414,7 +427,7 @@ impl<'a> Traverse<'a> {
         Some(closed)
     }
 
-    /// Lays the footprints where the stations are by now.
+    /// Recomputes the footprints at the current poses of their nodes.
     fn arrange(&mut self) {
         let footprint = |pose_node: &PoseNode| {
             let keyframe = pose_node.keyframe.as_ref()?;
@@ -424,7 +437,7 @@ impl<'a> Traverse<'a> {
     }
 }
 
-/// No motion, exactly known.
+/// The identity motion with zero covariance.
 fn still() -> RelativeMotion {
     RelativeMotion::new(Transform::identity(), Covariance6::new(nalgebra::Matrix6::zeros()))
 }

@@ -1,46 +1,48 @@
-//! The motion that most points agree on.
+//! RANSAC: the motion with the most inliers.
 
 use rand::{Rng, RngExt};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, StereoPixels, StereoRig, Transform, UncertainPoint};
 use seafix_referencing::{Observation, Observations, Solver};
 
-/// A point of an earlier pair, which takes the model's place, seen again in a later one.
+/// The observation of an earlier point, in the role of the model point, in a later pair.
 pub(crate) fn seen_again(earlier: &UncertainPoint<Camera>, later: &MeasuredPoint) -> Observation {
     Observation {
         measured: later.position,
         pixels: later.pixels,
         model: Point::<Object>::from(earlier.at.coords),
-        // Across the line of sight: along it the error is larger, and the same for every motion.
+        // The error across the line of sight; the larger one along it is common to all candidate motions.
         model_sigma: earlier.covariance.symmetric_eigenvalues().min().max(0.0).sqrt(),
     }
 }
 
-/// When points agree, and how long it is sought.
+/// The settings of RANSAC.
 pub(crate) struct Rules {
-    /// The root mean square of the distances in both images up to which they do (px).
+    /// Inlier threshold: RMS distance over both images (px).
     pub(crate) px: f64,
-    /// With what probability three right points have been drawn.
+    /// Probability that at least one sample is free of outliers.
     pub(crate) confidence: f64,
-    /// Draws at most.
+    /// Maximum number of samples.
     pub(crate) draws: usize,
 }
 
 impl Rules {
-    /// The distance from which on a point is at another place, not at the same one badly measured (px).
+    /// The distance (px) beyond which a point has moved, as opposed to a bad measurement.
     pub(crate) fn elsewhere(&self) -> f64 {
         3.0 * self.px
     }
 }
 
-/// A motion, `earlier_from_later`, and the points that agree with it.
+/// A motion `earlier_from_later` and its inliers.
 pub(crate) struct Consensus {
     pub(crate) motion: Transform<Object, Camera>,
     pub(crate) inliers: Vec<usize>,
     score: f64,
 }
 
-/// Maximises Σ (1 − r²/t²)₊ over motions, r the distance of a point from where it is expected in both new images: over
-/// the motions of random minimal sets and the `guesses`. Each new best is solved again from all that agree with it.
+/// MSAC: maximises Σ (1 − r²/t²)₊ over the motions of random minimal samples and the `guesses`.
+///
+/// The residual r is the distance of a point from its predicted position in both new images, t the threshold. Each new
+/// best motion is re-estimated from all of its inliers.
 pub(crate) fn consensus(
     data: &Observations<'_>,
     rig: &StereoRig,
@@ -60,7 +62,7 @@ pub(crate) fn consensus(
         if best.as_ref().is_some_and(|best| tried.score <= best.score) {
             return;
         }
-        // What agrees with three points is solved from all that do, twice.
+        // The motion of a minimal sample is re-estimated twice from all of its inliers.
         for _ in 0..2 {
             if tried.inliers.len() < 2 * size {
                 break;
@@ -97,15 +99,15 @@ pub(crate) fn consensus(
     best
 }
 
-/// Whether a consensus is that nothing moves: what does not move at all explains what it explains.
+/// Whether the best motion is indistinguishable from rest: the identity explains nearly all of its inliers.
 pub(crate) fn is_still(best: &Consensus, data: &Observations<'_>, rig: &StereoRig, rules: &Rules) -> bool {
-    /// The share of its points that stand still where nothing moves.
+    /// Minimum fraction of the inliers that the identity must explain.
     const STILL: f64 = 0.9;
     let still = judge(data, rig, rules, Transform::identity()).inliers.len();
     still as f64 >= STILL * best.inliers.len() as f64
 }
 
-/// How many of the points that are elsewhere than a motion expects them agree with each other on another one.
+/// The number of inliers of the best motion among points that contradict the first one.
 pub(crate) fn competitor(
     best: &Consensus,
     data: &Observations<'_>,
@@ -122,7 +124,7 @@ pub(crate) fn competitor(
     consensus(&subset(data, &others), rig, rules, solvers, &[], rng).map_or(0, |other| other.inliers.len())
 }
 
-/// Some of the points.
+/// A selection of the points.
 pub(crate) fn subset<'a>(data: &Observations<'a>, indices: &[usize]) -> Observations<'a> {
     Observations { points: indices.iter().map(|&index| data.points[index]).collect(), rig: data.rig }
 }
@@ -141,7 +143,7 @@ fn judge(data: &Observations<'_>, rig: &StereoRig, rules: &Rules, motion: Transf
     Consensus { motion, inliers, score }
 }
 
-/// The mean over both images of the squared distance from the expected place (px²).
+/// The squared distance from the predicted position, averaged over both images (px²).
 fn squared_distance(point: &Observation, rig: &StereoRig, motion: &Transform<Camera, Object>) -> Option<f64> {
     let StereoPixels { left, right } = rig.project(&(*motion * point.model))?;
     let seen = point.pixels?.at;

@@ -1,4 +1,4 @@
-//! Landmarks found again in a new pair of images.
+//! Tracking of landmarks in a new pair of images.
 
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 use seafix_geometry::{Camera, Pixel, StereoRig, Transform, World};
@@ -9,31 +9,30 @@ use super::{
     pose::Found,
 };
 
-/// A key frame: its pose, and the image that its landmarks' patches are taken from.
+/// A key frame of the window: its pose, and the image of its landmarks' patches.
 #[derive(Debug)]
 pub(super) struct WindowKeyFrame {
     pub(super) world_from_camera: Transform<World, Camera>,
-    /// Its left image, as long as it is in the window.
+    /// The left image, while the key frame is in the window.
     pub(super) image: Option<Image>,
 }
 
-/// What came of the search.
+/// The result of the tracking.
 #[derive(Debug, Default)]
 pub(super) struct Followed {
-    /// Landmarks that should be seen.
+    /// The landmarks that should be visible.
     pub(super) sought: Vec<usize>,
-    /// Index of each landmark that was found, and where.
+    /// Index, pixel coordinates and covariance of each landmark that was found.
     pub(super) found: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
 }
 
-/// A landmark that was missed so many times in succession is hidden, or was none.
+/// Number of consecutive misses after which a landmark counts as hidden or wrong.
 const GIVEN_UP: u32 = 2;
-/// A patch that is shown this many times larger or smaller than it was has other detail: along its most stretched
-/// direction, and as an area.
+/// Maximum change of a patch's scale and area; beyond it the patch shows other detail.
 const MAX_SCALE_ERROR: f64 = 3.0;
 
-/// Seeks landmarks where `world_from_camera` expects them.
-#[expect(clippy::too_many_arguments, reason = "one call site; each is a different thing")]
+/// Tracks the landmarks near their positions predicted from `world_from_camera`.
+#[expect(clippy::too_many_arguments, reason = "one call site; each argument has a meaning of its own")]
 pub(super) fn follow(
     refine: &Direct,
     rig: &StereoRig,
@@ -46,7 +45,7 @@ pub(super) fn follow(
 ) -> Followed {
     let camera_from_world = world_from_camera.inverse();
     let margin = (refine.window / 2 + 2) as f64;
-    // The landmarks of the last key frames first: their patches have changed least.
+    // Landmarks of the latest key frames come first: their patches have changed least.
     let mut expected: Vec<(usize, [Expected; 2])> = Vec::new();
     for (index, landmark) in landmarks.iter().enumerate().rev() {
         if expected.len() == max {
@@ -63,13 +62,13 @@ pub(super) fn follow(
     }
     let mut followed = Followed { sought: expected.iter().map(|(index, _)| *index).collect(), found: Vec::new() };
     let mut tracks: Vec<Option<Track>> = Vec::new();
-    // One anchor's after the other's: their patches come from one image.
+    // Landmarks are grouped by key frame, because their patches come from the same image.
     expected.sort_by_key(|(index, _)| (landmarks[*index].anchor, *index));
     for same in expected.chunk_by(|a, b| landmarks[a.0].anchor == landmarks[b.0].anchor) {
         let Some(image) = &frames[landmarks[same[0].0].anchor].image else { continue };
         let left: Vec<Expected> = same.iter().map(|(_, both)| both[0]).collect();
         refine.follow_into(image, images[0], &left, work, &mut tracks);
-        // How far the left place was off tells where the right one begins.
+        // The correction in the left image improves the start in the right one.
         let begun: Vec<(usize, Track, Expected)> = same
             .iter()
             .zip(&tracks)
@@ -98,7 +97,7 @@ pub(super) fn follow(
 }
 
 impl Followed {
-    /// For the pose.
+    /// The found landmarks as observations for the pose estimate.
     pub(super) fn for_pose(&self, frames: &[WindowKeyFrame], landmarks: &[Landmark]) -> Vec<Found> {
         let found = self.found.iter().map(|(index, pixels, noise)| {
             let landmark = &landmarks[*index];
@@ -114,7 +113,7 @@ impl Followed {
     }
 }
 
-/// Where both images should show a landmark and how deformed; `None` where they should not.
+/// The predicted positions and deformations of a landmark's patch in both images; `None` if it is not visible.
 fn expect(
     rig: &StereoRig,
     landmark: &Landmark,
@@ -142,7 +141,7 @@ fn expect(
     Some([one(0)?, one(1)?])
 }
 
-/// A window whose border moves by less than a fiftieth of a pixel is not worth deforming.
+/// Whether the border of a patch moves by less than 0.02 px; no deformation is needed then.
 fn nearly_still(shape: &Matrix2<f64>) -> bool {
     (shape - Matrix2::identity()).abs().max() * 8.0 < 0.02
 }

@@ -1,4 +1,4 @@
-//! What one pair of images shows.
+//! The processed images of one pair: points, key points and descriptors.
 
 use seafix_geometry::{MeasuredPoint, Pixel, StereoRig};
 use seafix_vision::{Descriptors, FrontEndOutput, Image, Keypoint, Match, Matcher, View, Workspace};
@@ -6,13 +6,13 @@ use seafix_vision::{Descriptors, FrontEndOutput, Image, Keypoint, Match, Matcher
 use super::StereoStages;
 use crate::StereoPair;
 
-/// One pair.
+/// The processed images of one pair.
 #[derive(Debug)]
 pub(crate) struct Seen {
     pub(super) stamp_ns: u64,
-    /// As the filters leave them.
+    /// The filtered images.
     pub(super) images: [Image; 2],
-    /// Its measured points, each with its key point and descriptor.
+    /// The measured points, each with its key point and descriptor.
     pub(super) cloud: Vec<MeasuredPoint>,
     keypoints: Vec<Keypoint>,
     descriptors: Descriptors,
@@ -30,7 +30,7 @@ impl Seen {
         let filtered = output.filtered();
         let images = [filtered[0].unwrap_or(pair.left).clone(), filtered[1].unwrap_or(pair.right).clone()];
         let cloud = std::mem::take(&mut output.cloud);
-        // Both lists are in the order of the key points, and a left place is its key point's.
+        // Both lists are in the order of the key points; a left pixel equals its key point's.
         let mut rest = output.keypoints()[0].iter().enumerate();
         let indices: Vec<usize> = cloud
             .iter()
@@ -50,7 +50,7 @@ impl Seen {
         Self { stamp_ns: pair.stamp_ns, images, cloud, keypoints, descriptors }
     }
 
-    /// Its strongest points, so many at most, with their key points and descriptors.
+    /// The `max` strongest points with their key points and descriptors.
     pub(crate) fn strongest(self, max: usize) -> (Vec<MeasuredPoint>, Vec<Keypoint>, Descriptors) {
         let mut order: Vec<usize> = (0..self.cloud.len()).collect();
         order.sort_by(|&a, &b| self.keypoints[b].response.total_cmp(&self.keypoints[a].response).then(a.cmp(&b)));
@@ -67,7 +67,7 @@ impl Seen {
         View { image: &self.images[0], keypoints: &self.keypoints, descriptors: &self.descriptors }
     }
 
-    /// Indices of points of `earlier` and of `self` that look alike.
+    /// The matches of `earlier` and `self`, as pairs of indices.
     pub(super) fn in_common(
         &self,
         earlier: &Self,
@@ -79,7 +79,7 @@ impl Seen {
     }
 }
 
-/// Indices of key points of `earlier` and of `later` that look alike.
+/// The matches of the key points of `earlier` and `later`, as pairs of indices.
 pub(crate) fn in_common(
     earlier: &View<'_>,
     later: &View<'_>,

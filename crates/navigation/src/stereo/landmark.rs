@@ -1,48 +1,50 @@
-//! Landmarks: patches of an image and how far away what they show is.
+//! Landmarks: image patches with an inverse depth.
 
 use nalgebra::{Matrix2, Matrix3, Matrix4, Matrix4x3, Matrix4x6, Vector2, Vector3, Vector4};
 use seafix_geometry::{Camera, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, so3::skew};
 
-/// A point of the scene: the direction in which the left camera of its key frame saw it first, and its inverse depth
-/// there. In that camera's frame it lies at (x, y, 1) / w, which stays well behaved for points far away, w → 0.
+/// A landmark: a scene point by its direction in the left camera of its first key frame, and its inverse depth there.
+///
+/// Its position in that camera's frame is (x, y, 1) / w; the parameters stay well conditioned for distant points, w →
+/// 0.
 #[derive(Debug, Clone)]
 pub(super) struct Landmark {
     /// The key frame that saw it first.
     pub(super) anchor: usize,
-    /// Where that key frame's left image shows it: the centre of its patch.
+    /// Its pixel in the left image of that key frame: the centre of its patch.
     pub(super) place: Pixel,
-    /// (x, y, w).
+    /// The parameters (x, y, w).
     pub(super) at: Vector3<f64>,
     /// The covariance of (x, y, w), given the poses.
     pub(super) covariance: Matrix3<f64>,
-    /// Where key frames saw it, in order of time, the first of them its own.
+    /// Its observations by key frames, in order of time; the first one is its anchor's.
     pub(super) views: Vec<LandmarkObservation>,
-    /// How many pairs in succession should have shown it and did not.
+    /// Number of consecutive pairs in which it should have been visible and was not found.
     pub(super) misses: u32,
-    /// Derivative of w by x and y over its neighbourhood: how its surface slants.
+    /// The slant of its surface: the derivative of w by x and y in its neighbourhood.
     pub(super) slant: Vector2<f64>,
 }
 
-/// Where the two images of a key frame show a landmark.
+/// The observation of a landmark by a key frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LandmarkObservation {
     /// The key frame.
     pub(super) frame: usize,
-    /// The four pixel coordinates.
+    /// The four pixel coordinates: left u, v and right u, v.
     pub(super) pixels: Vector4<f64>,
     /// The inverse of their covariance (1/px²).
     pub(super) information: Matrix4<f64>,
 }
 
-/// Where a rig sees a landmark, and the derivatives.
+/// The projection of a landmark into both images, with its derivatives.
 pub(super) struct Projection {
     /// The four pixel coordinates.
     pub(super) pixels: Vector4<f64>,
-    /// w times the place in the frame of the left camera.
+    /// The position in the left camera's frame, times w.
     scaled: Vector3<f64>,
-    /// By the scaled place, w in the right camera's offset kept.
+    /// The derivative of the pixels by `scaled`, at constant w.
     by_scaled: Matrix4x3<f64>,
-    /// By w through the right camera's offset alone.
+    /// The derivative of the pixels by w, through the right camera's offset.
     by_offset: Vector4<f64>,
     w: f64,
 }
@@ -52,7 +54,7 @@ pub(super) fn coordinates(pixels: &StereoPixels) -> Vector4<f64> {
     Vector4::new(pixels.left.u, pixels.left.v, pixels.right.u, pixels.right.v)
 }
 
-/// Where `rig` sees the landmark `at` of a frame that is moved by `here_from_anchor`; `None` where a camera cannot.
+/// The projection of the landmark `at` of an anchor at `here_from_anchor`; `None` if a camera cannot see it.
 pub(super) fn project(
     rig: &StereoRig,
     here_from_anchor: &Transform<Camera, Camera>,
@@ -74,7 +76,7 @@ pub(super) fn project(
 }
 
 impl Projection {
-    /// By (x, y, w).
+    /// The derivative of the pixels by (x, y, w).
     pub(super) fn by_landmark(&self, here_from_anchor: &Transform<Camera, Camera>) -> Matrix4x3<f64> {
         let mut axes = here_from_anchor.rotation_matrix();
         axes.set_column(2, &here_from_anchor.translation());
@@ -83,7 +85,7 @@ impl Projection {
         by
     }
 
-    /// By ξ of `world_from_here · Exp(ξ)`.
+    /// The derivative of the pixels by ξ of `world_from_here · Exp(ξ)`.
     pub(super) fn by_pose(&self) -> Matrix4x6<f64> {
         let mut by = Matrix4x6::zeros();
         by.fixed_columns_mut::<3>(0).copy_from(&(self.by_scaled * skew(&self.scaled)));
@@ -91,7 +93,7 @@ impl Projection {
         by
     }
 
-    /// By ξ of `world_from_anchor · Exp(ξ)`.
+    /// The derivative of the pixels by ξ of `world_from_anchor · Exp(ξ)`.
     pub(super) fn by_anchor(&self, here_from_anchor: &Transform<Camera, Camera>, at: &Vector3<f64>) -> Matrix4x6<f64> {
         let turned = self.by_scaled * here_from_anchor.rotation_matrix();
         let mut by = Matrix4x6::zeros();
@@ -100,8 +102,9 @@ impl Projection {
         by
     }
 
-    /// Derivative of the left and of the right pixel by a pixel of the anchor's left image, on a surface of this
-    /// inverse-depth slant; `by_pixel` is the derivative of (x, y) by that pixel.
+    /// The derivatives of the left and right pixel by a pixel of the anchor's left image.
+    ///
+    /// The surface has the inverse-depth slant `slant`; `by_pixel` is the derivative of (x, y) by the anchor's pixel.
     pub(super) fn shapes(
         &self,
         here_from_anchor: &Transform<Camera, Camera>,
@@ -115,14 +118,16 @@ impl Projection {
 }
 
 impl Landmark {
-    /// What the measured pixels of a key frame say: the place in the left image is what it is, the right one follows by
-    /// alignment; what the camera model leaves unexplained (`calibration` px) comes to every coordinate.
+    /// A new landmark from the measured pixels of a key frame.
+    ///
+    /// The left pixel defines the landmark and has no alignment error; the right pixel has one. The calibration error
+    /// (`calibration` px) is added to every coordinate.
     pub(super) fn begin(anchor: usize, pixels: &UncertainPixels, calibration: f64, rig: &StereoRig) -> Option<Self> {
         let information = information(&aligned(pixels, calibration), calibration)?;
         let direction = rig.left().normalize(&pixels.at.left)?;
         let seen = coordinates(&pixels.at);
         let here = Transform::identity();
-        // The depth that the pixels say, from a first guess by the triangulated point.
+        // Maximum-likelihood parameters, starting from the triangulated point.
         let point = rig.triangulate(&UncertainPixels::independent(pixels.at, 0.1)).ok()?.point;
         let mut at = Vector3::new(direction.x, direction.y, 1.0 / point.coords.z);
         for _ in 0..5 {
@@ -154,7 +159,7 @@ impl Landmark {
     }
 }
 
-/// The covariance of the right place given the left one (px²), without what calibration adds.
+/// The covariance of the right pixel given the left one (px²), without the calibration error.
 fn aligned(pixels: &UncertainPixels, calibration: f64) -> Matrix2<f64> {
     let own = pixels.covariance - Matrix4::identity() * (calibration * calibration);
     let block = |row, column| own.fixed_view::<2, 2>(row, column).into_owned();
@@ -162,7 +167,7 @@ fn aligned(pixels: &UncertainPixels, calibration: f64) -> Matrix2<f64> {
     place.try_inverse().map_or(right, |inverse| right - across * inverse * across.transpose())
 }
 
-/// The information of a landmark's own view: only calibration blurs the place that defines it.
+/// The information of a landmark's first observation; its left pixel has the calibration error only.
 fn information(aligned: &Matrix2<f64>, calibration: f64) -> Option<Matrix4<f64>> {
     let mut covariance = Matrix4::identity() * (calibration * calibration).max(MIN * MIN);
     let mut right = covariance.fixed_view_mut::<2, 2>(2, 2);
@@ -170,7 +175,7 @@ fn information(aligned: &Matrix2<f64>, calibration: f64) -> Option<Matrix4<f64>>
     covariance.cholesky().map(|factor| factor.inverse())
 }
 
-/// No pixel is known better than this (px).
+/// Minimum standard deviation of a pixel coordinate (px).
 pub(super) const MIN: f64 = 0.02;
 
 #[cfg(test)]

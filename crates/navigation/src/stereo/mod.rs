@@ -21,20 +21,20 @@ use serde::{Deserialize, Serialize};
 use crate::{Odometry, OdometrySession};
 use tracker::StereoTracker;
 
-/// Visual odometry of a calibrated stereo rig.
+/// Visual odometry of a calibrated stereo rig: semi-direct tracking with windowed bundle adjustment.
 ///
-/// Each pair becomes a cloud of measured points. Points are paired with those of the pair before by their descriptors;
-/// the motion that most pairs agree on (sample consensus over minimal sets, the truncated score of MSAC) is refined by a
-/// [`Solver`]. With it every landmark of the last key frames is expected in both new images, and the patch around the
-/// place where it was first seen is aligned to them directly: a landmark *is* the centre of its patch, so that the error
-/// of the corner detector drops out. Patches are laid over as their surface slants: the ground ahead of a vehicle is seen
-/// at a grazing angle. The pose is the robust maximum likelihood over all landmarks found, with their
-/// covariances. Pairs that see too little of what the last key frame saw become key frames: they bring new landmarks, and
-/// the poses and landmarks of the last `window` key frames are adjusted together (bundle adjustment).
+/// Each pair becomes a cloud of measured points. Their descriptors are matched with those of the previous pair. RANSAC
+/// (with the MSAC score) finds the motion with the most inliers, and a [`Solver`] refines it. This motion predicts
+/// every landmark of the last key frames in both new images, and the patch around its first observation is aligned to
+/// them directly. A landmark *is* the centre of its patch, so the error of the corner detector drops out. Patches are
+/// warped by the slant of their surface, because the ground ahead of a vehicle is seen at a grazing angle. The pose is
+/// the robust maximum likelihood over all found landmarks with their covariances. A pair that sees too few landmarks of
+/// the last key frame becomes a key frame: it adds new landmarks, and bundle adjustment refines the poses and landmarks
+/// of the last `window` key frames.
 ///
-/// A consensus of points that stand still in the image, beside others that agree on a motion, may be a part of the vehicle, sharp
-/// and always found again. It is believed where landmarks of it have been elsewhere in the image; else pairs are left out until
-/// the vehicle is seen to move.
+/// Points that are static in the image, beside others that agree on a motion, may be part of the vehicle. They are
+/// accepted if their landmarks have been at other positions in the image before; otherwise pairs are skipped until the
+/// vehicle is seen to move.
 ///
 /// Points are projected through the lens model; images are neither rectified nor undistorted.
 ///
@@ -43,54 +43,55 @@ use tracker::StereoTracker;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Stereo {
-    /// Prepare each image, one after the other.
+    /// Image filters, in the order of their application.
     pub filters: Vec<Choice>,
-    /// Finds key points in each image.
+    /// The detector of key points.
     pub detector: Choice,
-    /// Says where exactly they are. Natural texture has no corners to fit: `peak`.
+    /// The locator of key points; `peak`, because natural texture has no corners to fit.
     pub locator: Choice,
-    /// Describes their surroundings, for the matcher between the two cameras and the one between pairs.
+    /// The descriptor, for the matcher between the cameras and the one between pairs.
     pub descriptor: Choice,
-    /// Pairs left with right.
+    /// The matcher between left and right image.
     pub matcher: Choice,
-    /// Aligns each pair between the cameras.
+    /// The refinement of each match between the cameras.
     #[serde(deserialize_with = "read_refinement")]
     pub refinement: Choice,
-    /// Turns pairs into points.
+    /// The triangulator.
     #[serde(deserialize_with = "read_triangulator")]
     pub triangulator: Choice,
-    /// Pairs points with those of the pair before; the rig plays no part.
+    /// The matcher between successive pairs; it does not use the rig.
     pub between: Choice,
-    /// The motion of three points, for the consensus.
+    /// The minimal solver of RANSAC, for three points.
     pub minimal: Choice,
-    /// The motion of all that agree.
+    /// The solver for all inliers of RANSAC.
     pub solver: Choice,
-    /// How far from its expected place, in the mean of both images, a point may be seen and still agree (px).
+    /// Inlier threshold of RANSAC: RMS distance over both images from the predicted position (px).
     pub consensus_px: f64,
-    /// With what probability three right points have been drawn when the consensus ends.
+    /// Probability that RANSAC draws at least one sample without outliers, between 0 and 1.
     pub confidence: f64,
-    /// Draws at most.
+    /// Maximum number of RANSAC samples.
     pub draws: usize,
-    /// Fewer points that agree are no consensus.
+    /// Minimum number of inliers, at least 6.
     pub min_points: usize,
-    /// How landmarks are found again in new images.
+    /// The alignment of landmark patches in new images.
     pub follow: Direct,
-    /// At most so many landmarks are sought in a pair.
+    /// Maximum number of landmarks that are tracked in a pair.
     pub landmarks: usize,
-    /// A landmark begins no nearer to another (px).
+    /// Minimum distance of a new landmark from others (px).
     pub apart_px: f64,
-    /// A pair becomes a key frame when it sees less than this share of the landmarks of the last key frame.
+    /// Fraction of the last key frame's landmarks below which a pair becomes a key frame, 0 to 1.
     pub keyframe_fraction: f64,
-    /// Key frames that are adjusted together, from 1 to 100; with 1 none are.
+    /// Number of key frames in the bundle adjustment, 1 to 100; 1 disables it.
     pub window: usize,
-    /// A motion known worse than this is no answer: one standard deviation over the three axes together (m).
+    /// Maximum standard deviation of the position over the three axes together (m); a less certain motion is rejected.
     pub max_sigma: f64,
-    /// A longer time without a pair that can be followed breaks the segment (s).
+    /// Maximum time between two usable pairs (s); a longer gap breaks the segment.
     pub max_gap: f64,
-    /// A faster motion is not believed (m/s). The default leaves room for a car's; a vehicle that inspects does not go 3 m/s, and
-    /// what it is told to be unable to do it cannot be misled into.
+    /// Maximum speed (m/s); a faster estimate is rejected as an outlier.
+    ///
+    /// The default admits cars; use about 3 m/s for an inspection vehicle.
     pub max_speed: f64,
-    /// What is drawn at random follows from this.
+    /// Seed of the random samples.
     pub seed: u64,
 }
 
@@ -99,7 +100,8 @@ impl Default for Stereo {
         let deep = 1e4;
         Self {
             filters: Vec::new(),
-            // Bright corners in view shall not hide the faint texture of the ground: their responses differ by ten million.
+            // A low quality threshold keeps the faint texture of the ground beside bright corners: the responses differ
+            // by 1e7.
             detector: Choice::named("harris").with("sigma", 2.0).with("features", 1000).with("quality", 1e-7),
             locator: Choice::named("peak"),
             descriptor: Choice::named("surf"),
@@ -128,7 +130,7 @@ impl Default for Stereo {
 
 impl Component for Stereo {
     const NAME: &'static str = "stereo";
-    const SUMMARY: &'static str = "landmarks followed through both cameras' images, adjusted over key frames";
+    const SUMMARY: &'static str = "semi-direct stereo visual odometry with windowed bundle adjustment";
     const SOURCE: &'static str = "Nistér, Naroditsky, Bergen, Visual odometry, CVPR 2004; Forster et al., SVO, 2017; \
                                   Triggs et al., Bundle adjustment: a modern synthesis, 2000";
 
@@ -145,7 +147,7 @@ impl Component for Stereo {
         in_range(enough, "landmarks", self.landmarks, "at least min-points")?;
         positive("apart-px", self.apart_px, "a positive number of pixels")?;
         let fraction = (0.0..=1.0).contains(&self.keyframe_fraction);
-        in_range(fraction, "keyframe-fraction", self.keyframe_fraction, "a share from 0 to 1")?;
+        in_range(fraction, "keyframe-fraction", self.keyframe_fraction, "a fraction from 0 to 1")?;
         in_range((1..=100).contains(&self.window), "window", self.window, "1 to 100 key frames")?;
         positive("max-sigma", self.max_sigma, "a positive length (m)")?;
         positive("max-gap", self.max_gap, "a positive time (s)")?;
@@ -153,7 +155,7 @@ impl Component for Stereo {
     }
 }
 
-/// The stages, built.
+/// The stages of the odometry.
 #[derive(Debug)]
 pub(crate) struct StereoStages {
     pub(crate) front_end: FrontEnd,

@@ -1,41 +1,43 @@
-//! The pose of a pair from the landmarks found in it.
+//! The pose of a pair from its landmarks.
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector4, Vector6};
 use seafix_geometry::{Camera, StereoRig, Transform, World};
 
 use super::landmark::project;
 
-/// A landmark found in a new pair.
+/// The observation of a landmark in a new pair.
 pub(crate) struct Found {
-    /// The pose of its key frame.
+    /// The pose of its anchor key frame.
     pub(crate) world_from_anchor: Transform<World, Camera>,
-    /// (x, y, w) there.
+    /// Its parameters (x, y, w) in the anchor's frame.
     pub(crate) at: Vector3<f64>,
     /// Their covariance.
     pub(crate) covariance: Matrix3<f64>,
-    /// Where the new images show it.
+    /// The pixel coordinates in the new images.
     pub(crate) pixels: Vector4<f64>,
-    /// The covariance of that (px²).
+    /// The covariance of the pixel coordinates (px²).
     pub(crate) noise: Matrix4<f64>,
 }
 
-/// A pose and what agrees with it.
+/// An estimated pose and its inliers.
 pub(crate) struct Pose {
     pub(crate) world_from_camera: Transform<World, Camera>,
-    /// Of ξ in `world_from_camera · Exp(ξ)`, the landmarks' key frames taken as exact.
+    /// The covariance of ξ in `world_from_camera · Exp(ξ)`, given the poses of the anchors.
     pub(crate) covariance: Matrix6<f64>,
-    /// Whether each landmark agrees.
+    /// Whether each landmark agrees with the pose.
     pub(crate) agrees: Vec<bool>,
 }
 
-/// Where the loss turns from squares to logarithms, in units of χ² of four degrees of freedom (Cauchy).
+/// Scale of the Cauchy loss, in units of χ² with four degrees of freedom.
 pub(super) const SOFT: f64 = 8.0;
-/// A landmark beyond this χ² does not agree: four degrees of freedom, 1 in 1000.
+/// Inlier threshold of a landmark: χ² with four degrees of freedom at a probability of 0.001.
 pub(super) const MAX: f64 = 18.5;
 const STEPS: usize = 15;
 
-/// The most likely pose near `start`: least Σ ρ(rᵀ S⁻¹ r), r the four pixel residuals of a landmark,
-/// S = noise + J Σ Jᵀ with the landmark's own covariance, ρ Cauchy's loss. `None` where the landmarks do not say.
+/// The robust maximum-likelihood pose near `start`.
+///
+/// It minimises Σ ρ(rᵀ S⁻¹ r) with the four pixel residuals r of a landmark, S = noise + J Σ Jᵀ including the
+/// landmark's own covariance, and the Cauchy loss ρ. `None` if the landmarks do not determine the pose.
 pub(crate) fn refine(rig: &StereoRig, found: &[Found], start: &Transform<World, Camera>) -> Option<Pose> {
     let mut pose = *start;
     let mut weights: Vec<Option<Matrix4<f64>>> = Vec::new();
@@ -46,7 +48,7 @@ pub(crate) fn refine(rig: &StereoRig, found: &[Found], start: &Transform<World, 
         let (normal, gradient) = linearize(rig, found, &weights, &pose);
         let xi: Vector6<f64> = normal.cholesky()?.solve(&gradient);
         pose = pose.perturbed(&xi).renormalized();
-        // A thousandth of a standard deviation.
+        // Convergence: a step below a thousandth of a standard deviation.
         if step >= 2 && gradient.dot(&xi) < 1e-6 {
             break;
         }
@@ -64,11 +66,13 @@ pub(crate) fn refine(rig: &StereoRig, found: &[Found], start: &Transform<World, 
     (pose.is_finite()).then_some(Pose { world_from_camera: pose, covariance, agrees })
 }
 
-/// The most likely pose and landmarks together, for what is known to agree: the least
-/// Σ (rᵀ noise⁻¹ r + (p − at)ᵀ Σ⁻¹ (p − at)) over the pose and the places p, ρ the identity.
+/// The maximum-likelihood pose and landmarks together, for landmarks known to be inliers.
 ///
-/// A derivative at the place `at` as it was measured shares its error with the residual; over a hundred landmarks of one
-/// look that is a bias as large as the noise. Here derivatives are those at the fitted places.
+/// It minimises Σ (rᵀ noise⁻¹ r + (p − at)ᵀ Σ⁻¹ (p − at)) over the pose and the landmark parameters p.
+///
+/// A derivative evaluated at the measured parameters `at` shares their error with the residual; with a hundred
+/// landmarks of a single key frame this causes a bias as large as the noise. Here derivatives are evaluated at the
+/// fitted parameters.
 pub(crate) fn joint(rig: &StereoRig, found: &[Found], start: &Transform<World, Camera>) -> Option<Pose> {
     let mut pose = *start;
     let mut places: Vec<Vector3<f64>> = found.iter().map(|one| one.at).collect();
@@ -98,7 +102,7 @@ pub(crate) fn joint(rig: &StereoRig, found: &[Found], start: &Transform<World, C
             places[index] = found[index].at + found[index].covariance * (by.transpose() * weighted);
             agrees[index] = rest.dot(&weighted) < MAX;
         }
-        // A thousandth of a standard deviation.
+        // Convergence: a step below a thousandth of a standard deviation.
         if step >= 2 && gradient.dot(&xi) < 1e-6 {
             let covariance = factor.inverse();
             return pose.is_finite().then_some(Pose { world_from_camera: pose, covariance, agrees });

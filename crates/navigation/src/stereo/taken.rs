@@ -1,8 +1,8 @@
-//! Places in an image that landmarks have taken.
+//! Minimum distances between the landmarks of an image.
 
 use std::collections::HashMap;
 
-/// Places that are taken.
+/// The occupied positions of an image, in a grid.
 pub(super) struct Taken {
     apart: f64,
     cells: HashMap<[i64; 2], Vec<[f64; 2]>>,

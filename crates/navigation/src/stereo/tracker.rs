@@ -1,4 +1,4 @@
-//! The odometry at work.
+//! The session of stereo visual odometry.
 
 use std::time::Instant;
 
@@ -23,7 +23,7 @@ use crate::{
     Waypoint, odometry::Stamps, times::Times, unusable::RawImages,
 };
 
-/// The memory of one journey.
+/// The state of one session.
 pub(super) struct StereoTracker<'a> {
     settings: &'a Stereo,
     stages: StereoStages,
@@ -32,18 +32,18 @@ pub(super) struct StereoTracker<'a> {
     work: Workspace,
     stamps: Stamps,
     raw: RawImages,
-    /// The last pair that was followed.
+    /// The last pair of the trajectory.
     last: Option<Last>,
-    /// A pair that could not be followed, its place among the outcomes, and why.
+    /// A pair that could not be followed: its data, its index among the outcomes, the reason.
     pending: Option<(Seen, usize, Lost)>,
-    /// Why the way ended, while no pair was good enough to begin the next segment.
+    /// The reason of the last break, until a usable pair begins the next segment.
     broken: Option<Lost>,
-    /// How many points moved beside what stood still when that was doubted last; zero once the vehicle was seen to move.
+    /// Number of moving points beside static ones at the last doubt; zero once the vehicle has been seen to move.
     doubted: usize,
     frames: Vec<WindowKeyFrame>,
     /// The first key frame of the segment.
     first: usize,
-    /// How many landmarks the last key frame saw.
+    /// Number of landmarks that the last key frame saw.
     seen_by_keyframe: usize,
     landmarks: Vec<Landmark>,
     segments: Vec<OpenSegment>,
@@ -51,21 +51,21 @@ pub(super) struct StereoTracker<'a> {
     times: Times,
 }
 
-/// The last pair that was followed.
+/// The last pair of the trajectory.
 struct Last {
     seen: Seen,
     world_from_camera: Transform<World, Camera>,
-    /// The motion to it and how long that took (s).
+    /// The previous motion and its duration (s).
     motion: Option<(Transform<Camera, Camera>, f64)>,
 }
 
-/// A segment in the making.
+/// A segment whose poses may still be adjusted.
 struct OpenSegment {
     broken: Option<Lost>,
     poses: Vec<Relative>,
 }
 
-/// A pose relative to a key frame, which may still move.
+/// A pose relative to a key frame; bundle adjustment may still move the key frame.
 struct Relative {
     stamp_ns: u64,
     frame: usize,
@@ -73,15 +73,15 @@ struct Relative {
     local: Option<RelativeMotion>,
 }
 
-/// The way from the last pair to a new one.
+/// The motion from the last pair to a new one.
 struct Step {
     world_from_camera: Transform<World, Camera>,
     local: RelativeMotion,
     seconds: f64,
     sought: Vec<usize>,
-    /// Landmarks that agree, and where they are.
+    /// Index, pixel coordinates and covariance of each landmark that agrees with the pose.
     observations: Vec<(usize, Vector4<f64>, Matrix4<f64>)>,
-    /// Whether other points moved while these stood still.
+    /// Whether other points moved while the inliers were static.
     passed_by: bool,
 }
 
@@ -146,7 +146,7 @@ impl<'a> StereoTracker<'a> {
         }
     }
 
-    /// Follows what was seen, or begins with it.
+    /// Processes a pair: it continues the segment or begins a new one.
     fn take(&mut self, seen: Seen) {
         let Some(last) = self.last.take() else {
             let outcome = self.begin(seen, None);
@@ -154,19 +154,19 @@ impl<'a> StereoTracker<'a> {
         };
         match self.follow(&seen, &last) {
             Ok(step) => {
-                // A pair between that could not be followed was the exception.
+                // A single pair between that failed was an outlier.
                 self.pending = None;
                 self.outcomes
                     .push(OdometryOutcome::Followed { sought: step.sought.len(), found: step.observations.len() });
                 self.accept(seen, step);
             }
-            // Where it stands may still be told by how it goes on from the last pair.
+            // The following pairs may still decide whether the vehicle is at rest; the last pair is kept.
             Err(lost @ Lost::Still { .. }) => {
                 self.outcomes.push(OdometryOutcome::Skipped(lost));
                 self.last = Some(last);
             }
             Err(lost) => match (self.pending.take(), lost) {
-                // Two pairs say that there is no way on: a segment begins with the first of them.
+                // Two successive failures: a new segment begins with the first of the two pairs.
                 (Some((first, index, why)), _) => {
                     self.outcomes[index] = self.begin(first, Some(why));
                     self.take(seen);
@@ -184,12 +184,12 @@ impl<'a> StereoTracker<'a> {
         }
     }
 
-    /// Begins a segment where the one before ended.
+    /// Begins a segment at the pose where the previous one ended.
     fn begin(&mut self, seen: Seen, broken: Option<Lost>) -> OdometryOutcome {
         let broken = self.broken.take().or(broken);
         let (found, needed) = (seen.cloud.len(), self.settings.min_points);
         if found < needed {
-            // The reason waits for the pair that does begin.
+            // The reason is kept until a usable pair begins the segment.
             self.broken = broken;
             return OdometryOutcome::Skipped(Lost::FewPoints { found, needed });
         }
@@ -217,12 +217,12 @@ impl<'a> StereoTracker<'a> {
         }
     }
 
-    /// Where the last waypoint is; the first is where the world begins.
+    /// The pose of the last waypoint; the identity before the first one.
     fn world_from_last(&self) -> Transform<World, Camera> {
         self.latest().map_or_else(Transform::identity, |(_, waypoint)| waypoint.world_from_camera)
     }
 
-    /// The way from `last` to `seen`.
+    /// The motion from `last` to `seen`.
     fn follow(&mut self, seen: &Seen, last: &Last) -> Result<Step, Lost> {
         let settings = self.settings;
         let seconds = (seen.stamp_ns - last.seen.stamp_ns) as f64 * 1e-9;
@@ -258,7 +258,7 @@ impl<'a> StereoTracker<'a> {
         if observations.len() < needed {
             return Err(Lost::NoConsensus { found: observations.len(), matches: sought.len(), needed });
         }
-        // What was doubted is doubted until something tells: the others may be out of view meanwhile.
+        // A doubt stays until evidence decides it: the moving points may leave the view meanwhile.
         let beside = moving.map_or(0, |moving| if moving > 0 { moving } else { self.doubted });
         if beside > 0 && !self.were_elsewhere(&observations, needed) {
             self.doubted = beside;
@@ -278,8 +278,9 @@ impl<'a> StereoTracker<'a> {
         Ok(Step { world_from_camera: guess, local, seconds, sought, observations, passed_by: beside > 0 })
     }
 
-    /// Whether enough landmarks have been at another place of the image before. What is fixed to the vehicle never has, however
-    /// sharp it is and however often it is found again.
+    /// Whether enough landmarks have been at another position of the image before.
+    ///
+    /// A part of the vehicle never has, however sharp it is and however often it is found again.
     fn were_elsewhere(&self, observations: &[(usize, Vector4<f64>, Matrix4<f64>)], needed: usize) -> bool {
         let far = self.rules().elsewhere();
         let moved = |(index, pixels, _): &&(usize, Vector4<f64>, Matrix4<f64>)| {
@@ -294,8 +295,10 @@ impl<'a> StereoTracker<'a> {
         Rules { px, confidence, draws }
     }
 
-    /// The motion that the points in common agree on, `earlier_from_later`; and where nothing moves by it, how many of the others
-    /// agree on a motion, zero where they are so few that chance may agree as well.
+    /// The motion `earlier_from_later` by RANSAC over the matches with the last pair.
+    ///
+    /// If the motion is indistinguishable from rest, the second value is the number of other points that agree on a
+    /// motion; 0 if they are too few to be significant.
     fn predicted(
         &mut self,
         seen: &Seen,
@@ -319,14 +322,14 @@ impl<'a> StereoTracker<'a> {
         if let Some((motion, before)) = &last.motion {
             guesses.push(Transform::exp(&(motion.log() * (seconds / before))));
         }
-        // The stamp tells one pair from another, however many were left out before.
+        // The stamp seeds the sampler, so that the result does not depend on skipped pairs.
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ seen.stamp_ns);
         let solvers = (&*self.stages.minimal, &*self.stages.solver);
         let best = consensus(&data, self.rig, &rules, solvers, &guesses, &mut rng);
         let found = best.as_ref().map_or(0, |best| best.inliers.len());
         let answer = match best {
             Some(best) if found >= needed => {
-                // Three points always agree on a motion; as many again do not.
+                // A minimal sample always agrees on a motion; twice as many points are significant.
                 let enough = |count: &usize| *count >= 2 * self.stages.minimal.minimum();
                 let mut moving = || Some(competitor(&best, &data, self.rig, &rules, solvers, &mut rng)).filter(enough);
                 let beside = is_still(&best, &data, self.rig, &rules).then(|| moving().unwrap_or(0));
@@ -338,7 +341,7 @@ impl<'a> StereoTracker<'a> {
         answer
     }
 
-    /// Makes `seen` part of the journey.
+    /// Adds `seen` to the trajectory.
     fn accept(&mut self, seen: Seen, step: Step) {
         let Step { world_from_camera, local, seconds, sought, observations, passed_by } = step;
         for index in sought {
@@ -348,7 +351,8 @@ impl<'a> StereoTracker<'a> {
             self.landmarks[*index].misses = 0;
         }
         let fraction = observations.len() as f64 / self.seen_by_keyframe.max(1) as f64;
-        // What passes by hides landmarks; those of other places of the image are what vouches for the ground, and are kept.
+        // A passing object hides landmarks. Landmarks from other positions of the image are the evidence for a static
+        // ground, so the key frame is kept.
         let own = fraction < self.settings.keyframe_fraction && !passed_by;
         if own {
             self.keyframe(&seen, world_from_camera, &observations);
@@ -357,7 +361,7 @@ impl<'a> StereoTracker<'a> {
             self.times.since("adjust", start);
         }
         let frame = self.frames.len() - 1;
-        // A key frame is its own reference, wherever the adjustment moved it.
+        // The pose of a key frame refers to itself, so that it follows the adjustment.
         let frame_from_camera = match own {
             true => Transform::identity(),
             false => self.frames[frame].world_from_camera.inverse() * world_from_camera,
@@ -368,7 +372,7 @@ impl<'a> StereoTracker<'a> {
         self.last = Some(Last { seen, world_from_camera: self.world_from_last(), motion });
     }
 
-    /// Makes `seen` a key frame: what it saw of the landmarks, and new ones where it saw none.
+    /// Makes `seen` a key frame: it stores the landmark observations and adds new landmarks in free areas.
     fn keyframe(
         &mut self,
         seen: &Seen,
@@ -406,7 +410,7 @@ impl<'a> StereoTracker<'a> {
         self.times.since("key frame", start);
     }
 
-    /// Adjusts the window and forgets what has left it.
+    /// Adjusts the window and drops key frames and landmarks that have left it.
     fn adjust(&mut self) {
         let end = self.frames.len();
         let window = self.settings.window;

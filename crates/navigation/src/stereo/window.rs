@@ -1,4 +1,4 @@
-//! Key frames and landmarks adjusted together.
+//! Windowed bundle adjustment over key frames and landmarks.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6x3, Vector3, Vector6};
 use seafix_geometry::{Camera, StereoRig, Transform, World};
@@ -9,16 +9,16 @@ use super::{
     pose::{MAX, SOFT},
 };
 
-/// Steps at most, those not taken among them.
+/// Maximum number of iterations, rejected steps included.
 const STEPS: usize = 10;
-/// A step that lowers the cost by a smaller share than this is the last.
+/// Convergence threshold: relative decrease of the cost.
 const MIN_GAIN: f64 = 1e-4;
 
-/// A robust bundle adjustment: the poses of the key frames from `first` on, and all landmarks that two of them saw, to
-/// the least Σ ρ(rᵀ S⁻¹ r) over all sightings, ρ Cauchy's loss. The landmarks are eliminated first (Schur complement).
-/// Key frames before `first` stand as they are and hold the rest.
+/// Robust bundle adjustment of the key frames from `first` on and of their common landmarks.
 ///
-/// Sightings that do not agree in the end are dropped.
+/// It minimises Σ ρ(rᵀ S⁻¹ r) over all observations of landmarks that at least two key frames observe, with the Cauchy
+/// loss ρ. The landmarks are eliminated first (Schur complement). Key frames before `first` are fixed and define the
+/// gauge. Observations that are outliers at the end are dropped.
 pub(super) fn adjust(rig: &StereoRig, frames: &mut [WindowKeyFrame], landmarks: &mut [Landmark], first: usize) {
     let count = frames.len() - first;
     let active: Vec<usize> = (0..landmarks.len())
@@ -75,7 +75,7 @@ pub(super) fn adjust(rig: &StereoRig, frames: &mut [WindowKeyFrame], landmarks: 
     }
 }
 
-/// Drops sightings that do not agree.
+/// Drops outlier observations.
 fn prune(rig: &StereoRig, frames: &[WindowKeyFrame], landmarks: &mut [Landmark], active: &[usize]) {
     for &index in active {
         let (anchor, at) = (landmarks[index].anchor, landmarks[index].at);
@@ -90,15 +90,15 @@ fn prune(rig: &StereoRig, frames: &[WindowKeyFrame], landmarks: &mut [Landmark],
     }
 }
 
-/// What one landmark contributes.
+/// The contribution of one landmark to the normal equations.
 struct Block {
     own: Matrix3<f64>,
     pull: Vector3<f64>,
-    /// Key frames, counted from the first free one, and how they and the landmark go together.
+    /// The free key frames that observe it, counted from the first one, each with its cross block.
     with: Vec<(usize, Matrix6x3<f64>)>,
 }
 
-/// The normal equations of all.
+/// The normal equations of all poses and landmarks.
 struct Equations {
     poses: DMatrix<f64>,
     pull: DVector<f64>,
@@ -106,7 +106,7 @@ struct Equations {
     cost: f64,
 }
 
-/// What is left for the poses, and what gives the landmarks back.
+/// The reduced system of the poses, and the terms that recover the landmarks.
 struct Reduced {
     normal: DMatrix<f64>,
     pull: DVector<f64>,
@@ -156,7 +156,7 @@ impl Equations {
             let own = view.frame == landmark.anchor;
             let here_from_anchor = if own { Transform::identity() } else { inverses[view.frame] * world_from_anchor };
             let Some(seen) = project(rig, &here_from_anchor, &landmark.at) else {
-                // Behind a camera: as bad as a sighting can be.
+                // A landmark behind a camera has a constant large cost.
                 self.cost += 1e3;
                 continue;
             };
@@ -200,7 +200,7 @@ impl Equations {
         view += block;
     }
 
-    /// The poses' equations with the landmarks eliminated, each damped in proportion to its own information.
+    /// The reduced camera system: landmarks eliminated, every diagonal damped relative to itself.
     fn reduced(&self, damping: f64) -> Option<Reduced> {
         let (mut normal, mut pull) = (self.poses.clone(), self.pull.clone());
         for k in 0..normal.nrows() {

@@ -1,4 +1,4 @@
-//! Thirteen points before the Karmin2 rig, as METHOD §3 has them.
+//! Thirteen points seen by the Karmin2 rig, as in METHOD §3.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -8,14 +8,16 @@ use seafix_geometry::{
 };
 use seafix_referencing::Observation;
 
-/// 1600×1200, f 1348.3 px, baseline 0.25 m.
+/// The rig: 1600×1200 px, f 1348.3 px, baseline 0.25 m.
 pub(crate) fn rig() -> StereoRig {
     let camera = Pinhole::new([1600, 1200], [1348.3; 2], [799.5, 599.5], &[]).expect("a camera");
     let right_from_left = Transform::exp(&[0.0, 0.0, 0.0, -0.25, 0.0, 0.0].into());
     StereoRig::new(camera, camera, right_from_left).expect("a rig")
 }
 
-/// Points over the common field at 3.25 m ± 10 %, each pixel coordinate disturbed by up to ± 0.35 px (σ 0.2).
+/// Points over the common field at 3.25 m ± 10 %, with pixel noise.
+///
+/// The noise is uniform within ± 0.35 px (σ 0.2) in each pixel coordinate.
 pub(crate) fn points(rig: &StereoRig, count: usize) -> Vec<Observation> {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let pose = Transform::<Object, Camera>::exp(&[0.4, -1.1, 0.7, 1.5, -2.0, 3.0].into());
@@ -36,7 +38,7 @@ pub(crate) fn points(rig: &StereoRig, count: usize) -> Vec<Observation> {
     (0..count).map(|_| point()).collect()
 }
 
-/// Every solver at its defaults, and those the figures name.
+/// Every solver at its defaults, and the variants of the tables.
 pub(crate) fn choices() -> Vec<(String, Choice)> {
     let plain = seafix_referencing::SOLVERS.names().map(|name| (name.to_owned(), Choice::named(name)));
     plain

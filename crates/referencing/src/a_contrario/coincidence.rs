@@ -1,4 +1,4 @@
-//! Shuffled partners in a cloud that holds the object's arrangement: that of a grid, say, whatever the pairs.
+//! Shuffled partners in a cloud that contains the object's own arrangement of points, as a grid does.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Object, Transform};
@@ -6,19 +6,22 @@ use seafix_geometry::{Camera, Object, Transform};
 use super::{CONFIDENCE, coordinates};
 use crate::{ModelPoint, Problem, candidates::chi_square};
 
-/// Motions that may map a model onto itself, a point: a ring of n points has 2n, a grid of 27 has 24.
+/// Number of motions, for each model point, that may map a model onto itself: a ring of n points has 2n, a grid of 27
+/// has 24.
 const ALIKE: f64 = 2.0;
 
-/// The expected number of sets of `size` pairs or more at this pose and those like it, were the partners of putative pairs shuffled.
+/// The expected number of sets of `size` pairs or more at one pose, for shuffled partners.
 ///
-/// The expectation over all poses takes partners to lie as densely as their neighbours do. But to shuffle them leaves the cloud as it
-/// is: where a pose puts model point i onto points of the cloud that have the share q_i of all partners, one of its m_i different
-/// partners is there with m_i q_i, and the number of points so met is a sum of independent ones. Every motion that maps the model onto itself
-/// leads to another such pose.
+/// The pose stands for its symmetric ones too.
+///
+/// The expectation over all poses assumes that partners are as dense as their neighbours. A shuffle, however, leaves
+/// the cloud unchanged. If a pose puts model point i onto cloud points with the fraction q_i of all partners, one of
+/// its m_i different partners is there with probability m_i q_i, and the number of such points is a sum of independent
+/// ones. Every motion that maps the model onto itself leads to another such pose.
 pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera: &Transform<Object, Camera>) -> f64 {
     let shuffled = Shuffled::of(problem);
     let camera_from_object = object_from_camera.inverse();
-    // P(so many points are met) of the points so far; the last of `size` or more.
+    // P(number of matched points) for the points so far; the last entry is for `size` or more.
     let mut number = vec![0.0; size + 1];
     number[0] = 1.0;
     for (i, point) in problem.model.iter().enumerate() {
@@ -34,10 +37,10 @@ pub(super) fn expected_at(problem: &Problem<'_>, size: usize, object_from_camera
     number[size] * ALIKE * problem.model.len() as f64
 }
 
-/// Putative pairs whose partners are shuffled over a cloud that stays as it is.
+/// Putative pairs with partners shuffled over an unchanged cloud.
 pub(crate) struct Shuffled<'a> {
     partners: Partners<'a>,
-    /// How often each cloud point is a partner, and all together.
+    /// Number of times that each cloud point is a partner, and their sum.
     times: Vec<f64>,
     all: f64,
 }
@@ -50,8 +53,9 @@ impl<'a> Shuffled<'a> {
         Self { partners, times, all }
     }
 
-    /// m q: the probability that one of the m partners of a model point lies where a pose puts that, q the share of all partners
-    /// there.
+    /// The probability m q that a partner of a model point lies at its place under a pose.
+    ///
+    /// m is the number of its partners, and q is the fraction of all partners at that place.
     pub(crate) fn meets(&self, model: usize, place: Vector3<f64>) -> f64 {
         let Problem { model: points, candidates, .. } = self.partners.problem;
         let own = candidates.lists[model].len() as f64;
@@ -63,14 +67,14 @@ impl<'a> Shuffled<'a> {
     }
 }
 
-/// The cloud points that are anyone's partner.
+/// The cloud points that are partners.
 struct Partners<'a> {
     problem: &'a Problem<'a>,
-    /// Their places and numbers, by the first coordinate.
+    /// Their places and indices, by the first coordinate.
     sorted: Vec<(Vector3<f64>, usize)>,
-    /// The greatest variance of one of them along any direction is not more (m²).
+    /// Upper bound of their variance along any direction (m²).
     variance: f64,
-    /// What is further away was not measured of a point (χ²₃).
+    /// Gate of a measured point about its true place (χ²₃).
     far: f64,
 }
 
@@ -83,7 +87,7 @@ impl<'a> Partners<'a> {
         Self { problem, sorted, variance, far: chi_square(3, CONFIDENCE) }
     }
 
-    /// Those that may have been measured of a point at this place.
+    /// The partners that may be measurements of a point at this place.
     fn near(&self, point: &ModelPoint, place: Vector3<f64>) -> impl Iterator<Item = usize> {
         let own = point.sigma * point.sigma;
         let reach = (self.far * (self.variance + own)).sqrt();
@@ -110,7 +114,7 @@ mod tests {
     use super::*;
     use crate::{Candidates, Tolerance};
 
-    /// The model in the cloud, and pairs that know nothing of it.
+    /// A cloud that contains the model, with random pairs.
     fn expected(model: &[Vector3<f64>], pairs: usize, size: usize, seed: u64) -> (f64, usize) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let cloud: Vec<MeasuredPoint> = model
@@ -127,10 +131,10 @@ mod tests {
         (expected_at(&problem, size, &Transform::identity()), met)
     }
 
-    /// Seen to fail where all partners have one share, and where a point has one partner only.
+    /// Fails if all partners have the same fraction, and if a point has one partner only.
     #[test]
     fn shuffled_partners_meet_a_pose_as_often_as_is_expected() {
-        // No two distances alike, so that no motion maps it onto itself.
+        // No two distances are equal, so that no motion maps the model onto itself.
         let model: Vec<Vector3<f64>> = (0..12)
             .map(f64::from)
             .map(|i| Vector3::new(0.3 * i, 0.011 * i * i * i, 1.7 * (i * i * 0.37).sin()))

@@ -1,26 +1,25 @@
-//! Of how many dimensions clutter looks.
+//! The local dimension of clutter.
 
 use super::{coordinates, sample::spread_sample};
 use crate::{Correspondence, Problem};
 
-/// The neighbours of a point that tell how the points about it thin out.
+/// Number of neighbours of a point that define its scale.
 const NEIGHBOURS: usize = 12;
-/// How far at least one looks about a point, in standard deviations of its place: nearer, noise has three dimensions of its own.
+/// Minimum radius about a point, in standard deviations of its place, since noise itself is three-dimensional.
 const REACH: f64 = 6.0;
-/// About no more points than so many is looked.
+/// Maximum number of points whose neighbours are counted.
 const SAMPLE: usize = 256;
 
-/// The dimension of the candidates that are not used: 3 where they fill space, 2 where they lie on surfaces, 1 on lines.
+/// The correlation dimension of the unused candidates: 3 for a volume, 2 for surfaces, 1 for lines.
 ///
-/// It says how the number of neighbours grows with the distance, of all points looked at together:
+/// The growth of the number of neighbours with the distance, summed over all points (Grassberger and Procaccia,
+/// *Measuring the strangeness of strange attractors*, 1983, about each point at its own scale):
 ///
 /// D = log₂ Σ_i N_i(r_i) / Σ_i N_i(r_i/2),
 ///
-/// N_i(r) the neighbours of point i nearer than r (m), r_i the distance of its twelfth, or six standard deviations of its place
-/// if that is more. `None` of fewer than 13 points, and of such that are at no place. Of more than [`SAMPLE`] those are
-/// looked at that [`spread_sample`] chooses. Time O(256 M).
-/// (The correlation dimension of Grassberger and Procaccia, *Measuring the strangeness of strange attractors*, 1983, about each
-/// point at its own scale.)
+/// N_i(r) the number of neighbours of point i nearer than r (m), r_i the distance of its twelfth, but at least six
+/// standard deviations of its place. `None` for fewer than 13 points and for places that are not finite. More than
+/// [`SAMPLE`] points are decimated by [`spread_sample`]. Time O(256 M).
 pub(crate) fn dimension(problem: &Problem<'_>, used: &[Correspondence]) -> Option<f64> {
     let mut counts = vec![false; problem.cloud.len()];
     problem.candidates.lists.iter().flatten().for_each(|&j| counts[j] = true);
@@ -75,7 +74,7 @@ mod tests {
         dimension(&problem, &used)
     }
 
-    /// Points uniform along the first `axes` of a box of four metres, `noise` along all.
+    /// Points uniform along the first `axes` of a box of four metres, with `noise` along all.
     fn spread(axes: usize, noise: f64, rng: &mut ChaCha8Rng) -> Vec<Vector3<f64>> {
         let mut of = |half: f64| if half > 0.0 { rng.random_range(-half..half) } else { 0.0 };
         (0..600).map(|_| Vector3::from_fn(|axis, _| of(if axis < axes { 2.0 } else { 0.0 }) + of(noise))).collect()
@@ -85,12 +84,12 @@ mod tests {
     fn lines_surfaces_and_space_have_one_two_and_three() {
         let rng = &mut ChaCha8Rng::seed_from_u64(5);
         for axes in 1..=3 {
-            let found = of(&spread(axes, 0.0, rng), &[]).expect("it has some");
-            // At the sides of what is filled the neighbours thin out less.
+            let found = of(&spread(axes, 0.0, rng), &[]).expect("a dimension");
+            // At the boundary the number of neighbours grows less.
             assert!((found - axes as f64).abs() < 0.1 * axes as f64, "{axes}: {found}");
         }
-        // Seven millimetres from each other along a line, and as far off it.
-        let noise = of(&spread(1, SIGMA, rng), &[]).expect("it has some");
+        // Seven millimetres apart along a line, with noise of that size across it.
+        let noise = of(&spread(1, SIGMA, rng), &[]).expect("a dimension");
         assert!(noise < 1.2, "{noise}");
     }
 
@@ -98,15 +97,15 @@ mod tests {
     fn it_does_not_depend_on_how_points_are_numbered_nor_on_those_that_are_used() {
         let rng = &mut ChaCha8Rng::seed_from_u64(6);
         let mut places = spread(2, 0.05, rng);
-        let before = of(&places, &[]).expect("it has some");
+        let before = of(&places, &[]).expect("a dimension");
         places.reverse();
-        assert!((of(&places, &[]).expect("it has some") - before).abs() < 1e-12);
+        assert!((of(&places, &[]).expect("a dimension") - before).abs() < 1e-12);
         // Four hundred points of a line, all of them used.
         let line = (0..400).map(|k| Vector3::new(1.0, 0.01 * f64::from(k), 1.0));
         let with: Vec<Vector3<f64>> = places.iter().copied().chain(line).collect();
         let used: Vec<usize> = (600..1000).collect();
         assert!((of(&with, &used).unwrap() - before).abs() < 1e-12);
-        assert!(of(&with, &[]).expect("it has some") < before - 0.3);
+        assert!(of(&with, &[]).expect("a dimension") < before - 0.3);
     }
 
     #[test]

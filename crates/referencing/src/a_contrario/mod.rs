@@ -1,36 +1,35 @@
-//! How many sets as good as the one found chance alone would give.
+//! The number of false alarms (NFA) of a set: an a-contrario test.
 //!
 //! # Null model
 //!
-//! No candidate is true: each candidate of a model point lies anywhere in its shell; without a prior
-//! anywhere in the cloud's box, as dense as the set's part of the cloud ([`Parts`](crate::parts::Parts));
-//! the partners of putative pairs are shuffled; all independent ([`Null`]). Then
+//! No candidate is true. Each candidate of a model point lies anywhere in its gate; without a prior, anywhere in the
+//! cloud's box with the density of the set's part of the cloud ([`Parts`](crate::parts::Parts)); the partners of
+//! putative pairs are shuffled. All are independent ([`Null`]). Then
 //!
-//! E = Σ_{j ≥ k} Σ over j-subsets S of model points of Π_{i∈S} m_i · P(S),
+//! NFA = Σ_{j ≥ k} Σ over j-subsets S of model points of Π_{i∈S} m_i · P(S),
 //!
-//! m_i candidates of model point i, P(S) the probability that one candidate of each makes a set that
-//! is coherent, not mirrored, and no worse: χ² per degree of freedom at most that of the set found.
+//! with m_i candidates of model point i and the probability P(S) that one candidate of each forms a set that is
+//! coherent, not mirrored, and no worse: its χ² per degree of freedom is at most that of the set found.
 //!
 //! # The probability that j points fit
 //!
-//! The clouds that a rigid motion makes of S exactly are a surface of dimension 6 in the 3j coordinates
-//! of j points; those that fit within χ² ≤ R² are its tube of radius R in whitened coordinates, and to
-//! first order in R over the set's extent
+//! The clouds that a rigid motion of S produces exactly are a surface of dimension 6 in the 3j coordinates of j points.
+//! Those that fit within χ² ≤ R² are its tube of radius R in whitened coordinates (Weyl 1939), and to first order in R
+//! over the set's extent
 //!
 //! P(S) = ∫ √det H · Π_i ρ_i(T p_i) dT · |{e ⟂ surface: ‖e‖ ≤ R, every distance within its tolerance}|,
 //!
-//! H = Σ_i J_iᵀ W J_i the information matrix of the motion, ρ_i the density of the candidates of i. The
-//! surface has proper motions only, so that mirror images are not counted; where S is nearly a line,
-//! the turn about it is bounded below by the noise ([`shape`]). The integral over translations is
-//! exact: the overlap of the shells moved to where the rotation takes them. Rotations, subsets and
-//! directions of e are sampled from fixed sequences, of the points in an order of their own: the answer is a
-//! function of the problem, whatever the numbers of its points.
+//! H = Σ_i J_iᵀ W J_i the information matrix of the motion, ρ_i the density of the candidates of i. The surface has
+//! proper motions only, so that mirror images do not count. If S is nearly collinear, the noise bounds the rotation
+//! about the line from below ([`shape`]). The integral over translations is exact: the overlap of the gates, displaced
+//! by the rotation. Rotations, subsets and directions of e are sampled from fixed sequences, of the points in a
+//! canonical order: the answer is a function of the problem and does not depend on the numbering of its points.
 //!
-//! Shuffled partners lie as densely about a place as their neighbours do, which loses what is regular in a cloud: about the pose found
-//! they are counted themselves ([`coincidence`]), and the greater number holds.
+//! The density of shuffled partners is that of their neighbours, which ignores the regularity of a cloud. Partners
+//! about the pose found are therefore counted as well ([`coincidence`]), and the greater number holds.
 //!
-//! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid
-//! point matches*, 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
+//! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid point matches*,
+//! 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
 
 mod coincidence;
 mod dimension;
@@ -54,26 +53,27 @@ use sequence::QuasiRandom;
 use shape::{Noise, Shape};
 use subsets::Subsets;
 
-/// Larger sets are counted until they add less than this share.
+/// Fraction of the sum below which the terms of larger sets are neglected.
 const NEGLIGIBLE: f64 = 0.03;
-/// At most so many sizes beyond that of the set found.
+/// Maximum number of sizes beyond that of the set found.
 const MAX_SIZES: usize = 16;
-/// Samples a model point, their greatest number, and how many pairs of points they may hold in all.
+/// Number of samples for each model point, with its limits; maximum number of point pairs in all samples.
 const SAMPLES_A_POINT: usize = 4;
 const MAX_SAMPLES: usize = 250;
 const MIN_SAMPLES: usize = 16;
 const MAX_WORK: usize = 8_000;
-/// Expectations below these are not refined: after so many samples, and after the first of many points.
+/// Expectations that are not refined: after the minimum number of samples, and after the first two.
 const IMPOSSIBLE: f64 = 1e-7;
 const HOPELESS: f64 = 1e-30;
 const FIRST_SAMPLES: usize = 2;
 
-/// The confidence of the χ² test that sets must pass.
+/// Confidence of the χ² test that sets must pass.
 const CONFIDENCE: f64 = 0.999;
 
-/// The expected number of one-to-one sets of `found.len()` pairs or more that would pass as `found` does,
-/// if no candidate were true: with any residual that the χ² test admits. Infinite below three pairs; NaN
-/// where a covariance is.
+/// The NFA of a set of this size: the expected number of sets that pass the χ² test.
+///
+/// It counts one-to-one sets of `found.len()` pairs or more if no candidate is true. Infinite below three pairs; NaN
+/// for a NaN covariance.
 pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
     if found.len() < 3 {
         return f64::INFINITY;
@@ -82,13 +82,13 @@ pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> 
     AContrario::of(problem, found).beside(anywhere)
 }
 
-/// The expected number of such sets that are as good as `found`: with at most its residual. Of frames
-/// without the object a share ε shows a set below ε of each size.
+/// The expected number of sets with at most the residual of `found`. Among frames without the object, a fraction ε
+/// shows a set with a number below ε for each size.
 pub fn expected_sets_as_good(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
     AContrario::of(problem, found).sets_as_good()
 }
 
-/// What chance gives in place of a set, each number computed where it is asked for, and once.
+/// The NFAs of a set, each computed on demand and once.
 pub(crate) struct AContrario<'a> {
     problem: &'a Problem<'a>,
     found: &'a [Correspondence],
@@ -111,8 +111,7 @@ impl<'a> AContrario<'a> {
         })
     }
 
-    /// The expected number of sets as large at the pose of these putative pairs, and at those like it: zero of pairs that are not
-    /// putative.
+    /// The NFA at the pose of these putative pairs and at its symmetric poses; zero for other pairs.
     pub(crate) fn at_their_pose(&self) -> f64 {
         *self.at_their_pose.get_or_init(|| match self.best() {
             (_, Some(pose)) if shuffled(self.problem) => expected_at(self.problem, self.found.len(), &pose),
@@ -120,32 +119,33 @@ impl<'a> AContrario<'a> {
         })
     }
 
-    /// The greater of what is expected over all poses and about this one.
+    /// The maximum of the numbers over all poses and about this one.
     fn beside(&self, anywhere: f64) -> f64 {
-        // Written so that a NaN stays one.
+        // A NaN remains NaN.
         if anywhere < 1.0 { anywhere.max(self.at_their_pose()) } else { anywhere }
     }
 
-    /// The least χ² of the pairs over rigid motions, and the motion.
+    /// The minimum χ² of the pairs over rigid motions, and the motion.
     fn best(&self) -> (f64, Option<Transform<Object, Camera>>) {
         *self.best.get_or_init(|| best(self.problem, self.found))
     }
 }
 
-/// Whether chance shuffles partners: without a prior pairs are given, and not each with each.
+/// Whether the null model shuffles partners: pairs are given without a prior, and not every possible pair.
 pub(crate) fn shuffled(problem: &Problem<'_>) -> bool {
     let lists = &problem.candidates.lists;
     problem.prior.is_none() && lists.iter().any(|list| !list.is_empty() && list.len() < problem.cloud.len())
 }
 
-/// The expected number of admissible one-to-one sets that are no worse than one given, if no candidate of
-/// the problem were true: sets of `size` pairs or more whose χ² per degree of freedom is at most
-/// `chi2`/(3·size − 6).
+/// The number of false alarms: the expected number of admissible one-to-one sets no worse than a given one, if no
+/// candidate were true.
+///
+/// A set is no worse if it has `size` pairs or more, and a χ² per degree of freedom of at most `chi2`/(3·size − 6).
 pub fn nfa(problem: &Problem<'_>, size: usize, chi2: f64) -> f64 {
     expected_about(problem, &[], size, chi2)
 }
 
-/// The same where the cloud is as dense as about these pairs; about none, as it is where most of it is.
+/// The NFA with the cloud's density about these pairs; without pairs, the density of its largest part.
 fn expected_about(problem: &Problem<'_>, pairs: &[Correspondence], size: usize, chi2: f64) -> f64 {
     if size < 3 {
         return f64::INFINITY;
@@ -161,7 +161,7 @@ fn expected_about(problem: &Problem<'_>, pairs: &[Correspondence], size: usize, 
         let halved = (j - size).min(3);
         let term = expected_of_size(problem, &frame, j, chi2 * dof(j) / dof(size), halved);
         sum += term;
-        // Not before the terms fall: among many candidates the larger sets may be the more.
+        // Only once the terms decrease: among many candidates larger sets may be more numerous.
         if term.is_nan() || (term <= NEGLIGIBLE * sum && term <= last.max(f64::MIN_POSITIVE)) {
             break;
         }
@@ -177,7 +177,7 @@ fn dof(size: usize) -> f64 {
     (3 * size - 6) as f64
 }
 
-/// What sets of all sizes have in common.
+/// The data common to sets of all sizes.
 struct Frame<'a> {
     null: Null<'a>,
     noise: Noise,
@@ -186,10 +186,11 @@ struct Frame<'a> {
     shared: f64,
 }
 
-/// The model points in an order of their own, whatever their numbers and the axes of the object: by their distance from their centroid.
+/// The model points in a canonical order, independent of their numbers and of the object's axes: by distance from the
+/// centroid.
 ///
-/// Of points equally far to seven digits, as sums in another order may differ in the last, the length of the lists decides, then the
-/// coordinates.
+/// Distances equal to seven digits (sums in another order may differ in the last) are ordered by the length of the
+/// lists, then by the coordinates.
 fn order(problem: &Problem<'_>) -> Vec<usize> {
     let at = |i: usize| problem.model[i].at.coords;
     let count = problem.model.len();
@@ -213,14 +214,14 @@ fn expected_of_size(problem: &Problem<'_>, frame: &Frame<'_>, size: usize, chi2:
     let samples = wanted.min(MAX_WORK / pairs).max(MIN_SAMPLES);
     let mut sequence = QuasiRandom::new(samples);
     let mut shape = Shape::new(problem, &frame.null, &frame.noise, size, chi2);
-    // Candidates that two model points share can serve one of them only.
+    // A candidate that two model points share can serve only one of them.
     let apart = pairs as f64 * libm::log1p(-frame.shared);
     let ln_scale = subsets.ln_tuples() + shape.ln_scale() + apart;
     let (mut sum, mut taken) = (0.0, 0);
     while taken < samples {
         sum += shape.fit_probability(subsets.next(&mut sequence), &mut sequence);
         taken += 1;
-        // How impossible the impossible is need not be known well.
+        // The size of a negligible expectation need not be accurate.
         let expected = libm::exp(ln_scale) * sum;
         let hopeless = taken == FIRST_SAMPLES && sum > 0.0 && expected < HOPELESS;
         if hopeless || (taken == MIN_SAMPLES && expected < IMPOSSIBLE) {
@@ -228,8 +229,8 @@ fn expected_of_size(problem: &Problem<'_>, frame: &Frame<'_>, size: usize, chi2:
         }
     }
     if sum == 0.0 && halved == 0 {
-        // An object that fills the cloud's box fits it by hardly a rotation, and where it was measured all the same: of so many one,
-        // barely.
+        // An object that fills the cloud's box fits it for hardly any rotation, but was measured there: one sample
+        // barely fits.
         sum = shape.barely_fits(subsets.next(&mut sequence), &mut sequence);
     }
     libm::exp(ln_scale + libm::log(sum / taken as f64))
@@ -246,7 +247,7 @@ fn shared(problem: &Problem<'_>) -> f64 {
     if different > 0.0 { (same / different).min(0.999) } else { 0.0 }
 }
 
-/// The least χ² of the pairs over rigid motions, and the motion; of those that define none, what their size allows.
+/// The minimum χ² of the pairs over rigid motions, and the motion; infinite for pairs that determine none.
 fn best(problem: &Problem<'_>, pairs: &[Correspondence]) -> (f64, Option<Transform<Object, Camera>>) {
     let data = Observations::of(pairs, problem.model, problem.cloud, None);
     if data.points.iter().any(|point| !point.is_finite()) {
@@ -261,7 +262,7 @@ fn best(problem: &Problem<'_>, pairs: &[Correspondence]) -> (f64, Option<Transfo
     }
 }
 
-/// Where a point was measured, in the camera.
+/// The measured place of a point in the camera frame.
 fn coordinates(point: &MeasuredPoint) -> Vector3<f64> {
     point.position.at.coords
 }

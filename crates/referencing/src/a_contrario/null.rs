@@ -1,4 +1,4 @@
-//! The null model: where candidates lie if none of them is true.
+//! The null model: the distribution of candidates if none of them is true.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::MeasuredPoint;
@@ -6,21 +6,21 @@ use seafix_geometry::MeasuredPoint;
 use super::{coordinates, sample::spread_sample, sequence::QuasiRandom, shuffled};
 use crate::{Correspondence, Prior, PriorBound, Problem, candidates::chi_square, parts::Parts};
 
-/// The confidence of the shells that a Gaussian prior draws, as [`crate::Gate`] has it by default.
+/// Confidence of the gates of a Gaussian prior, the default of [`crate::Gate`].
 const CONFIDENCE: f64 = 0.99;
-/// The cloud's density about a place is that of its nearest so many points, among at most so many.
+/// Number of nearest points that define a local density; maximum number of points searched.
 const NEAREST: usize = 4;
 const MAX_SAMPLED: usize = 200;
-/// Nothing is smaller (m).
+/// Minimum length (m).
 const MIN: f64 = 1e-9;
 
-/// Where the candidates of a model point lie by chance.
+/// The distribution of the candidates of a model point by chance.
 pub(super) enum Null<'a> {
-    /// Anywhere in its shell: the centre of each in the camera and its half-sizes.
+    /// Anywhere in its gate.
     Gates(Vec<GateVolume>),
-    /// Anywhere in a box of these lengths, as dense as the cloud is about the set ([`Parts`]).
+    /// Anywhere in a box of these lengths, with the cloud's density about the set ([`Parts`]).
     Box(Vector3<f64>),
-    /// Where any partner lies.
+    /// At any partner.
     Shuffled(Vec<&'a MeasuredPoint>),
 }
 
@@ -30,7 +30,7 @@ pub(super) struct GateVolume {
     pub(super) centre: Vector3<f64>,
     pub(super) half: Vector3<f64>,
     ln_volume: f64,
-    /// The density of its candidates over that which [`Null::ln_scale`] has.
+    /// The density of its candidates relative to that of [`Null::ln_scale`].
     pub(super) relative_density: f64,
 }
 
@@ -51,7 +51,7 @@ impl<'a> Null<'a> {
         Self::Shuffled(partners.into_iter().map(|j| &problem.cloud[j]).collect())
     }
 
-    /// ln of the density of a candidate that is left out of the sampled densities.
+    /// ln of the density of a candidate that the sampled densities omit.
     pub(super) fn ln_scale(&self) -> f64 {
         match self {
             Self::Gates(gates) => {
@@ -63,8 +63,8 @@ impl<'a> Null<'a> {
     }
 }
 
-/// The box of each model point. Of a Gaussian prior's ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ² it is the one
-/// of the same volume and proportions.
+/// The box of each model point. For a Gaussian prior's ellipsoid (c − p)ᵀ S⁻¹ (c − p) ≤ χ² it has the same volume and
+/// proportions.
 fn gates(problem: &Problem<'_>, prior: &Prior) -> Vec<GateVolume> {
     let camera_from_object = prior.object_from_camera.inverse();
     let gate = |(point, list): (&crate::ModelPoint, &Vec<usize>)| {
@@ -100,7 +100,7 @@ fn mean_ln_volume(gates: &[GateVolume]) -> f64 {
     }
 }
 
-/// The density (1/m³) of `cloud` about a place, of one point: (q − 1)/(N · volume to the q-th nearest).
+/// The density (1/m³) of one point of `cloud` about a place: (q − 1)/(N · volume to the q-th nearest).
 pub(super) fn density(cloud: &[&MeasuredPoint], at: &Vector3<f64>) -> f64 {
     let q = NEAREST.min(cloud.len());
     if q < 2 {
@@ -119,7 +119,7 @@ pub(super) fn density(cloud: &[&MeasuredPoint], at: &Vector3<f64>) -> f64 {
     (q - 1) as f64 / (cloud.len() as f64 * 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3))
 }
 
-/// One of the cloud points.
+/// The place of one of the cloud points.
 pub(super) fn any(cloud: &[&MeasuredPoint], sequence: &mut QuasiRandom) -> Vector3<f64> {
     coordinates(cloud[sequence.below(cloud.len())])
 }

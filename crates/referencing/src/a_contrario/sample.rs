@@ -1,14 +1,14 @@
-//! Some points of a cloud that stand for all.
+//! Representative samples of a cloud.
 
 use nalgebra::Vector3;
 use seafix_geometry::MeasuredPoint;
 
 use super::coordinates;
 
-/// Leaves at most so many of the points, evenly spaced among all by their distance from the centroid of all, in this order.
+/// Decimates the points to at most `max`, evenly spaced by distance from their centroid, in this order.
 ///
-/// So the numbers of the points do not change which they are, nor does a rigid motion of the cloud, but for points equally far from the
-/// centroid to seven digits (as sums in another order may differ in the last): of these the coordinates decide.
+/// The sample does not depend on the numbering of the points, nor on a rigid motion of the cloud, except for distances
+/// equal to seven digits (sums in another order may differ in the last), which the coordinates order.
 pub(super) fn spread_sample(cloud: &[MeasuredPoint], points: &mut Vec<usize>, max: usize) {
     let place = |j: usize| coordinates(&cloud[j]);
     let centroid = points.iter().map(|&j| place(j)).sum::<Vector3<f64>>() / points.len().max(1) as f64;
@@ -50,7 +50,7 @@ mod tests {
         spread_sample(&cloud, &mut Vec::new(), 2);
     }
 
-    /// Seen to fail where the distances are from the origin.
+    /// Fails if the distances are from the origin.
     #[test]
     fn a_motion_of_the_cloud_leaves_it() {
         let step = |k: usize| Vector3::new(0.37 * k as f64, (k * k) as f64 * 0.011, (0.7 * k as f64).sin());

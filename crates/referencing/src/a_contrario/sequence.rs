@@ -1,23 +1,23 @@
-//! Fixed sequences in place of random numbers: the same problem has the same answer.
+//! Fixed quasi-random sequences: the same problem has the same answer.
 
 use std::sync::OnceLock;
 
 use nalgebra::Vector3;
 
-/// How many points and normal numbers there are.
+/// Number of points and of normal numbers.
 const POINTS: usize = 1 << 10;
 const NORMALS: usize = 1 << 13;
-/// The positive root of x⁵ = x + 1: its powers fill a cube of four dimensions evenly (Roberts, 2018).
+/// The positive root of x⁵ = x + 1: its powers fill a four-dimensional cube evenly (Roberts, 2018).
 const ROOT: f64 = 1.167_303_978_261_418_7;
 
-/// So many of them are made at a time, when they are first asked for: most estimates need few.
+/// Number of entries computed at a time on demand, since most estimates need few.
 const CHUNK: usize = 64;
 
-/// Points of the even sequence.
+/// Points of the low-discrepancy sequence.
 struct Points {
     /// In [0, 1).
     even: [f64; CHUNK],
-    /// Over the unit sphere.
+    /// On the unit sphere.
     directions: [Vector3<f64>; CHUNK],
     /// Over all rotations: unit quaternions, scalar last.
     turns: [[f64; 4]; CHUNK],
@@ -63,13 +63,13 @@ fn normals(chunk: usize) -> &'static [f64; CHUNK] {
     })
 }
 
-/// Numbers that look random. (Steele, Lea and Flood, SplitMix, 2014.)
+/// Pseudo-random numbers (SplitMix: Steele, Lea and Flood, 2014).
 struct Bits(u64);
 
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Bits {
-    /// Those that follow so many.
+    /// The sequence after `many` numbers.
     fn after(self, many: usize) -> Self {
         Self(self.0.wrapping_add(STEP.wrapping_mul(many as u64)))
     }
@@ -81,7 +81,7 @@ impl Bits {
     }
 }
 
-/// The number that looks random after this one.
+/// The pseudo-random number after this one.
 fn mixed(number: u64) -> u64 {
     let mut z = number.wrapping_add(STEP);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -97,23 +97,23 @@ pub(super) struct QuasiRandom {
 }
 
 impl QuasiRandom {
-    /// For this many samples.
+    /// The sequence for a number of samples.
     pub(super) fn new(samples: usize) -> Self {
         Self { taken: 0, normals: 0, bits: Bits(samples as u64) }
     }
 
-    /// In [0, 1), evenly over a sequence of calls, one a sample.
+    /// A number in [0, 1), evenly distributed over a sequence of calls, one a sample.
     pub(super) fn even(&mut self) -> f64 {
         self.taken = (self.taken + 1) % POINTS;
         points(self.taken / CHUNK).even[self.taken % CHUNK]
     }
 
-    /// In [0, 1).
+    /// A pseudo-random number in [0, 1).
     pub(super) fn unit(&mut self) -> f64 {
         self.bits.unit()
     }
 
-    /// In 0..n.
+    /// A pseudo-random number in 0..n.
     pub(super) fn below(&mut self, n: usize) -> usize {
         ((self.bits.unit() * n as f64) as usize).min(n - 1)
     }
@@ -128,7 +128,7 @@ impl QuasiRandom {
         points(self.taken / CHUNK).turns[self.taken % CHUNK]
     }
 
-    /// Three independent normal numbers.
+    /// Three independent standard normal numbers.
     pub(super) fn normal3(&mut self) -> Vector3<f64> {
         self.normals = (self.normals + 3) % (NORMALS - 3);
         Vector3::from_fn(|k, _| normals((self.normals + k) / CHUNK)[(self.normals + k) % CHUNK])

@@ -1,4 +1,4 @@
-//! The probability that given model points are matched by chance: the tube about their rigid motions.
+//! The probability that given model points match by chance: the tube about their rigid motions.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -10,15 +10,15 @@ use super::{
 };
 use crate::{Problem, Tolerance};
 
-/// Nothing is measured better (m).
+/// Minimum standard deviation of a measurement (m).
 const FLOOR: f64 = 1e-9;
-/// Directions of the errors a sample of few points; of more points there is one.
+/// Number of directions of the errors in a sample of few points; one direction for more points.
 const DIRECTIONS: usize = 2;
 const FEW: usize = 5;
-/// Below this sine of a turn its second order is small; the search for its end goes so far beyond.
+/// Sine of a small rotation, whose second order is negligible; factor by which the search exceeds its end.
 const SMALL_TURN: f64 = 0.6;
 const BEYOND: f64 = 1.25;
-/// Nodes and weights of Gauss and Legendre on [0, 1].
+/// Nodes and weights of Gauss–Legendre quadrature on [0, 1].
 const LEGENDRE: [[f64; 2]; 5] = [
     [0.046_910_077_030_668, 0.118_463_442_528_094_5],
     [0.230_765_344_947_158_5, 0.239_314_335_249_683_2],
@@ -27,7 +27,7 @@ const LEGENDRE: [[f64; 2]; 5] = [
     [0.953_089_922_969_332, 0.118_463_442_528_094_5],
 ];
 
-/// How candidates are measured: one covariance for the frame.
+/// The noise of candidates: one covariance for the frame.
 pub(super) struct Noise {
     /// The mean covariance of a measured point (m²).
     measured: Matrix3<f64>,
@@ -48,7 +48,7 @@ impl Noise {
         }
         let mut measured = sum / f64::max(count, 1.0);
         if problem.prior.is_none() {
-            // How object and camera are turned against each other is not known.
+            // The rotation between object and camera is unknown.
             measured = Matrix3::identity() * (measured.trace() / 3.0);
         }
         let model = problem.model.iter().map(|point| point.sigma * point.sigma).sum::<f64>();
@@ -69,13 +69,13 @@ pub(super) struct Shape<'a> {
     problem: &'a Problem<'a>,
     null: &'a Null<'a>,
     noise: &'a Noise,
-    /// Dimensions of the tube's section, and its radius.
+    /// Dimension of the tube's section, and its radius.
     dof: f64,
     radius: f64,
-    /// ln of the tube's section, and of all else that the members share.
+    /// ln of the volume of the tube's section, with all factors common to the members.
     ln_section: f64,
-    /// The least inertia about any axis that the noise leaves: the square of h₀ = R ω_{D−1}/(ω_D (D + 1)),
-    /// the mean radius of a full tube.
+    /// Minimum inertia about any axis with noise: the square of h₀ = R ω_{D−1}/(ω_D (D + 1)), the mean radius of a full
+    /// tube.
     min_inertia: f64,
     /// The members, about their centroid.
     at: Vec<Vector3<f64>>,
@@ -121,8 +121,8 @@ impl<'a> Shape<'a> {
         }
     }
 
-    /// An estimate from one rotation and a few directions of the errors; the mean of many is P(S) but for
-    /// the [scale](Self::ln_scale).
+    /// An estimate from one rotation and a few directions of the errors; the mean of many is P(S) up to the
+    /// [scale](Self::ln_scale).
     pub(super) fn fit_probability(&mut self, set: &[usize], sequence: &mut QuasiRandom) -> f64 {
         if !self.centre(set) {
             return 0.0;
@@ -135,7 +135,7 @@ impl<'a> Shape<'a> {
         self.estimate(set, motions, sequence)
     }
 
-    /// The estimate from a rotation by which a set fits the cloud's box as barely as its errors let it; nought where there is no box.
+    /// The estimate from a rotation with which a set barely fits the cloud's box; zero without a box.
     pub(super) fn barely_fits(&mut self, set: &[usize], sequence: &mut QuasiRandom) -> f64 {
         if !(matches!(self.null, Null::Box(_)) && self.centre(set)) {
             return 0.0;
@@ -144,7 +144,7 @@ impl<'a> Shape<'a> {
         self.estimate(set, ALL_TURNS * reach.powi(3), sequence)
     }
 
-    /// Puts the members about their centroid; whether there are enough of them.
+    /// Centres the members; false if they are too few.
     fn centre(&mut self, set: &[usize]) -> bool {
         if set.len() < 3 || self.radius <= 0.0 {
             return false;
@@ -159,12 +159,12 @@ impl<'a> Shape<'a> {
         true
     }
 
-    /// The estimate where one rotation gives so many motions: their measure (m³ rad³, over the density that is left out).
+    /// The estimate from the measure of motions of one rotation (m³ rad³, up to the omitted density).
     fn estimate(&mut self, set: &[usize], motions: f64, sequence: &mut QuasiRandom) -> f64 {
         if !(motions > 0.0) {
             return 0.0;
         }
-        // Σ [x]×ᵀ W [x]×: the information of the turn.
+        // Σ [x]×ᵀ W [x]×: the information of the rotation.
         let whitened = |x: &Vector3<f64>| self.noise.whitening * x.cross_matrix();
         let turn = self.at.iter().fold(Matrix3::identity() * self.min_inertia, |sum, x| {
             let j = whitened(x);
@@ -174,13 +174,13 @@ impl<'a> Shape<'a> {
         within * turn.determinant().sqrt() * motions
     }
 
-    /// ln of what every estimate is to be multiplied by.
+    /// ln of the common factor of every estimate.
     pub(super) fn ln_scale(&self) -> f64 {
         self.ln_section
     }
 
-    /// The share of the ball of radius R in which all distances are within their tolerances: the mean of
-    /// the D-th power of how far they are along random directions.
+    /// The fraction of the ball of radius R in which all distances are within their tolerances: the mean of the D-th
+    /// power of the relative extent along random directions.
     fn within_tolerances(&mut self, set: &[usize], turn: &Matrix3<f64>, sequence: &mut QuasiRandom) -> f64 {
         let root = &self.noise.root;
         if let Tolerance::Fixed(delta) = self.problem.tolerance {
@@ -195,8 +195,7 @@ impl<'a> Shape<'a> {
         (0..directions).map(|_| along()).sum::<f64>() / directions as f64
     }
 
-    /// How far along a random direction of the errors, as a share of R, all distances stay within their
-    /// tolerances.
+    /// The extent along a random error direction, as a fraction of R, within which all distances keep their tolerances.
     fn within_tolerance(&mut self, set: &[usize], turn: &Cholesky<f64, U3>, sequence: &mut QuasiRandom) -> f64 {
         let root = &self.noise.root;
         self.errors.clear();
@@ -245,17 +244,17 @@ fn isotropic(root: &Matrix3<f64>) -> bool {
     root.m11 == root.m22 && root.m22 == root.m33 && root.m21 == 0.0 && root.m31 == 0.0 && root.m32 == 0.0
 }
 
-/// Motions that keep every member in its shell, along one direction of the turn.
+/// The measure of motions that keep every member in its gate, for one rotation axis.
 ///
-/// A turn by 2ψ about the axis w moves the members by 4 sin²ψ wᵀ I w in all, I their inertia; shells of
-/// half-sizes s allow Σ |s|². So the quaternion's vector part v = w sin ψ lies in the ellipsoid
-/// vᵀ I v ≤ Σ |s|²/4 and in the unit ball. With v = L⁻ᵀ u ϱ, u evenly over the sphere and L Lᵀ the ellipsoid's
-/// form, the measure of turns 8 dv/√(1 − v²) is 8/|L| · sin²ψ dψ du/|L⁻ᵀ u|³; along ψ by Gauss and Legendre.
-/// Translations are in the overlap of the shells.
+/// A rotation by 2ψ about the axis w moves the members by 4 sin²ψ wᵀ I w in all, I their inertia; gates of half-sizes s
+/// permit Σ |s|². The quaternion's vector part v = w sin ψ therefore lies in the ellipsoid vᵀ I v ≤ Σ |s|²/4 and in the
+/// unit ball. With v = L⁻ᵀ u ϱ, u uniform on the sphere and L Lᵀ the ellipsoid's form, the measure of rotations 8
+/// dv/√(1 − v²) is 8/|L| · sin²ψ dψ du/|L⁻ᵀ u|³; ψ is integrated by Gauss–Legendre quadrature. Translations fill the
+/// overlap of the gates.
 fn in_gates(at: &[Vector3<f64>], set: &[usize], gates: &[GateVolume], sequence: &mut QuasiRandom) -> f64 {
     let inertia = inertia(at.iter());
     let allowed = set.iter().map(|&i| gates[i].half.norm_squared()).sum::<f64>() / 4.0;
-    // The least inertia is at least 4 |I|/tr². Where it allows half a turn, both bounds are joined.
+    // The minimum inertia is at least 4 |I|/tr². If it permits half a turn, both bounds are combined.
     let free = 4.0 * inertia.determinant() < 2.0 * allowed * inertia.trace().powi(2);
     let fraction = if free { 0.25 } else { 0.0 };
     let form = (inertia + Matrix3::identity() * (fraction * allowed)) / (allowed * (1.0 + fraction));
@@ -265,7 +264,7 @@ fn in_gates(at: &[Vector3<f64>], set: &[usize], gates: &[GateVolume], sequence: 
     let length = along.norm();
     let axis = along / length;
 
-    // How far: by the ellipsoid, and by the range of the members' steps, to first order.
+    // The end of the rotation: by the ellipsoid, and by the range of the members' steps, to first order.
     let max = gates_of(set, gates).fold(Vector3::zeros(), |max: Vector3<f64>, gate| max.sup(&gate.half));
     let (mut low, mut high) = (Vector3::zeros(), Vector3::<f64>::zeros());
     for x in at {
@@ -280,7 +279,7 @@ fn in_gates(at: &[Vector3<f64>], set: &[usize], gates: &[GateVolume], sequence: 
 
     let mut sum = 0.0;
     for [node, weight] in LEGENDRE {
-        // Small turns by their sine, which costs no more than a root; full ones by their angle.
+        // Small rotations by their sine, which costs only a root; full ones by their angle.
         let (sine, cosine, measure) = if all_round {
             let (sine, cosine) = libm::sincos(FRAC_PI_2 * node);
             (sine, cosine, FRAC_PI_2)
@@ -307,7 +306,7 @@ fn gates_of<'s>(set: &'s [usize], gates: &'s [GateVolume]) -> impl Iterator<Item
     set.iter().map(|&i| &gates[i])
 }
 
-/// Any turn: the measure of all rotations.
+/// The measure of all rotations.
 const ALL_TURNS: f64 = 8.0 * PI * PI;
 
 fn turned(sequence: &QuasiRandom) -> Rotation3<f64> {
@@ -315,7 +314,7 @@ fn turned(sequence: &QuasiRandom) -> Rotation3<f64> {
     UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, i, j, k)).to_rotation_matrix()
 }
 
-/// Motions that keep every member in a box of these lengths.
+/// The measure of motions that keep every member in a box of these lengths.
 fn in_box(at: &[Vector3<f64>], lengths: &Vector3<f64>, sequence: &mut QuasiRandom) -> f64 {
     let turn = turned(sequence);
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
@@ -327,7 +326,7 @@ fn in_box(at: &[Vector3<f64>], lengths: &Vector3<f64>, sequence: &mut QuasiRando
     ALL_TURNS * (lengths - (high - low)).map(|length| length.max(0.0)).product()
 }
 
-/// Motions that bring one member onto a point of the cloud, and the density of the cloud at the others.
+/// The measure of motions that bring one member onto a cloud point, times the density at the others.
 fn among(at: &[Vector3<f64>], cloud: &[&seafix_geometry::MeasuredPoint], sequence: &mut QuasiRandom) -> f64 {
     let turn = turned(sequence);
     let anchor = sequence.below(at.len());

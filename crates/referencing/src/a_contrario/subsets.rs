@@ -1,25 +1,25 @@
-//! Subsets of model points, drawn with the weight Π m_i of their candidates.
+//! Random subsets of model points with the weight Π m_i of their candidates.
 
 use super::sequence::QuasiRandom;
 
-/// Largest table of symmetric polynomials.
+/// Maximum size of the table of symmetric polynomials.
 const MAX_TERMS: usize = 100_000;
-/// Narrower than this a number of the even sequence has no more digits to give.
+/// Interval width below which a number of the sequence has no digits left.
 const SPENT: f64 = 1e-6;
 
-/// Draws subsets of `size` of the model points that have candidates.
+/// A sampler of subsets of `size` of the model points with candidates.
 pub(super) struct Subsets {
     size: usize,
-    /// Model point and its number of candidates over the mean.
+    /// Model points with their number of candidates relative to the mean.
     points: Vec<(usize, f64)>,
-    /// e_j of the points from i on, at [i·(size + 1) + j]; empty where all weigh alike.
+    /// e_j of the points from i on, at [i·(size + 1) + j]; empty for equal weights.
     table: Vec<f64>,
     ln_tuples: f64,
     set: Vec<usize>,
 }
 
 impl Subsets {
-    /// Of model points with these numbers of candidates: what is drawn depends on the order in which they come.
+    /// A sampler for model points with these numbers of candidates; the samples depend on the order of the points.
     pub(super) fn new(lengths: impl Iterator<Item = (usize, usize)>, size: usize) -> Self {
         let mut points: Vec<(usize, f64)> = lengths.filter(|&(_, m)| m > 0).map(|(i, m)| (i, m as f64)).collect();
         let n = points.len();
@@ -31,7 +31,7 @@ impl Subsets {
             size,
             points,
             table: Vec::new(),
-            // Of unequal lists too many for the table, Maclaurin's inequality: e_k ≤ C(n, k) · mean^k.
+            // For unequal lists too many for the table, Maclaurin's inequality: e_k ≤ C(n, k) · mean^k.
             ln_tuples: ln_choose + size as f64 * libm::log(mean),
             set: Vec::with_capacity(size),
         };
@@ -80,7 +80,7 @@ impl Subsets {
             self.set.iter_mut().for_each(|place| *place = self.points[*place].0);
             return &self.set;
         }
-        // One number decodes the subset: each inclusion takes its share of the interval.
+        // One number decodes the subset: each inclusion takes its fraction of the interval.
         let (width, mut digits) = (self.size + 1, 1.0);
         for i in 0..n {
             let left = self.size - self.set.len();

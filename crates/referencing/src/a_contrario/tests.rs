@@ -53,7 +53,7 @@ fn anywhere(half: f64, m: usize, rng: &mut ChaCha8Rng) -> Frame {
     Frame { model: model(), cloud, candidates: Candidates::all(PLACES.len(), m), prior: None }
 }
 
-/// Putative pairs whose partners are shuffled: half of them in a corner.
+/// Putative pairs with shuffled partners, half of them in a corner.
 fn putative(n: usize, rng: &mut ChaCha8Rng) -> Frame {
     let model = (0..n).map(|_| ModelPoint::exact("", within(0.6, rng).into())).collect();
     let cloud = (0..n).map(|j| measured(within(if j % 2 == 0 { 0.6 } else { 2.0 }, rng), [0.01; 3])).collect();
@@ -73,7 +73,7 @@ impl Frame {
     }
 }
 
-/// The admissible sets of `size` pairs or more with at most this χ² per degree of freedom, one by one.
+/// The number of admissible sets of `size` pairs or more with at most this χ² per degree of freedom, by enumeration.
 fn count(problem: &Problem<'_>, size: usize, each: f64) -> usize {
     fn grow(problem: &Problem<'_>, size: usize, each: f64, from: usize, set: &mut Vec<Correspondence>) -> usize {
         let good = |set: &[Correspondence]| set.len() >= size && best(problem, set).0 <= each * dof(set.len());
@@ -101,7 +101,7 @@ fn threes(set: &[Correspondence]) -> Vec<[Correspondence; 3]> {
     pairs.flat_map(|(i, j)| (j + 1..n).map(move |k| [set[i], set[j], set[k]])).collect()
 }
 
-/// Observed over predicted in `frames` frames.
+/// Ratio of observed to predicted numbers in `frames` frames.
 fn ratio(size: usize, each: f64, tolerance: f64, frames: usize, mut frame: impl FnMut() -> Frame) -> f64 {
     let (mut expected, mut counted) = (0.0, 0);
     for _ in 0..frames {
@@ -140,7 +140,7 @@ fn candidates_anywhere() {
     }
 }
 
-/// The same frame with its points in any other order.
+/// The same frame with its points in a random order.
 fn renumbered(frame: &Frame, rng: &mut ChaCha8Rng) -> Frame {
     let mut shuffled = |n: usize| {
         let mut order: Vec<usize> = (0..n).collect();
@@ -163,7 +163,7 @@ fn renumbered(frame: &Frame, rng: &mut ChaCha8Rng) -> Frame {
     }
 }
 
-/// What is expected does not depend on the numbers of the points.
+/// The NFA does not depend on the numbering of the points.
 #[test]
 fn an_order_of_the_points_is_as_good_as_another() {
     let mut rng = ChaCha8Rng::seed_from_u64(17);
@@ -190,9 +190,9 @@ fn an_order_of_the_points_is_as_good_as_another() {
     }
 }
 
-/// Nor, of shuffled partners, where the camera's frame has its origin.
+/// The NFA of shuffled partners does not depend on the origin of the camera's frame.
 ///
-/// Seen to fail where partners are chosen by a hash of their coordinates.
+/// Fails if partners are selected by a hash of their coordinates.
 #[test]
 fn a_translation_of_the_cloud_changes_nothing() {
     let mut rng = ChaCha8Rng::seed_from_u64(18);
@@ -232,9 +232,9 @@ fn few_pairs_and_impossible_noise() {
     assert!(expected_sets_as_good(&frame.problem(0.05), &pairs).is_nan());
 }
 
-/// Nothing but the object is measured, so that the cloud's box is the object's: no rotation that is drawn fits.
+/// Only the object is measured, so that the cloud's box is the object's: no sampled rotation fits.
 ///
-/// Seen to fail where what none of the rotations drawn fits is impossible.
+/// Fails if a set that fits no sampled rotation counts as impossible.
 #[test]
 fn an_object_that_fills_its_cloud_is_no_impossible_accident() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);

@@ -1,4 +1,4 @@
-//! Whether the object is there at all.
+//! The test of the object's presence.
 
 use std::cell::OnceCell;
 
@@ -8,13 +8,13 @@ use crate::{
     a_contrario::{AContrario, dimension},
 };
 
-/// What is asked of a frame before the object is believed to be there.
+/// The test of the object's presence, with the data that it needs.
 pub(super) struct Absence<'a> {
     judge: &'a Judge<'a>,
     found: &'a Identification,
     probabilities: &'a PosteriorProbabilities,
     a_contrario: &'a AContrario<'a>,
-    /// Looked at where it decides, and once.
+    /// Computed on demand, and once.
     fills_space: OnceCell<bool>,
     rare: OnceCell<bool>,
 }
@@ -29,15 +29,16 @@ impl<'a> Absence<'a> {
         Self { judge, found, probabilities, a_contrario, fills_space: OnceCell::new(), rare: OnceCell::new() }
     }
 
-    /// Why the object is not believed to be there when its absence has this probability; `None` where it is.
+    /// The rejection at this probability of absence; `None` if the object is accepted as present.
     ///
-    /// A pattern that looks like the object is no chance: how sure its odds are does not depend on where clutter lies. And shuffled
-    /// partners that often make a set as large at this very pose are an absence that the evidence does not know of.
+    /// A repeated pattern that resembles the object is no random set: its probability does not depend on the
+    /// distribution of the clutter, so it has a limit of its own. Randomly permuted candidates that often yield a set
+    /// as large at this pose are a kind of absence that the evidence does not model.
     pub(super) fn refusal(&self, absent: f64) -> Option<RejectionReason> {
         let (min, max) = self.limits();
         let a_contrario = absent - self.probabilities.alike;
         let limit = if min < max && a_contrario > min && self.fills_space() { max } else { min };
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         let likely = a_contrario <= limit && absent <= max;
         if (likely && self.a_contrario.at_their_pose() <= limit) || self.is_rare() {
             return None;
@@ -50,41 +51,40 @@ impl<'a> Absence<'a> {
         Some(RejectionReason::Absent { probability, limit })
     }
 
-    /// The largest probability of absence with which any pose is believed.
+    /// The largest probability of absence at which a pose can be accepted.
     pub(super) fn max(&self) -> f64 {
         self.limits().1
     }
 
-    /// The largest probabilities of absence with which a pose is believed: where clutter lies on lines and surfaces, and
-    /// where it fills space; of models as small as the limit is stated for they are one.
+    /// The limits of the probability of absence: for clutter on lines and surfaces, and for clutter that fills space.
     ///
-    /// Every number of visible points is equally likely beforehand, so that of a larger model each has less, and clutter
-    /// that fills space shows a stated evidence the more seldom. On lines and surfaces the evidence, a sum of as many terms
-    /// as points are visible, is too sure by something of each: the more, the larger the model.
+    /// Both are equal for models up to the reference size. Every number of visible points has the same prior
+    /// probability, so each is less probable for a larger model, and clutter that fills space reaches a given evidence
+    /// less often. On lines and surfaces each visible point's term of the evidence is overestimated, so the excess
+    /// grows with the model.
     fn limits(&self) -> (f64, f64) {
         let larger = (self.judge.problem.model.len() + 1) as f64 / STATED_FOR;
         let stated = self.judge.acceptance.absence;
         if larger <= 1.0 {
             return (stated, stated);
         }
-        // The lesser by its odds: of what is stated to be hardly a limit at all, so little is asked of any model.
+        // The lower limit scales the odds, so that a stated limit near one remains near one for every model.
         let odds = stated / (1.0 - stated) / (larger * larger * larger.sqrt());
         (odds / (1.0 + odds), (stated * larger).min(MAX_ABSENCE.max(stated)))
     }
 
-    /// Whether the candidates that are not the object's fill space, as the evidence takes clutter to do.
+    /// Whether the clutter fills space, as the evidence assumes.
     fn fills_space(&self) -> bool {
         let fills = || dimension(self.judge.problem, &self.found.pairs).is_some_and(|of| of >= FILLS_SPACE);
         *self.fills_space.get_or_init(fills)
     }
 
-    /// Whether chance gives sets as good so rarely that the pose is believed although absence is not as improbable as it
-    /// should be.
+    /// Whether a small NFA justifies the pose despite a probability of absence above its limit.
     ///
-    /// The probability of absence takes every number of visible points to be equally likely, which of a large model makes
-    /// few visible ones improbable beforehand; chance is counted without. Only of putative pairs whose points fill space is
-    /// its count good enough for that: partners that were shuffled lie wherever the cloud does, while clutter in shells lies
-    /// on edges that look like the object's.
+    /// The probability of absence assigns the same prior to every number of visible points, which makes few visible
+    /// points of a large model improbable; the NFA makes no such assumption. It is reliable enough only for putative
+    /// pairs whose cloud fills space: permuted candidates lie wherever the cloud does, while clutter within gates lies
+    /// on edges that resemble the object's.
     fn is_rare(&self) -> bool {
         let Problem { cloud, candidates, prior, .. } = self.judge.problem;
         let acceptance = self.judge.acceptance;
@@ -99,14 +99,14 @@ impl<'a> Absence<'a> {
     }
 }
 
-// These four are no settings: they belong to the scale on which `acceptance.absence` and `acceptance.rare` are stated, and were
-// chosen with their defaults on drawn problems. Whoever wants to be stricter or laxer moves those two.
+// These four constants are not settings: they define the scale of `acceptance.absence` and `acceptance.rare` and were
+// chosen with those defaults on generated problems. Change those two for a stricter or laxer test.
 
-/// An object is not believed whose absence is more probable than this.
+/// Largest probability of absence at which a small NFA can accept an object.
 const IMPROBABLE: f64 = 0.05;
-/// The greatest limit of the probability of absence, whatever the model.
+/// Upper bound of the limit of the probability of absence, for every model.
 const MAX_ABSENCE: f64 = 0.01;
-/// Clutter of fewer dimensions lies on lines and surfaces.
+/// Smallest dimension of clutter that fills space; below it clutter lies on lines and surfaces.
 const FILLS_SPACE: f64 = 2.3;
-/// The number of points, and one, of the models that [`Acceptance::absence`](super::Acceptance::absence) is stated for.
+/// Number of model points plus one for which [`Acceptance::absence`](super::Acceptance::absence) is stated.
 const STATED_FOR: f64 = 9.0;

@@ -1,46 +1,53 @@
-//! When a pose is believed.
+//! The limits of the acceptance tests.
 
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
-/// When an identified set is believed.
+/// The limits of the tests by which an identified set becomes a fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Acceptance {
-    /// Least number of identified points.
+    /// Minimum number of identified points, 3 or more.
     pub min_points: usize,
-    /// Largest expected number of chance sets of the found size (a-contrario acceptance); of searches that weigh evidence, of
-    /// those that are as good as the found one.
+    /// Largest number of false alarms (NFA): the expected number of random sets of the same size.
+    ///
+    /// For a search that weighs evidence, it counts random sets as good as the one found.
     pub max_nfa: f64,
-    /// Largest probability, by a search that weighs evidence, that the object is not there at all; of a model of eight
-    /// points. Of a larger one, of n points, (n + 1)/9 times as much, a hundredth at most, where the cloud fills space: its
-    /// evidence comes about by chance so much more seldom. Where the cloud lies on lines and surfaces, of less than 2.3
-    /// dimensions by the distances of neighbours, odds of ((n + 1)/9)^2.5 times less: there each point's evidence is too sure
-    /// by something. A pattern that looks like the object is held to the former wherever clutter lies.
+    /// Largest posterior probability of the object's absence, for a model of eight points; used by searches that weigh
+    /// evidence.
+    ///
+    /// For a larger model of n points the limit depends on the clutter. If the cloud fills space, the limit is (n +
+    /// 1)/9 times larger, at most 0.01, since random evidence is that much rarer. If the cloud lies on lines and
+    /// surfaces (less than 2.3 dimensions, by the distances of neighbours), the odds are ((n + 1)/9)^2.5 times smaller,
+    /// since each point's evidence is overestimated there. A repeated pattern that resembles the object has the former
+    /// limit in every cloud.
     pub absence: f64,
-    /// Of putative pairs without a prior whose cloud fills space: largest expected number of chance sets as good as the one
-    /// found with which a pose is believed whose object is absent with a probability of more than that, but of a twentieth
-    /// at most.
+    /// Largest NFA at which a pose is accepted although its probability of absence exceeds [`absence`](Self::absence).
+    ///
+    /// It applies to putative pairs without a prior whose cloud fills space; the probability of absence must be at most
+    /// 0.05.
     pub rare: f64,
-    /// Largest probability, by a search that weighs evidence, that a present object is elsewhere.
+    /// Largest posterior probability that a present object has another pose; used by searches that weigh evidence.
     pub doubt: f64,
-    /// Confidence of the χ² tests of residuals and prior: a true set fails with one minus this.
+    /// Confidence of the χ² tests of residuals and prior; a correct set fails with one minus this probability.
     pub confidence: f64,
-    /// Poses further apart than this (m, RMS over the model points), or than [`alert_fraction`](Self::alert_fraction) of the
-    /// model's diameter if that is less, are different answers; a pose that by its own covariance may be off
-    /// by as much is none, and one of four points or more that is off by so much should any one of them be a wrong match
-    /// ([`RejectionReason::Hinge`](super::RejectionReason::Hinge)).
+    /// Alert limit: the distance (m, RMS over the model points) beyond which two poses are different answers.
+    ///
+    /// A pose whose error may exceed the limit by its covariance (two sigma) is rejected. So is a pose of four points
+    /// or more that one wrong match could move beyond it ([`RejectionReason::Hinge`](super::RejectionReason::Hinge)).
+    /// The fraction [`alert_fraction`](Self::alert_fraction) of the model's diameter replaces the limit if that is
+    /// smaller.
     pub alert_limit: f64,
-    /// The share of the model's diameter that limits it where that is less.
+    /// Alert limit as a fraction of the model's diameter; the smaller of it and [`alert_limit`](Self::alert_limit)
+    /// applies.
     pub alert_fraction: f64,
-    /// A pose whose attitude may be off by as much (rad) by its own covariance, two standard deviations of its worst axis,
-    /// is none.
+    /// Largest attitude error (rad), two standard deviations of the worst axis; a less precise pose is rejected.
     pub attitude_limit: f64,
-    /// With what probability a protection level may be exceeded.
+    /// Integrity risk: the probability with which an error may exceed its protection level.
     pub risk: f64,
-    /// Share of believed sets that hold one wrong match, as protection levels assume it.
+    /// Assumed fraction of accepted sets with one wrong match; the protection levels depend on it.
     pub wrong_match_rate: f64,
-    /// Share of believed sets that hold two wrong matches, as protection levels assume it; of none where it is nought.
+    /// Assumed fraction of accepted sets with two wrong matches; zero excludes the case from the protection levels.
     pub two_wrong_rate: f64,
 }
 
@@ -64,14 +71,15 @@ impl Default for Acceptance {
 }
 
 impl Acceptance {
-    /// What is wrong with the settings, if something is.
+    /// Checks the range of every setting.
     ///
     /// # Errors
-    /// The first setting out of its range, and the range.
+    ///
+    /// The first invalid setting, with its range.
     pub fn check(&self) -> Result<(), String> {
         let check = || {
             in_range(self.min_points >= 3, "min-points", self.min_points, "3 or more")?;
-            // Written so that a NaN is refused too.
+            // A NaN is rejected as well.
             let budget = self.max_nfa > 0.0 && self.max_nfa.is_finite();
             in_range(budget, "max-nfa", self.max_nfa, "a positive number")?;
             for (name, value) in [("absence", self.absence), ("rare", self.rare), ("doubt", self.doubt)] {
@@ -88,9 +96,9 @@ impl Acceptance {
             let risk = self.risk > 0.0 && self.risk < 1.0;
             in_range(risk, "risk", self.risk, "a probability between 0 and 1")?;
             let rate = self.wrong_match_rate > 0.0 && self.wrong_match_rate <= 1.0;
-            in_range(rate, "wrong-match-rate", self.wrong_match_rate, "a share above 0, at most 1")?;
+            in_range(rate, "wrong-match-rate", self.wrong_match_rate, "a fraction above 0, at most 1")?;
             let two = self.two_wrong_rate >= 0.0 && self.two_wrong_rate <= 1.0;
-            in_range(two, "two-wrong-rate", self.two_wrong_rate, "a share from 0 to 1")
+            in_range(two, "two-wrong-rate", self.two_wrong_rate, "a fraction from 0 to 1")
         };
         check().map_err(|message| format!("acceptance: {message}"))
     }

@@ -1,4 +1,4 @@
-//! Which model points a measured point may be when a set is read otherwise.
+//! The model points that a measured point may be under another assignment.
 
 use std::collections::BTreeMap;
 
@@ -7,35 +7,38 @@ use nalgebra::Matrix3;
 use super::judge::Judge;
 use crate::{Correspondence, PriorBound, a_contrario::shuffled, candidates::chi_square};
 
-/// A point of a reading may lie so many standard deviations of its measurement outside a box;
+/// Tolerance at the edge of a box prior, in standard deviations of the measurement.
 const BOX_EDGE: f64 = 4.0;
-/// of a Gaussian prior outside the ellipsoid of the lesser and inside that of the greater of these confidences.
+/// Confidences at the edge of a Gaussian prior: outside the first ellipsoid and inside the second.
 const GAUSSIAN_EDGE: [f64; 2] = [0.9, 0.9999];
 
-/// Where a measured point lies by the shell of a model point.
+/// The position of a measured point relative to the gate of a model point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum GatePosition {
     Inside,
-    /// Outside, by no more than noise may do.
+    /// Outside, but within the tolerance for noise.
     Edge,
     Outside,
 }
 
-/// Of larger models proposed pairs are taken at their word: to read them otherwise takes n² pairs of model points.
+/// Maximum number of model points for which proposed labels are questioned; another assignment requires n² pairs of
+/// model points.
 const MAX_MISLABELED: usize = 100;
 
 /// The model points that each measured point of a set may be.
 pub(super) struct Admitted {
-    /// Of each measured point, by its number in the cloud.
+    /// The model points by the index of the measured point in the cloud.
     pub(super) models: BTreeMap<usize, Vec<usize>>,
-    /// Whether candidates were proposed by more than a prior, so that the model points may be others than those proposed.
+    /// Whether a source other than the prior proposed the candidates; labels may then be mistaken.
     pub(super) proposed: bool,
 }
 
 impl Judge<'_> {
-    /// The model points that each measured point of a set may be: its candidates, and those that a prior only just excludes. That
-    /// one of many points falls outside its shell by its noise does not exclude a pose that the prior as a whole allows. Where
-    /// candidates were proposed by more than a prior, all that it allows: what proposes may mistake a point for its like.
+    /// The admissible model points of each measured point of a set: candidates, and those that a prior barely excludes.
+    ///
+    /// One point outside its gate by noise does not exclude a pose that the complete prior allows. If a source other
+    /// than the prior proposed the candidates, every model point that the prior allows is admitted, since the proposer
+    /// may confuse similar points.
     pub(super) fn admitted(&self, pairs: &[Correspondence]) -> Admitted {
         let lists = &self.problem.candidates.lists;
         let camera_from_object = self.problem.prior.map(|prior| prior.object_from_camera.inverse());
@@ -67,11 +70,11 @@ impl Judge<'_> {
             }
         };
         let listed = |model: usize, cloud: usize| lists[model].binary_search(&cloud).is_ok();
-        // Without a prior there are no shells.
+        // There are no gates without a prior.
         let gates = places.len();
         let by_gates = |cloud: usize| (cloud, (0..gates).map(|model| place_of(model, cloud)).collect());
         let placed: Vec<(usize, Vec<GatePosition>)> = pairs.iter().map(|pair| by_gates(pair.cloud)).collect();
-        // Where a shell holds what is no candidate, the candidates were proposed by more than the prior.
+        // A gate with a point that is no candidate shows that another source proposed the candidates.
         let proposed = shuffled(self.problem)
             || placed.iter().any(|(cloud, places)| {
                 let mut inside = (0..gates).filter(|&model| places[model] == GatePosition::Inside);
@@ -91,7 +94,7 @@ impl Judge<'_> {
     }
 }
 
-/// The model points that list each measured point of a set.
+/// The model points that list each measured point of a set as a candidate.
 fn listing(lists: &[Vec<usize>], pairs: &[Correspondence]) -> BTreeMap<usize, Vec<usize>> {
     let mut models: BTreeMap<usize, Vec<usize>> = pairs.iter().map(|pair| (pair.cloud, Vec::new())).collect();
     for (model, list) in lists.iter().enumerate() {

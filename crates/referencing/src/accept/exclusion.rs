@@ -1,26 +1,25 @@
-//! Sets that fit no rigid motion, without their badly measured pairs.
+//! The exclusion of badly measured pairs from sets that fail the residual test.
 
 use std::collections::BTreeSet;
 
 use super::{hypothesis::Hypothesis, judge::Judge};
 use crate::Correspondence;
 
-/// One pair in so many may be left out.
+/// Number of pairs per excluded pair.
 const EXCLUDABLE: usize = 5;
-/// So many sets are thinned, the likeliest.
+/// Maximum number of sets, the best first, that are thinned.
 const MAX_SETS: usize = 64;
-/// Larger sets are not thinned: every way of leaving out a pair is one fit of all the others.
+/// Maximum number of pairs of a thinned set; each exclusion requires one fit of all other pairs.
 const MAX_POINTS: usize = 50;
 
 impl Judge<'_> {
-    /// What is left of sets that fell at the residuals, the likeliest of which stand first, when
-    /// their worst pairs are left out. A pair may agree with the distances of the others and still be
-    /// badly measured: a corner before a distant ground, say.
+    /// The subsets of failed sets that pass without their worst pairs; `fallen` is ordered by falling score.
     ///
-    /// As few pairs are left out as let the residuals pass, at most one in five, so that at least
-    /// four points bear witness. Every way of leaving out the last one that passes is given, each
-    /// tested against chance anew: their poses, and those of the sets that passed whole, may
-    /// contradict each other. No other test is helped by leaving pairs out.
+    /// A pair may agree with the distances of the others and still be badly measured, for example a corner in front of
+    /// a distant background. The smallest number of pairs is excluded that passes the residual test, at most one in
+    /// five, so that at least four points remain. Every choice of the last excluded pair that passes is returned, and
+    /// each is tested against its NFA again: their poses, and those of complete sets, may contradict each other.
+    /// Exclusion serves the residual test only.
     pub(super) fn thinned(&self, fallen: &[Hypothesis]) -> Vec<Hypothesis> {
         let mut known = BTreeSet::new();
         let sets = fallen.iter().filter(|hypothesis| hypothesis.pairs.len() <= MAX_POINTS).take(MAX_SETS);

@@ -1,13 +1,12 @@
-//! When nothing is found: shells that grow, then vanish.
+//! Expanding gates: the search is repeated with larger gates, then without a prior.
 
 use super::{Attempt, Outcome, RejectionReason};
 use crate::{Prior, PriorBound, Rejected};
 
-/// By how much the shells grow, in turn, before they vanish.
+/// Growth factors of the gates, in order.
 const GROWTH: [f64; 2] = [2.0, 4.0];
 
-/// The priors to seek from in turn where an object may have been displaced: the same with shells twice and four times as
-/// large, then none.
+/// The wider priors for a displaced object, in order: gates twice and four times as large, then none.
 pub fn wider(prior: &Prior) -> Vec<Option<Prior>> {
     let grown = |by: f64| {
         let mut bound = prior.bound.clone();
@@ -20,10 +19,10 @@ pub fn wider(prior: &Prior) -> Vec<Option<Prior>> {
     GROWTH.map(grown).into_iter().chain([None]).collect()
 }
 
-/// An attempt from one prior after the other, until one finds something: a pose, or several between which the data do
-/// not decide. Where none does, the refusal is that of the first.
+/// The first attempt with a pose, or with several alternatives, over successively wider priors.
 ///
-/// A wider prior says less, so that its poses need more evidence; and every further look is one more chance to be wrong.
+/// If all fail, the rejection of the first attempt is returned. A wider prior carries less information, so its poses
+/// require more evidence, and every further attempt is another opportunity for a false fix.
 pub fn search_with_expanding_gates(
     first: Attempt,
     prior: Option<&Prior>,
@@ -33,7 +32,9 @@ pub fn search_with_expanding_gates(
     wider(prior).iter().map(|prior| seek(prior.as_ref())).find(|attempt| !nothing(&attempt.outcome)).unwrap_or(first)
 }
 
-/// Whether the object was not found where it was sought. What ended at a budget or cannot be a pose says nothing of that.
+/// Whether the object was not found in the gates.
+///
+/// An exhausted budget and a degenerate pose do not show that.
 fn nothing(outcome: &Outcome) -> bool {
     match outcome {
         Outcome::Fix(_) | Outcome::Ambiguous(_) | Outcome::Degenerate(_) => false,

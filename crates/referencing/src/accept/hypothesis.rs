@@ -1,24 +1,24 @@
-//! A set of pairs with the pose it leads to.
+//! A hypothesis: a set of pairs and its pose.
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use super::{Alternative, RejectionReason};
 use crate::{Correspondence, Degenerate, solve::likelihood::Likelihood};
 
-/// A set with its pose.
+/// A set of pairs with its pose.
 #[derive(Clone)]
 pub(super) struct Hypothesis {
     pub(super) pairs: Vec<Correspondence>,
-    /// What the solver says.
+    /// The solver's pose.
     pub(super) pose: Transform<Object, Camera>,
-    /// The most likely pose near it, and how well that explains the pairs.
+    /// The maximum-likelihood pose nearby, with its cost.
     pub(super) likelihood: Likelihood,
-    /// As [`Alternative::score`].
+    /// The score, as [`Alternative::score`].
     pub(super) score: f64,
-    /// The covariance of `pose`, once it was asked for.
+    /// The covariance of `pose`, once computed.
     pub(super) covariance: Option<Covariance6<Object, Camera>>,
-    /// Other poses of the same pairs that are as likely, the likeliest first ([`Solver::alternatives`](crate::Solver::alternatives)): with
-    /// one the pose is ambiguous.
+    /// Other poses of the same pairs with a similar likelihood, the best first
+    /// ([`Solver::alternatives`](crate::Solver::alternatives)); any alternative makes the pose ambiguous.
     pub(super) alternatives: Vec<Alternative>,
 }
 
@@ -28,12 +28,12 @@ impl Hypothesis {
     }
 }
 
-/// The likeliest first; of equals the first in the order of the pairs.
+/// The order by falling score; equal scores are ordered by their pairs.
 pub(super) fn by_score(a: &Hypothesis, b: &Hypothesis) -> std::cmp::Ordering {
     b.score.total_cmp(&a.score).then_with(|| a.pairs.cmp(&b.pairs))
 }
 
-/// Why a hypothesis falls.
+/// The reason for which a hypothesis fails.
 pub(super) enum Fallen {
     Refused(RejectionReason),
     Degenerate(Degenerate),

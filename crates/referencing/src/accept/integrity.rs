@@ -1,4 +1,4 @@
-//! How far off a fix may be, wrong matches included.
+//! The integrity of a fix: protection levels that include wrong matches.
 
 use nalgebra::Matrix3;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
@@ -10,21 +10,23 @@ use crate::{
     solve::{leave_out::Deletions, scale_error::isotropic},
 };
 
-/// What the number of points allows to know of a wrong match. A grade of the count alone, as three points are monitored by
-/// nothing whatever they are: whether these very points allow it, four in a row say, is told by the separation
-/// and the protection levels, which are none where a point cannot be spared.
+/// The grade of redundancy for wrong matches, by the number of points.
+///
+/// The grade depends on the number alone, since any three points fit. Whether these particular points allow an
+/// exclusion (four in a row do not) follows from solution separation and protection levels: both are `None` if a point
+/// is indispensable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Redundancy {
-    /// Three points: any three fit, nothing would show.
+    /// Three points: any three fit, so a wrong match is undetectable.
     Unmonitored,
-    /// Four: that one is wrong would show, not which.
+    /// Four points: a wrong match is detectable, but not identifiable.
     Detectable,
-    /// Five and more: the wrong one can be told and left out.
+    /// Five points or more: the wrong match is identifiable and can be excluded.
     Excludable,
 }
 
 impl Redundancy {
-    /// The grade of so many points.
+    /// The grade of a number of points.
     pub fn of(points: usize) -> Self {
         match points {
             0..=3 => Self::Unmonitored,
@@ -33,7 +35,7 @@ impl Redundancy {
         }
     }
 
-    /// Its name in files.
+    /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Unmonitored => "unmonitored",
@@ -43,96 +45,107 @@ impl Redundancy {
     }
 }
 
-/// Radii that the errors of a fix exceed with no more than the stated risk.
+/// Protection levels: radii that the errors of a fix exceed with at most the stated risk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Protection {
-    /// Of the camera's position in the object frame (m).
+    /// The level of the camera's position in the object frame (m).
     pub position: f64,
-    /// Of the attitude (rad).
+    /// The level of the attitude (rad).
     pub attitude: f64,
 }
 
 impl Protection {
-    /// The radii that a fix with this covariance exceeds with such a probability each, where all of its points are right.
+    /// The fault-free radii: errors with this covariance exceed each with the given probability.
     pub(super) fn quiet(covariance: &Covariance6<Object, Camera>, probability: f64) -> Self {
         let (position, attitude) = semi_axes(covariance);
         let quiet = radius(probability);
         Self { position: quiet * position, attitude: quiet * attitude }
     }
 
-    /// Raised so that it holds of another pose, known as well as `quiet` says, too.
+    /// Raises the levels to cover another pose with the same precision as `quiet`.
     pub(super) fn cover(&mut self, quiet: &Self, fix: &Transform<Object, Camera>, other: &Transform<Object, Camera>) {
         let (moved, turned) = apart(fix, other);
         *self = self.max(&Self { position: moved + quiet.position, attitude: turned + quiet.attitude });
     }
 
-    /// The greater radii of two.
+    /// The larger radii of two.
     pub(super) fn max(&self, other: &Self) -> Self {
         Self { position: self.position.max(other.position), attitude: self.attitude.max(other.attitude) }
     }
 }
 
-/// How far apart two poses have the camera: its position (m) and attitude (rad).
+/// The distance between two camera poses: position (m) and attitude (rad).
 fn apart(one: &Transform<Object, Camera>, other: &Transform<Object, Camera>) -> (f64, f64) {
     let moved = (one.translation() - other.translation()).norm();
     (moved, so3::angle(&(one.rotation().inverse() * other.rotation())))
 }
 
-/// What supports a fix beyond its covariance.
+/// The integrity of a fix beyond its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Integrity {
-    /// What the number of points allows to know.
+    /// The grade of redundancy by the number of points.
     pub redundancy: Redundancy,
-    /// χ² of the residuals at the most likely pose.
+    /// χ² of the residuals at the maximum-likelihood pose.
     pub chi2: f64,
-    /// Its degrees of freedom, 3k − 6.
+    /// The degrees of freedom of χ², 3k − 6.
     pub dof: usize,
-    /// The χ² that a true set exceeds with one minus the confidence.
+    /// The limit of χ², which a correct set exceeds with probability one minus the confidence.
     pub chi2_limit: f64,
-    /// Solution separation: the farthest that the position moves (m) when one point is left out; `None` with fewer
-    /// than four points, or where one cannot be spared.
+    /// Solution separation: the largest shift of the position (m) when one point is excluded.
+    ///
+    /// `None` with fewer than four points, or if a point is indispensable.
     pub solution_separation: Option<f64>,
-    /// The same when two points are left out; `None` with fewer than five points, where two cannot be spared, or where
-    /// [`Acceptance::two_wrong_rate`] is nought.
+    /// Solution separation (m) when two points are excluded.
+    ///
+    /// `None` with fewer than five points, if two points are indispensable, or if [`Acceptance::two_wrong_rate`] is
+    /// zero.
     pub solution_separation_two: Option<f64>,
-    /// The probability that the pose is another, farther off than the alert limit, as most of the points are others than those of the
-    /// fix, or that the object is not there at all, by a search that weighs evidence; `None` of one that counts, which does not
-    /// say.
+    /// The posterior probability of a wrong pose or of an absent object.
+    ///
+    /// A pose is wrong if it differs from the truth by more than the alert limit; it then has mostly other pairs than
+    /// the fix. `None` for a search that does not weigh evidence.
     pub misidentified: Option<f64>,
-    /// Protection levels at [`Acceptance::risk`]; `None` where nothing can vouch for the fix (three points, or a point
-    /// that cannot be spared), or where [`misidentified`](Self::misidentified) exceeds that risk.
+    /// The protection levels at [`Acceptance::risk`].
+    ///
+    /// `None` without redundancy (three points, or an indispensable point), or if
+    /// [`misidentified`](Self::misidentified) exceeds the risk.
     pub protection: Option<Protection>,
-    /// Whether what was measured is as large as the model says; `None` with fewer than four points, any three of which fit.
+    /// The scale error between measurement and model; `None` with fewer than four points, since any three fit.
     pub scale_error: Option<ScaleError>,
 }
 
-/// How far the fix moves when points are left out, and what that protects.
+/// Solution separation and the protection levels that follow from it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Separation {
-    /// Farthest move of the position (m) without one point; `None` with fewer than four, or where one cannot be spared.
+    /// The largest shift of the position (m) without one point; `None` with fewer than four, or if one is
+    /// indispensable.
     pub(super) one: Option<f64>,
-    /// Without two; `None` with fewer than five, or where two wrong matches are not assumed to happen.
+    /// The largest shift without two points; `None` with fewer than five, or if two wrong matches are assumed
+    /// impossible.
     pub(super) two: Option<f64>,
-    /// The levels.
+    /// The protection levels.
     pub(super) protection: Option<Protection>,
-    /// See [`Integrity::stretch`].
+    /// The scale error, as [`Integrity::scale_error`].
     pub(super) scale_error: Option<ScaleError>,
-    /// The point that the pose hangs on most: its place in the set, and by how much the model points that the fix transfers are
-    /// off if it is a wrong match (m, RMS, one sigma); infinitely far where it cannot be spared. `None` with fewer than four.
+    /// The most critical point: its index in the set, and the error of the transferred model points if it is a wrong
+    /// match.
+    ///
+    /// The error is in metres (RMS, one sigma), infinite if the point is indispensable. `None` with fewer than four
+    /// points.
     pub(super) hinge: Option<(usize, f64)>,
 }
 
 /// Protection levels by solution separation (Blanch and others, *Baseline advanced RAIM user algorithm*, 2015).
 ///
-/// If the points of a set I are wrong matches, the pose x_I without them is not disturbed, and the fix x is off by no more
-/// than |x − x_I| + K σ_I: the separation as it is, no threshold assumed, and the radius that x_I itself exceeds with
-/// the share of the risk that the rate of such sets leaves. Half of the risk goes to the case that nothing is wrong,
-/// the other half to one wrong match, or where two may be wrong in equal parts to one and to two. Radii are the greatest
-/// semi-axis times √χ²₃. x_I is the most likely pose, whatever solver gave x. Sets of two need five points at least,
-/// and six for a level: three that are left fit whatever they are.
+/// If the points of a set I are wrong matches, the pose x_I without them is undisturbed, and the error of the fix x is
+/// at most |x − x_I| + K σ_I. The separation is used as computed, without a threshold; K σ_I is the radius that x_I
+/// exceeds with its fraction of the risk divided by the rate of such sets. Half of the risk is allotted to the
+/// fault-free case, the other half to one wrong match, or in equal parts to one and to two. Radii are the largest
+/// semi-axis times √χ²₃. x_I is the maximum-likelihood pose for every solver. Sets of two require five points, and six
+/// for a level, since any three remaining points fit.
 ///
-/// Where all points are mistaken, no pose without some of them is right, and no radius holds: the probability `misidentified`
-/// that they are is taken from the risk first, and where nothing is left of it there is no level.
+/// No radius holds if all points are mistaken: the probability `misidentified` of that case is subtracted from the risk
+/// first, and there is no level if nothing remains.
 pub(super) fn protection(
     data: &Observations<'_>,
     pose: &Transform<Object, Camera>,
@@ -146,7 +159,7 @@ pub(super) fn protection(
         return Separation::default();
     }
     let left = acceptance.risk - misidentified;
-    // Written so that a NaN leaves nothing.
+    // A NaN leaves nothing.
     let identified = left > 0.0;
     let risk = if identified { left } else { acceptance.risk };
     let own = Protection::quiet(covariance, 0.5 * risk);
@@ -168,21 +181,23 @@ pub(super) fn protection(
     Separation { one, two, protection: available.then_some(watch.level), scale_error, hinge: watch.hinge }
 }
 
-/// A fix, watched while points are left out.
+/// The exclusion of points from a fix, and the maxima so far.
 struct Watch<'a> {
     pose: &'a Transform<Object, Camera>,
     transfer: &'a Transfer,
     deletions: Deletions<'a>,
     level: Protection,
-    /// Whether every set so far could be spared.
+    /// Whether no excluded set was indispensable.
     spared: bool,
-    /// The single point without which the model points move most.
+    /// The point whose exclusion moves the model points most.
     hinge: Option<(usize, f64)>,
 }
 
 impl Watch<'_> {
-    /// Raises the levels to what these sets of wrong matches, each as likely as `fraction` of the risk says, may do; the
-    /// farthest move of the position (m), `None` where one of the sets cannot be spared.
+    /// Raises the levels for these sets of wrong matches.
+    ///
+    /// `fraction` is the probability allotted to each set. Returns the largest shift of the position (m); `None` if one
+    /// of the sets is indispensable.
     fn farthest<const N: usize>(&mut self, sets: impl Iterator<Item = [usize; N]>, fraction: f64) -> Option<f64> {
         let k = radius(fraction);
         let mut farthest = Some(0.0_f64);
@@ -192,11 +207,11 @@ impl Watch<'_> {
                 self.hang(&out, f64::INFINITY);
                 continue;
             };
-            // Had the fix a wrong match, the others would be right: it is off by what it differs from them, and by their error.
+            // If this point is a wrong match, the error is the shift plus the error of the pose without it.
             self.hang(&out, self.transfer.between(self.pose, &without).hypot(self.transfer.rms(&certainty)));
             let (moved, turned) = apart(self.pose, &without);
             farthest = farthest.map(|farthest| farthest.max(moved));
-            // Eigenvalues are asked for only where they may raise a level.
+            // Eigenvalues are computed only if they may raise a level.
             if let Some(position) = longer_than((self.level.position - moved) / k, &block(&certainty, 3)) {
                 self.level.position = self.level.position.max(moved + k * position);
             }
@@ -209,7 +224,7 @@ impl Watch<'_> {
         farthest
     }
 
-    /// Keeps the single point that most hangs on.
+    /// Keeps the most critical point.
     fn hang(&mut self, out: &[usize], off: f64) {
         if let &[point] = out
             && self.hinge.is_none_or(|(_, max)| !max.is_nan() && !(off <= max))
@@ -219,15 +234,15 @@ impl Watch<'_> {
     }
 }
 
-/// The greatest semi-axis of a covariance, where it may exceed `limit`: it is no longer than the root of the matrix's norm.
+/// The largest semi-axis of a covariance, if it may exceed `limit`; the root of the matrix's norm bounds it.
 fn longer_than(limit: f64, covariance: &Matrix3<f64>) -> Option<f64> {
-    /// What rounding may have taken from the norm.
+    /// Upper bound of the rounding of the norm.
     const ROUNDED: f64 = 1.0 + 1e-12;
-    // Written so that a NaN is looked at too.
+    // A NaN is included.
     (!(covariance.norm().sqrt() * ROUNDED <= limit)).then(|| semi_axis(covariance))
 }
 
-/// The greatest semi-axis of a covariance.
+/// The largest semi-axis of a covariance.
 fn semi_axis(covariance: &Matrix3<f64>) -> f64 {
     covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
 }
@@ -237,15 +252,16 @@ fn block(covariance: &Covariance6<Object, Camera>, first: usize) -> Matrix3<f64>
     covariance.matrix.fixed_view::<3, 3>(first, first).into()
 }
 
-/// An attitude less certain than this (rad) has other valleys nearby: no Gaussian radius bounds its error.
+/// Largest standard deviation of the attitude (rad) for a level; beyond it other local minima are near, and no Gaussian
+/// radius bounds the error.
 const WEAK: f64 = 0.035;
 
-/// Greatest standard deviations of position (m) and attitude (rad) over all directions.
+/// The largest standard deviations of position (m) and attitude (rad) over all directions.
 pub(super) fn semi_axes(covariance: &Covariance6<Object, Camera>) -> (f64, f64) {
     (semi_axis(&block(covariance, 3)), semi_axis(&block(covariance, 0)))
 }
 
-/// The radius, in standard deviations, that a normal vector of three exceeds with this probability.
+/// The radius, in standard deviations, that a three-dimensional normal vector exceeds with this probability.
 fn radius(probability: f64) -> f64 {
     chi_square(3, 1.0 - probability).sqrt()
 }

@@ -1,4 +1,4 @@
-//! The tests that a set and its rivals must pass.
+//! The tests of a set of pairs and of its alternatives.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
@@ -21,16 +21,16 @@ use crate::{
     },
 };
 
-/// What a set is judged by.
+/// The problem, solver and limits by which a set is tested.
 pub(super) struct Judge<'a> {
     pub(super) problem: &'a Problem<'a>,
     pub(super) solver: &'a dyn Solver,
     pub(super) acceptance: &'a Acceptance,
-    /// Poses further apart (m) are different answers.
+    /// The distance (m, RMS over the model points) beyond which two poses are different answers.
     pub(super) alert_limit: f64,
-    /// Pairs of the largest set that is judged.
+    /// The number of pairs of the largest tested set.
     pub(super) largest: usize,
-    /// Whether a search found the sets, so that chance may have made them.
+    /// Whether a search selected the sets, so that false alarms are possible.
     pub(super) searched: bool,
     pub(super) rig: Option<&'a StereoRig>,
 }
@@ -51,17 +51,19 @@ impl Judge<'_> {
         self.rare(pairs.len(), expected_sets(self.problem, pairs))
     }
 
-    /// Whether chance is expected to give few enough sets of this size.
+    /// Whether the NFA of a set of this size is within its limit.
     pub(super) fn rare(&self, size: usize, expected: f64) -> Result<(), RejectionReason> {
         let budget = self.acceptance.max_nfa;
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         if expected <= budget { Ok(()) } else { Err(RejectionReason::AContrario { size, expected, budget }) }
     }
 
-    /// The pose of the set and of its rivals: the only one that passes, several, or none; `misidentified` as [`Integrity`] has it.
+    /// The outcome of the set and its alternatives: one pose, several, or none.
+    ///
+    /// `misidentified` is [`Integrity::misidentified`].
     pub(super) fn poses(&self, found: &Identification, misidentified: Option<f64>) -> (Outcome, Option<Alternative>) {
         let mut stand = Stand::default();
-        // Of what fell, the set that the search prefers gives the reason.
+        // The set that the search prefers states the reason if all fail.
         let mut first_fall: Option<(usize, Fallen)> = None;
         let mut fell = |place: usize, fall: Fallen| {
             if first_fall.as_ref().is_none_or(|(first, _)| place < *first) {
@@ -116,12 +118,13 @@ impl Judge<'_> {
             }
             (None, Some((_, Fallen::Degenerate(why)))) => (Outcome::Degenerate(why), None),
             (None, Some((_, Fallen::Refused(why)))) => (Outcome::Rejected(why), None),
-            (None, None) => unreachable!("every set either passed or fell"),
+            (None, None) => unreachable!("every set either passes or fails"),
         }
     }
 
-    /// Puts a hypothesis whose residuals pass to those that stand or to those refused, and then says why.
-    /// One that only repeats a likelier pose is not looked at: it could change nothing.
+    /// Tests precision, prior and visibility of a hypothesis whose residuals passed; returns the reason if it fails.
+    ///
+    /// A hypothesis that repeats a better pose is skipped, since it cannot change the result.
     fn admit(&self, mut hypothesis: Hypothesis, stand: &mut Stand) -> Option<Fallen> {
         let repeats =
             |known: &Hypothesis| known.score >= hypothesis.score && !self.apart(&known.pose, &hypothesis.pose);
@@ -140,8 +143,10 @@ impl Judge<'_> {
         }
     }
 
-    /// A fix held against a pose elsewhere, the likeliest of pairs that contradict it, where the search named none: what stands as well
-    /// as the fix, and is no less likely, leaves it ambiguous.
+    /// The comparison of a fix with the best contradicting pose elsewhere.
+    ///
+    /// It applies if the search returned no alternative. The other pose consists of pairs that contradict the fix. If
+    /// it passes every test with a score no lower than the fix's, the outcome is ambiguous.
     pub(super) fn against_elsewhere(&self, fix: Box<Fix>) -> (Outcome, Option<Alternative>) {
         let sets = elsewhere(self.problem, &fix.object_from_camera);
         let others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
@@ -162,8 +167,8 @@ impl Judge<'_> {
         Observations::of(pairs, self.problem.model, self.problem.cloud, self.rig)
     }
 
-    /// The pose of the pairs: of all that the solver finds as likely, and that residuals, prior and visible sides leave
-    /// possible, the likeliest, with the others beside it.
+    /// The pose of the pairs: the best of the solver's alternatives that pass residuals, prior and visibility, with the
+    /// rest as alternatives.
     pub(super) fn hypothesis(&self, pairs: &[Correspondence]) -> Result<Hypothesis, Degenerate> {
         let data = self.observations(pairs);
         let pose = self.solver.solve(&data)?;
@@ -189,7 +194,7 @@ impl Judge<'_> {
         Ok(Hypothesis { alternatives: possible.map(Hypothesis::alternative).collect(), ..map_estimate })
     }
 
-    /// χ² of the prior at a pose; nought without one and of a shell.
+    /// χ² of the prior at a pose; zero without a prior and for a box.
     fn off_prior(&self, pose: &Transform<Object, Camera>) -> f64 {
         match self.problem.prior {
             Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) }) => {
@@ -200,20 +205,20 @@ impl Judge<'_> {
         }
     }
 
-    /// Whether a rigid motion explains the set within its noise.
+    /// Whether a rigid motion explains the set within its noise (χ² test).
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
         let dof = 3 * hypothesis.pairs.len() - 6;
         let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(dof, self.acceptance.confidence));
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
     }
 
-    /// Whether precision and prior let the pose pass.
+    /// Whether the pose passes the tests of precision and prior.
     pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let covariance = self.covariance(hypothesis)?;
         let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
         let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         if !(2.0 * rms <= limit) {
             return Err(Fallen::Refused(RejectionReason::Imprecise { rms, limit }));
         }
@@ -224,7 +229,7 @@ impl Judge<'_> {
         self.near(hypothesis)
     }
 
-    /// The covariance of the pose, asked for once.
+    /// The covariance of the pose, computed once.
     fn covariance(&self, hypothesis: &mut Hypothesis) -> Result<Covariance6<Object, Camera>, Fallen> {
         if let Some(known) = hypothesis.covariance {
             return Ok(known);
@@ -235,7 +240,7 @@ impl Judge<'_> {
         Ok(covariance)
     }
 
-    /// Whether the prior lets the pose pass.
+    /// Whether the pose agrees with the prior.
     fn near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let covariance = self.covariance(hypothesis)?;
         let Some(prior) = self.problem.prior else { return Ok(()) };
@@ -251,7 +256,7 @@ impl Judge<'_> {
         if off <= 1.0 { Ok(()) } else { Err(Fallen::Refused(RejectionReason::Prior { off })) }
     }
 
-    /// Whether the camera of the pose sees the identified points from the sides from which they can be seen.
+    /// Whether the camera sees the identified points from their visible sides.
     fn seen_from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
         if self.faces(hypothesis) {
             return Ok(());
@@ -259,13 +264,14 @@ impl Judge<'_> {
         let camera = hypothesis.pose.translation();
         let angle = |point: &ModelPoint| point.incidence_angle(&camera).unwrap_or(0.0);
         let points = hypothesis.pairs.iter().map(|pair| &self.problem.model[pair.model]);
-        let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b))).expect("a set that falls has points");
+        let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b))).expect("a rejected set has points");
         let (point, max) = (worst.id.clone(), ModelPoint::max_incidence_angle());
         Err(Fallen::Refused(RejectionReason::Behind { point, angle: angle(worst), max }))
     }
 
-    /// How far the identified model points, placed by the pose, are from where the prior places them:
-    /// the largest step along a camera axis over the half-size and the noise allowed with it.
+    /// The distance of the identified model points from their prior positions, relative to its limit.
+    ///
+    /// The result is the largest step along a camera axis divided by the half-size of the box plus the allowed noise.
     fn off_box(
         &self,
         hypothesis: &Hypothesis,
@@ -289,13 +295,14 @@ impl Judge<'_> {
         !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
     }
 
-    /// Whether the pose is as precise as is asked for whichever of its points is a wrong match, where a search found them.
+    /// Whether the pose stays within the alert limit despite any single wrong match.
     ///
-    /// Where what is seen of a large model is small or in a row, the pose of these points alone has many others drift far: one of
-    /// them is then near some clutter, and that makes the pose look precise and puts it wrong. Three points need each other.
+    /// It applies to sets that a search selected. If the visible points of a large model are few, close together or in
+    /// a row, many wrong poses are possible; a clutter point near one of them makes a wrong pose look precise. Three
+    /// points cannot be tested: each is needed.
     fn without_any_one(&self, hypothesis: &Hypothesis, hinge: Option<(usize, f64)>) -> Result<(), RejectionReason> {
         let Some((place, rms)) = hinge.filter(|_| self.searched) else { return Ok(()) };
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         if 2.0 * rms <= self.alert_limit {
             return Ok(());
         }
@@ -303,19 +310,20 @@ impl Judge<'_> {
         Err(RejectionReason::Hinge { point, rms, limit: self.alert_limit })
     }
 
-    /// Whether the points are measured as large as the model says, by a test of the confidence of the others, or so nearly that what
-    /// follows for the pose is within the alert limit: a rig that stretches all it measures by ε has the object nearer or farther by
-    /// ε of its distance.
+    /// Whether the scale error is insignificant, or its effect within the alert limit.
+    ///
+    /// A rig with a relative scale error ε displaces the object by ε of its distance. The significance test uses the
+    /// confidence of the other tests.
     fn as_large_as_modelled(&self, hypothesis: &Hypothesis, integrity: &Integrity) -> Result<(), RejectionReason> {
         let Some(scale_error) = integrity.scale_error else { return Ok(()) };
-        // Where the residuals that it leaves are larger than their noise, so is the error of the scale.
+        // Residuals above their noise also raise the error of the scale.
         let sigmas = scale_error.value / scale_error.sigma;
         let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.dof - 1) as f64;
         let sure = sigmas * sigmas > chi_square(1, self.acceptance.confidence) * left.max(1.0);
         let count = hypothesis.pairs.len() as f64;
         let centre: Vector3<f64> =
             hypothesis.pairs.iter().map(|pair| self.problem.model[pair.model].at.coords).sum::<Vector3<f64>>() / count;
-        // Points that a stretch moved farthest are those that were not identified: what is left shows less of it.
+        // The points that the scale error moved farthest were not identified, so the estimate is too small.
         let max = scale_error.value.abs() + UNDERSTATED * scale_error.sigma;
         let off = max * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
         match sure && off > self.alert_limit {
@@ -324,8 +332,9 @@ impl Judge<'_> {
         }
     }
 
-    /// Raises the levels of a fix so that they hold of other poses within the alert limit too: of all that are not less likely than
-    /// the fix by [`COVERED`] of the risk.
+    /// Raises the protection levels to cover other poses within the alert limit.
+    ///
+    /// It covers poses whose probability relative to the fix is at least [`COVERED`] of the risk.
     pub(super) fn cover<'p>(&self, fix: &mut Fix, others: impl Iterator<Item = (f64, &'p Transform<Object, Camera>)>) {
         let quiet = Protection::quiet(&fix.covariance, 0.5 * self.acceptance.risk);
         let Some(level) = &mut fix.integrity.protection else { return };
@@ -333,7 +342,7 @@ impl Judge<'_> {
         likely.for_each(|(_, other)| level.cover(&quiet, &fix.object_from_camera, other));
     }
 
-    /// Raises the levels of a fix to where its points are mistaken with this probability; they may have been raised for others.
+    /// Raises the protection levels to this probability of misidentification; levels raised before are kept.
     pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
         let data = self.observations(&fix.pairs);
         let pose = &fix.object_from_camera;
@@ -383,13 +392,13 @@ impl Judge<'_> {
     }
 }
 
-/// Poses near a fix whose probability, over that of the fix, is no more than this share of the risk need not be within its levels.
+/// Fraction of the risk: poses near the fix with a smaller relative probability need no coverage.
 const COVERED: f64 = 0.01;
 
-/// A stretch may be greater than it seems by so many of its standard deviations.
+/// Number of standard deviations that are added to the scale error.
 const UNDERSTATED: f64 = 2.0;
 
-/// The hypotheses that passed every test, and those that did not.
+/// The hypotheses that passed every test, and the rejected ones.
 #[derive(Default)]
 struct Stand {
     passed: Vec<Hypothesis>,

@@ -1,4 +1,4 @@
-//! How likely it is that proposed pairs name model points that are only like the true ones.
+//! The likelihood ratio of proposed pairs under mislabelled model points.
 
 use std::collections::BTreeSet;
 
@@ -8,16 +8,17 @@ use super::{hypothesis::Hypothesis, judge::Judge};
 use crate::{Correspondence, search::fraction};
 
 impl Judge<'_> {
-    /// How likely the proposed pairs are where `other`, which reads the points of `own` as other model points, is right, over how likely
-    /// where `own` is.
+    /// The likelihood ratio of the proposed pairs: `other` correct over `own` correct.
     ///
-    /// Who proposes pairs by appearance takes a model point for its like with a probability μ that nobody knows, less than ½. Let a of
-    /// the points of `own` be proposed for it alone, and b others agree with `other` alone. Then the proposals have
-    /// ∫ μᵇ (1 − μ)ᵃ dμ by the one and ∫ μᵃ (1 − μ)ᵇ dμ by the other over 0…½, of which the ratio is
+    /// `other` assigns the measured points of `own` to other model points. A proposer by appearance confuses similar
+    /// model points with an unknown probability μ < ½. Let a points of `own` be proposed for it alone, and let b other
+    /// points agree with `other` alone. The marginal likelihoods are ∫ μᵇ (1 − μ)ᵃ dμ for `own` and ∫ μᵃ (1 − μ)ᵇ dμ
+    /// for `other`, both over 0…½. Their ratio is
     ///
-    /// I½(a + 1, b + 1)/I½(b + 1, a + 1), I the regularised incomplete beta function:
+    /// I½(a + 1, b + 1)/I½(b + 1, a + 1),
     ///
-    /// one where both are proposed alike, 2⁻⁹ of eight points against none, a tenth of six against two.
+    /// with I the regularised incomplete beta function. It is one for a = b, about 2⁻⁹ for eight points against none,
+    /// and a tenth for six against two.
     pub(super) fn mislabeled(&self, own: &Hypothesis, other: &Hypothesis) -> f64 {
         let lists = &self.problem.candidates.lists;
         let listed = |pair: &&Correspondence| lists[pair.model].binary_search(&pair.cloud).is_ok();
@@ -45,8 +46,8 @@ fn odds(a: usize, b: usize) -> f64 {
 mod tests {
     use super::odds;
 
-    /// I½(a + 1, b + 1) is the share of the outcomes of a + b + 1 tosses that have more than a heads: of nine all nine, one of 512; of
-    /// nine seven or more, 36 + 9 + 1 of 512.
+    /// I½(a + 1, b + 1) is the probability of more than a heads in a + b + 1 tosses: 1/512 for nine of nine, (36 + 9 +
+    /// 1)/512 for seven or more of nine.
     #[test]
     fn proposals_have_the_odds_of_tossed_coins() {
         for (a, b, expected) in [(4, 4, 1.0), (8, 0, 1.0 / 511.0), (6, 2, 46.0 / 466.0), (0, 8, 511.0)] {

@@ -1,4 +1,4 @@
-//! From a search's answer to a pose that is believed, or a refusal.
+//! Acceptance: the tests between a search's result and a fix or a rejection.
 
 use rand::Rng;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
@@ -33,8 +33,11 @@ pub use refusal::RejectionReason;
 
 use judge::Judge;
 
-/// One attempt at a fix, after Stage 1: Stage 2 (which cloud points are which model points), the
-/// rigid motion, and the tests that it must pass before it is believed.
+/// One attempt at a fix after Stage 1: search (Stage 2), rigid motion, acceptance tests.
+///
+/// `problem` holds model, cloud and candidates; `search` selects the pairs; `solver` computes the pose; `acceptance`
+/// holds the limits of the tests. Solvers that minimise reprojection errors need the `rig`. The search draws its random
+/// numbers from `rng`.
 pub fn compute_fix(
     problem: &Problem<'_>,
     search: &dyn Search,
@@ -47,8 +50,9 @@ pub fn compute_fix(
     judge(problem, found, solver, acceptance, rig)
 }
 
-/// The second half of [`compute_fix()`], for callers that time the search by itself: from what a
-/// search said to a pose that is believed, or a refusal.
+/// The second half of [`compute_fix()`]: pose and acceptance tests of a search's result.
+///
+/// Callers that time the search separately use it.
 pub fn judge(
     problem: &Problem<'_>,
     found: Result<Identification, Rejected>,
@@ -92,7 +96,7 @@ pub fn judge(
         Outcome::Fix(fix) if fix.pairs != found.pairs => AContrario::of(problem, &fix.pairs).sets_as_good(),
         _ => a_contrario.sets_as_good(),
     };
-    // What was proved of a set is not proved of what is left of it.
+    // A proof for the complete set does not hold for a subset.
     let thinned = matches!(&outcome, Outcome::Fix(fix) if fix.pairs.len() < found.pairs.len());
     Attempt {
         nfa: Some(nfa),
@@ -107,8 +111,9 @@ pub fn judge(
     }
 }
 
-/// The same of pairs that no search found, because every measured point said which model point it is: nothing speaks for
-/// chance, and there are no rivals. The tests of residuals, precision and prior are those of every set.
+/// The acceptance of labelled pairs, which no search selected.
+///
+/// The labels exclude false alarms and alternatives; residuals, precision and prior are tested as in [`judge()`].
 pub fn judge_labelled(
     problem: &Problem<'_>,
     pairs: Vec<Correspondence>,
@@ -137,8 +142,9 @@ pub fn judge_labelled(
     }
 }
 
-/// That the model points with a candidate, three or more, lie on a line: whatever a search found of them, or did not, they
-/// determine no pose.
+/// The degeneracy of three or more model points with candidates on one line.
+///
+/// Such points determine no pose, whatever the search returned.
 fn on_a_line(problem: &Problem<'_>) -> Option<Degenerate> {
     let lists = problem.candidates.lists.iter();
     let places: Vec<_> =
@@ -147,18 +153,20 @@ fn on_a_line(problem: &Problem<'_>) -> Option<Degenerate> {
     (ratio < ON_A_LINE).then_some(Degenerate::Collinear { ratio, min: ON_A_LINE })
 }
 
-/// Poses further apart than this (m) are different answers: the alert limit, or its share of the model's diameter.
+/// The distance (m) beyond which two poses are different answers: the alert limit, or its fraction of the model's
+/// diameter if that is smaller.
 pub(crate) fn alert_limit(model: &[ModelPoint], acceptance: &Acceptance) -> f64 {
     let (max, fraction) = (acceptance.alert_limit, acceptance.alert_fraction);
-    // The diameter is no less than the longest side of the shell, which is found at once.
+    // The diameter is at least the longest side of the bounding box, which is cheaper to compute.
     let side = BoundingBox::around(model.iter().map(|point| point.at))
         .map_or(0.0, |bounding_box| (bounding_box.max - bounding_box.min).amax());
     if fraction * side >= max { max } else { max.min(fraction * diameter(model)) }
 }
 
-/// Whether the outcome stands whatever sets the search did not look at. These may contradict a fix, and
-/// stand where what was looked at fell; but poses that contradict each other stay ambiguous, and
-/// where no set is larger all are too small.
+/// Whether sets that the search did not examine cannot change the outcome.
+///
+/// An unexamined set may contradict a fix, or pass although the examined sets failed. Poses that contradict each other
+/// stay ambiguous, and a set too small stays too small if no set is larger.
 fn settled(outcome: &Outcome, optimal: bool) -> bool {
     match outcome {
         Outcome::Ambiguous(_) => true,
@@ -169,7 +177,7 @@ fn settled(outcome: &Outcome, optimal: bool) -> bool {
     }
 }
 
-/// How far two poses place the model points apart: root mean square over all of them (m).
+/// The RMS distance (m) between the model points as two poses place them.
 pub fn rms_apart(model: &[ModelPoint], a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> f64 {
     let (a, b) = (a.inverse(), b.inverse());
     let sum: f64 = model.iter().map(|point| (a * point.at - b * point.at).norm_squared()).sum();

@@ -1,4 +1,4 @@
-//! What comes of an attempt: a fix, rivals, or a refusal.
+//! The result of an attempt at a fix: a fix, alternatives, or a rejection.
 
 use std::fmt;
 
@@ -8,74 +8,74 @@ use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
 use super::{Integrity, RejectionReason};
 use crate::{Correspondence, Degenerate, Rejected};
 
-/// A fix: the pose relative to the target and everything that supports it.
+/// A fix: the camera's pose relative to the target, with covariance and integrity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
-    /// The pose.
+    /// The camera's pose in the object frame.
     pub object_from_camera: Transform<Object, Camera>,
-    /// Its covariance.
+    /// The covariance of the pose.
     pub covariance: Covariance6<Object, Camera>,
-    /// The identified points.
+    /// The identified pairs.
     pub pairs: Vec<Correspondence>,
-    /// The indices into `pairs` of the points the pose rests on (all of them, or the triad's three).
+    /// The indices into `pairs` of the points that determine the pose: all of them, or the three of the triad.
     pub used: Vec<usize>,
-    /// The residual C·H − P of each of the pairs (m, object frame).
+    /// The residual C·H − P of each pair (m, object frame).
     pub residuals: Vec<Vector3<f64>>,
-    /// Root mean square of them (m).
+    /// The RMS of the residuals (m).
     pub residual_rms: f64,
-    /// How well it explains the data; larger is better. Of a search that counts: minus half of the χ² of its
-    /// residuals and of the prior, and χ²₃(confidence) for each pair fewer than the largest set has (a
-    /// truncated χ²: sets of different size compare). Of one that weighs evidence: its logarithm (nats).
+    /// The score of the pose; larger is better.
+    ///
+    /// A counting search scores −χ²/2 of residuals and prior, minus χ²₃(confidence)/2 for each pair fewer than in the
+    /// largest set: a truncated χ², by which sets of different sizes compare. A search that weighs evidence scores the
+    /// log evidence (nats).
     pub score: f64,
-    /// What supports it beyond its covariance.
+    /// The integrity of the fix: redundancy, residual test, solution separation, protection levels.
     pub integrity: Integrity,
 }
 
 impl Fix {
-    /// Standard deviation of the camera's position in the object frame (m): the root of the trace of its covariance.
+    /// The standard deviation of the camera's position in the object frame (m), √tr Σ.
     pub fn position_sigma(&self) -> f64 {
         self.covariance.position_sigma()
     }
 
-    /// The covariance (m², camera axes) of the place where the fix puts a point of the object.
+    /// The covariance (m², camera axes) of an object point as transferred by the fix.
     pub fn point_covariance(&self, point: &Point<Object>) -> Matrix3<f64> {
         self.covariance.of_point(&(self.object_from_camera.inverse() * *point))
     }
 
-    /// The same as one of several poses.
+    /// The fix as one of several alternatives.
     pub(super) fn alternative(self) -> Alternative {
         Alternative { object_from_camera: self.object_from_camera, pairs: self.pairs, score: self.score }
     }
 }
 
-/// Another pose that explains the data as well.
+/// An alternative pose that explains the data nearly as well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alternative {
-    /// The pose.
+    /// The camera's pose in the object frame.
     pub object_from_camera: Transform<Object, Camera>,
-    /// Its pairs.
+    /// The pairs that support the pose.
     pub pairs: Vec<Correspondence>,
-    /// How well it explains the data; larger is better. Of a search that counts: minus half of the χ² of its
-    /// residuals and of the prior, and χ²₃(confidence) for each pair fewer than the largest set has (a
-    /// truncated χ²: sets of different size compare). Of one that weighs evidence: its logarithm (nats).
+    /// The score of the pose, defined as [`Fix::score`].
     pub score: f64,
 }
 
-/// What came of one attempt at a fix.
+/// The outcome of one attempt at a fix.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// A pose that passed every test.
     Fix(Box<Fix>),
-    /// Several poses explain the data equally well; the likeliest first.
+    /// Several poses explain the data equally well; the best is first.
     Ambiguous(Vec<Alternative>),
-    /// No set of points was identified, or the set was not believed.
+    /// The search returned no set, or a test rejected it.
     Rejected(RejectionReason),
     /// The identified points determine no pose.
     Degenerate(Degenerate),
 }
 
 impl Outcome {
-    /// Its name in logs and tables.
+    /// The name of the outcome in logs and tables.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Fix(_) => "fix",
@@ -85,7 +85,7 @@ impl Outcome {
         }
     }
 
-    /// Why there is no pose, in kebab-case; `None` where there is one.
+    /// The reason for the missing pose, in kebab-case; `None` for a fix.
     pub fn reason(&self) -> Option<&'static str> {
         match self {
             Self::Fix(_) => None,
@@ -95,11 +95,11 @@ impl Outcome {
         }
     }
 
-    /// The same in a sentence with its numbers; `None` where there is a pose.
+    /// The reason for the missing pose as a sentence with its numbers; `None` for a fix.
     pub fn explanation(&self) -> Option<String> {
         match self {
             Self::Fix(_) => None,
-            Self::Ambiguous(alternatives) => Some(format!("{} different poses explain the data", alternatives.len())),
+            Self::Ambiguous(alternatives) => Some(format!("{} poses fit; narrow the prior", alternatives.len())),
             Self::Rejected(refusal) => Some(refusal.to_string()),
             Self::Degenerate(degenerate) => Some(degenerate.to_string()),
         }
@@ -107,7 +107,7 @@ impl Outcome {
 }
 
 impl fmt::Display for Outcome {
-    /// The outcome in one line: a fix with its precision, or why there is none.
+    /// The outcome in one line: a fix with its precision, or the reason for its absence.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self, self.explanation()) {
             (Self::Fix(fix), _) => {
@@ -125,34 +125,36 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// An outcome and what led to it.
+/// An attempt at a fix: its outcome, and the search's result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attempt {
-    /// What came of it.
+    /// The outcome.
     pub outcome: Outcome,
-    /// The set that the search found, believed or not; empty where it found none.
+    /// The set that the search returned, accepted or rejected; empty if it returned none.
     pub identified: Vec<Correspondence>,
-    /// The best pose that differs from the answer by more than the alert limit, though it was not
-    /// believed; for comparison only.
+    /// The best pose beyond the alert limit from the answer; not accepted, for comparison only.
     pub runner_up: Option<Alternative>,
-    /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
+    /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
+    /// probable.
     pub optimal: bool,
-    /// No admissible set has more pairs than this, where the search says so.
+    /// The proved upper bound of the number of pairs of an admissible set; `None` if the search states none.
     pub consensus_bound: Option<usize>,
-    /// Expected number of chance sets as large as the one found.
+    /// The number of false alarms (NFA) of the set; `None` if it was not computed.
     pub nfa: Option<f64>,
-    /// Pair tests spent by the search, where it says so.
+    /// The number of pair tests of the search; `None` if it does not count them.
     pub pair_tests: Option<u64>,
-    /// Whether the search looked at all that may lead to a second copy of the object, whole or in part, beside the answer; `None`
-    /// where it looks for none, or nothing was likely enough to be believed.
+    /// Whether the search examined every possible second copy of the object, complete or partial.
+    ///
+    /// `None` if the search seeks no copies, or if no pose was probable enough to be accepted.
     pub copies_sought: Option<bool>,
-    /// No admissible set is likelier than the likeliest pose by more than this (nats); `None` where that was not asked. The answer is
-    /// optimal where this is zero and none of that pose's pairs had to go.
+    /// The upper bound (nats) by which an admissible set may exceed the best pose's evidence; `None` if not computed.
+    ///
+    /// The answer is optimal if the gap is zero and none of the best pose's pairs was excluded.
     pub evidence_gap: Option<f64>,
 }
 
 impl Attempt {
-    /// How much better than the runner-up the answer explains the data: the difference of their scores.
+    /// The score of the answer minus the score of the runner-up.
     pub fn margin(&self) -> Option<f64> {
         match (&self.outcome, &self.runner_up) {
             (Outcome::Fix(fix), Some(other)) => Some(fix.score - other.score),
@@ -163,7 +165,7 @@ impl Attempt {
 }
 
 impl Attempt {
-    /// The attempt that a search refused.
+    /// The attempt whose search rejected.
     pub(crate) fn without(why: Rejected) -> Self {
         let pair_tests = match why {
             Rejected::Budget { pair_tests, .. } => Some(pair_tests),

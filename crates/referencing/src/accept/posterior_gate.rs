@@ -1,11 +1,13 @@
-//! What is believed of a search that weighs evidence.
+//! The acceptance of a search that weighs evidence.
 
 use super::{Alternative, Outcome, absence::Absence, judge::Judge};
 use crate::{Explanation, Identification, Posterior, a_contrario::AContrario};
 
 impl Judge<'_> {
-    /// The pose of a search that weighs evidence: believed when little speaks for no object at all, little
-    /// for a pose elsewhere, nothing for a second copy of the object, and chance hardly ever gives as good a set.
+    /// The outcome of a search that weighs evidence.
+    ///
+    /// A pose is accepted if absence and other poses are improbable, no second copy of the object exists, and the NFA
+    /// is small.
     pub(super) fn weighted(
         &self,
         found: &Identification,
@@ -16,7 +18,7 @@ impl Judge<'_> {
         let elsewhere = posterior.elsewhere(self.problem.model, self.alert_limit);
         let runner_up = posterior.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
         let absence = Absence::of(self, found, &probabilities, a_contrario);
-        // Two things that are each the object by themselves: neither is the other's clutter.
+        // Two sets that each explain the object are copies; neither is clutter of the other.
         let even = probabilities.absent - probabilities.clutter;
         if absence.refusal(even).is_none()
             && let Some(best) = posterior.explanations.first()
@@ -30,14 +32,14 @@ impl Judge<'_> {
         if let Err(refusal) = self.rare(found.pairs.len(), a_contrario.sets_as_good()) {
             return (Outcome::Rejected(refusal), runner_up);
         }
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         if !(probabilities.elsewhere <= self.acceptance.doubt * (1.0 - probabilities.absent)) {
             let all = posterior.explanations.first().into_iter().chain(elsewhere);
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
         }
         let (mut outcome, _) = self.poses(found, Some(probabilities.elsewhere + probabilities.absent));
         if let (Outcome::Fix(fix), Some(best)) = (&mut outcome, posterior.explanations.first()) {
-            // The solver has the pairs alone: what it makes of them must be the pose that was weighed.
+            // The solver sees only the pairs: its pose must agree with the pose whose evidence was computed.
             if self.apart(&fix.object_from_camera, &best.object_from_camera) {
                 let solved = fix.clone().alternative();
                 return (Outcome::Ambiguous(vec![best.alternative(), solved]), None);

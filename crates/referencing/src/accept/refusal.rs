@@ -1,114 +1,140 @@
-//! Why an answer is not believed.
+//! The reasons for which an answer is rejected.
 
 use crate::{Rejected, ScaleError};
 
-/// Why an answer is not believed, or why there is none.
+/// The reason for which a set or its pose is rejected.
+///
+/// Its `Display` is one line: the failed test, its numbers, and a remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RejectionReason {
-    /// The search found nothing.
+    /// The search returned no set.
     #[error(transparent)]
     Search(#[from] Rejected),
-    /// The set is smaller than asked for.
-    #[error("{found} points were identified; {needed} are needed")]
+    /// The set has fewer points than required.
+    #[error(
+        "too few identified points: {found} found, {needed} required; bring more of the object into view or widen the \
+         prior"
+    )]
     TooFew {
-        /// Its size.
+        /// The number of identified points.
         found: usize,
-        /// [`Acceptance::min_points`](crate::Acceptance::min_points), or what the solver needs.
+        /// The required number: the larger of [`Acceptance::min_points`](crate::Acceptance::min_points) and the
+        /// solver's minimum.
         needed: usize,
     },
-    /// Chance alone would give sets as large.
+    /// The number of false alarms of the set is too large (a-contrario test).
     #[error("{}", a_contrario(.size, .expected, .budget))]
     AContrario {
-        /// Size of the set.
+        /// The number of points of the set.
         size: usize,
-        /// Expected number of chance sets of this size.
+        /// The number of false alarms (NFA): the expected number of random sets of this size.
         expected: f64,
-        /// [`Acceptance::max_nfa`](crate::Acceptance::max_nfa).
+        /// The largest accepted NFA, [`Acceptance::max_nfa`](crate::Acceptance::max_nfa).
         budget: f64,
     },
-    /// The cloud may well be clutter alone.
-    #[error("without the object the cloud has a probability of {probability:.2e}; at most {limit:.1e} is accepted")]
+    /// The posterior probability that the object is absent is too large.
+    #[error(
+        "object possibly absent: its absence has a probability of {probability:.2e}, the limit is {limit:.1e}; narrow \
+         the prior or bring more of the object into view"
+    )]
     Absent {
-        /// Posterior probability that the object is not there.
+        /// The posterior probability of absence.
         probability: f64,
+        /// The limit that applies to this model and cloud; it derives from
         /// [`Acceptance::absence`](crate::Acceptance::absence).
         limit: f64,
     },
-    /// No rigid motion explains the set within its noise.
-    #[error("the residuals have χ² = {chi2:.1}; at most {limit:.1} is likely of a true set")]
+    /// The residuals are larger than the noise of the points explains (χ² test).
+    #[error(
+        "residuals too large: χ² = {chi2:.1}, the limit is {limit:.1}; check calibration, object model and point \
+         covariances"
+    )]
     Residuals {
-        /// Σ rᵀ S⁻¹ r of the most likely rigid motion.
+        /// The χ² of the residuals, Σ rᵀ S⁻¹ r, at the maximum-likelihood pose.
         chi2: f64,
-        /// The quantile of χ² with 3k − 6 degrees of freedom.
+        /// The quantile of χ² with 3k − 6 degrees of freedom at
+        /// [`Acceptance::confidence`](crate::Acceptance::confidence).
         limit: f64,
     },
-    /// By its own covariance the pose may be further off than the alert limit.
+    /// Twice the predicted error of the model points exceeds the alert limit.
     #[error(
-        "the model points are known to {rms:.3} m (RMS, one sigma); twice that exceeds the alert limit of {limit:.3} m"
+        "pose too imprecise: the model points have a predicted error of {rms:.3} m (RMS, one sigma), twice that \
+         exceeds the alert limit of {limit:.3} m; identify more points or move closer"
     )]
     Imprecise {
-        /// Root mean square over the model points of the predicted error (m).
+        /// The predicted error of the model points (m, RMS over the points, one sigma).
         rms: f64,
         /// The alert limit (m).
         limit: f64,
     },
-    /// If one point is a wrong match, the pose may be further off than the alert limit.
+    /// One wrong match could move the pose beyond the alert limit.
     #[error("{}", hinge(.point, .rms, .limit))]
     Hinge {
-        /// The model point.
+        /// The identifier of the model point.
         point: String,
-        /// By how much the pose is off if that point is a wrong match: root mean square over the model points (m, one sigma);
-        /// infinite where the other points determine no pose.
+        /// The error of the model points for this wrong match (m, RMS, one sigma).
+        ///
+        /// Infinite if the other points determine no pose.
         rms: f64,
         /// The alert limit (m).
         limit: f64,
     },
-    /// By its own covariance the attitude is hardly determined: points near a line leave a turn about it free, which moves
-    /// no point and yet the vehicle.
-    #[error("the attitude is known to {:.1}° (one sigma, its worst axis); twice that exceeds {:.1}°", .sigma.to_degrees(), .limit.to_degrees())]
+    /// The attitude is too imprecise by its own covariance.
+    ///
+    /// Points near a line leave the rotation about it undetermined: it moves no point, but it moves the vehicle.
+    #[error(
+        "attitude too imprecise: its worst axis has an error of {:.1}° (one sigma), twice that exceeds the limit of \
+         {:.1}°; identify points farther from a common line",
+        .sigma.to_degrees(), .limit.to_degrees()
+    )]
     Attitude {
-        /// Greatest standard deviation over all axes (rad).
+        /// The largest standard deviation over all axes (rad).
         sigma: f64,
-        /// [`Acceptance::attitude_limit`](crate::Acceptance::attitude_limit) (rad).
+        /// The limit, [`Acceptance::attitude_limit`](crate::Acceptance::attitude_limit) (rad).
         limit: f64,
     },
-    /// The camera of the pose would have to see points from behind.
+    /// The pose places the camera behind identified points.
     #[error(
-        "the pose has the camera behind points that it identified: model point `{point}` would be seen {:.1}° from its normal; \
-         at most {:.1}° is possible", .angle.to_degrees(), .max.to_degrees()
+        "camera behind identified points: model point `{point}` would be seen {:.1}° from its normal, the largest \
+         possible angle is {:.1}°; check the normals of the object model",
+        .angle.to_degrees(), .max.to_degrees()
     )]
     Behind {
-        /// The point that turns its back the most.
+        /// The point with the largest angle.
         point: String,
-        /// The angle between its normal and the line of sight (rad).
+        /// The angle between the point's normal and the line of sight (rad).
         angle: f64,
-        /// The greatest at which a point shows itself (rad).
+        /// The largest angle at which a point is visible (rad).
         max: f64,
     },
-    /// All that is measured is longer or shorter than the model says, by more than the pose may be off for it.
+    /// The scale error between measurement and model may displace the object beyond the alert limit.
     #[error(
-        "measured distances are {:.1} % {} than the model's (one sigma {:.1} %): if the rig is at fault, the object may be {off:.2} m \
-         from where it seems to be, and {limit:.2} m are allowed; look at baseline, focal length and survey",
-        100.0 * .scale_error.value.abs(), if .scale_error.value > 0.0 { "longer" } else { "shorter" }, 100.0 * .scale_error.sigma
+        "scale error: measured distances are {:.1} % {} than the model's (one sigma {:.1} %), which may displace the \
+         object by {off:.2} m, the alert limit is {limit:.2} m; check baseline, focal length and survey",
+        100.0 * .scale_error.value.abs(), if .scale_error.value > 0.0 { "longer" } else { "shorter" },
+        100.0 * .scale_error.sigma
     )]
     Stretched {
-        /// By how much.
+        /// The estimated scale error.
         scale_error: ScaleError,
-        /// What that, and two standard deviations more, makes of the object's distance (m).
+        /// The displacement of the object (m) at the scale error plus two standard deviations.
         off: f64,
         /// The alert limit (m).
         limit: f64,
     },
     /// The pose contradicts the prior.
-    #[error("the pose is {off:.3} times as far from the prior as the prior allows")]
+    #[error(
+        "pose contradicts the prior: its distance is {off:.3} times the largest allowed; check the prior's pose and \
+         covariance"
+    )]
     Prior {
-        /// Distance from the prior over the largest allowed.
+        /// The distance from the prior divided by the largest allowed distance.
         off: f64,
     },
 }
 
 impl RejectionReason {
-    /// The reason as logs and tables have it, in kebab-case.
+    /// The short name of the reason in logs and tables, in kebab-case.
     pub fn reason(&self) -> &'static str {
         match self {
             Self::Search(why) => why.reason(),
@@ -120,25 +146,30 @@ impl RejectionReason {
     }
 }
 
-/// The sentence of [`RejectionReason::AContrario`].
+/// The message of [`RejectionReason::AContrario`].
 fn a_contrario(size: &usize, expected: &f64, budget: &f64) -> String {
     if expected.is_nan() {
         return format!(
-            "how many sets of {size} points chance gives cannot be told: the noise of a point is no number"
-        );
-    }
-    format!("chance gives {expected:.2e} sets of {size} points; at most {budget:.1e} are accepted")
-}
-
-/// The sentence of [`RejectionReason::Hinge`].
-fn hinge(point: &str, rms: &f64, limit: &f64) -> String {
-    if !rms.is_finite() {
-        return format!(
-            "the pose hangs on model point `{point}`: the others determine none, should that be a wrong match"
+            "cannot compute the number of false alarms (NFA) of {size} points: the noise of a point is not a number; \
+             check the point covariances"
         );
     }
     format!(
-        "the pose hangs on model point `{point}`: should that be a wrong match, the model points are {rms:.3} m off (RMS, one sigma); \
-         twice that exceeds the alert limit of {limit:.3} m"
+        "possible false alarm: the expected number of random sets of {size} points (NFA) is {expected:.2e}, the limit \
+         is {budget:.1e}; narrow the prior or identify more points"
+    )
+}
+
+/// The message of [`RejectionReason::Hinge`].
+fn hinge(point: &str, rms: &f64, limit: &f64) -> String {
+    if !rms.is_finite() {
+        return format!(
+            "pose depends on one point: without model point `{point}` the others determine no pose; identify more \
+             points"
+        );
+    }
+    format!(
+        "pose depends on one point: if model point `{point}` is a wrong match, the model points have an error of \
+         {rms:.3} m (RMS, one sigma), twice that exceeds the alert limit of {limit:.3} m; identify more points"
     )
 }

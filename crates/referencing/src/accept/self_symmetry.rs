@@ -1,4 +1,4 @@
-//! Other readings of the same measured points.
+//! Other assignments of the measured points of a fix, by self-symmetry of the model.
 
 use std::collections::BTreeSet;
 
@@ -13,19 +13,20 @@ use super::{
 };
 use crate::{Correspondence, Kabsch, Observations, Solver};
 
-/// Pairs of model points that the first two measured points may be, beyond which other readings are not sought.
+/// Maximum number of pairs of model points for the first two measured points; beyond it no symmetry is sought.
 const MAX_BASES: usize = 1_000_000;
-/// More readings of one set are not needed to call it ambiguous.
+/// Maximum number of assignments of one set; more are not needed to call it ambiguous.
 const MAX_SYMMETRIC: usize = 64;
 impl Judge<'_> {
-    /// The outcome, or that it is ambiguous because the measured points of a fix are other points of the model as well.
+    /// The outcome under the model's self-symmetry: ambiguous if other model points fit the measurements.
     ///
-    /// Where a motion maps the identified points of a model onto points of the model, the pose before it and the pose after
-    /// it explain the same measurements. Candidates, residuals, precision, prior and the visible sides of the points decide
-    /// between them as between any sets; what passes all is an alternative. A search that weighs evidence must leave all
-    /// alternatives together no more than [`Acceptance::doubt`](super::Acceptance::doubt), by the likelihood of the pairs and
-    /// the prior, and what it leaves them is taken from the fix's protection; of other searches none may pass. What the candidates do
-    /// not propose counts as much as those who propose may have mistaken the points for their like ([`Judge::mislabeled`]).
+    /// If a motion maps the identified model points onto other model points, the poses before and after it explain the
+    /// same measurements. Candidates, residuals, precision, prior and visible sides decide between them as between any
+    /// sets; an assignment that passes all tests is an alternative. A search that weighs evidence accepts the fix if
+    /// all alternatives together have at most the probability [`Acceptance::doubt`](super::Acceptance::doubt), by the
+    /// likelihood of the pairs and the prior, and their probability is deducted from the risk of the protection levels.
+    /// Other searches accept no alternative. An assignment outside the candidates is weighted by the probability that
+    /// the proposer confused the points ([`Judge::mislabeled`]).
     pub(super) fn distinguished(&self, mut outcome: Outcome, weighs: bool) -> Outcome {
         let Outcome::Fix(fix) = &mut outcome else { return outcome };
         let admitted = self.admitted(&fix.pairs);
@@ -36,7 +37,7 @@ impl Judge<'_> {
         let Ok(own) = self.hypothesis(&fix.pairs) else { return outcome };
         let mut possible: Vec<Hypothesis> = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok()).collect();
         possible.retain(|other| self.faces(other) && self.residuals(other).is_ok());
-        // The likeliest first: those near one that is known are the same pose.
+        // In order of falling score: an assignment near a known one is the same pose.
         possible.sort_by(by_score);
         let (mut near, mut others): (Vec<Hypothesis>, Vec<Hypothesis>) = (Vec::new(), Vec::new());
         for mut other in possible {
@@ -58,7 +59,7 @@ impl Judge<'_> {
         });
         if others.is_empty() || (weighs && weight <= self.acceptance.doubt * (1.0 + weight)) {
             if weight > 0.0 && weighs {
-                // The search may have counted some of them among the poses elsewhere: what is counted twice is on the safe side.
+                // The search may have counted some of them among the poses elsewhere; counting twice is conservative.
                 let known = fix.integrity.misidentified.unwrap_or(0.0);
                 self.protected(fix, known + weight / (1.0 + weight));
             }
@@ -67,10 +68,11 @@ impl Judge<'_> {
         Outcome::Ambiguous(std::iter::once(own).chain(others).map(Hypothesis::alternative).collect())
     }
 
-    /// All sets of as many pairs in which the same measured points are other points of the model: a triangle of them, as wide
-    /// as they have one, is laid on every triangle of the model that is coherent with it, and each of the others must come to
-    /// lie at a model point of its own.
-    /// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
+    /// All assignments of the same measured points to other model points.
+    ///
+    /// Alignment (Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990): a wide
+    /// triangle of the measured points is placed on every coherent triangle of the model, and each other point must
+    /// then lie at a model point of its own.
     fn symmetric_sets(&self, pairs: &[Correspondence], admitted: &Admitted) -> BTreeSet<Vec<Correspondence>> {
         let mut found = BTreeSet::new();
         let Some(base) = self.wide(pairs) else { return found };
@@ -107,8 +109,8 @@ impl Judge<'_> {
         found
     }
 
-    /// Three of the measured points, far apart: one far from their middle, the farthest from that, and the one that makes the
-    /// largest triangle with both.
+    /// Three distant measured points: one far from the centroid, the farthest from it, and the one with the largest
+    /// triangle.
     fn wide(&self, pairs: &[Correspondence]) -> Option<[usize; 3]> {
         let place = |pair: &Correspondence| self.problem.cloud[pair.cloud].position.at.coords;
         let middle = pairs.iter().map(place).sum::<Vector3<f64>>() / pairs.len() as f64;
@@ -123,7 +125,9 @@ impl Judge<'_> {
         (three[0] != three[1] && three[0] != three[2] && three[1] != three[2]).then_some(three)
     }
 
-    /// The set of all measured points of `pairs` that these three begin, if every other lies at a model point of its own.
+    /// The assignment of all measured points of `pairs` that extends these three.
+    ///
+    /// `None` unless each other point lies at a model point of its own.
     fn completed(
         &self,
         three: [Correspondence; 3],
@@ -145,8 +149,7 @@ impl Judge<'_> {
         Some(set)
     }
 
-    /// The model point nearest to where the pose places a measured point, of those that it may be and that are coherent with
-    /// the three.
+    /// The nearest admitted model point under the pose that is coherent with the three.
     fn nearest(
         &self,
         pose: &Transform<Object, Camera>,
@@ -162,7 +165,7 @@ impl Judge<'_> {
         };
         let mut nearest = (f64::INFINITY, None);
         for &model in admitted {
-            // Most are far: that is known sooner than their distances to the three.
+            // The distance excludes most points and is cheaper than the coherence test.
             let apart = (self.problem.model[model].at - place).norm_squared();
             if apart < nearest.0 && coherent(model) {
                 nearest = (apart, Some(model));
@@ -171,7 +174,7 @@ impl Judge<'_> {
         nearest.1
     }
 
-    /// Whether the camera sees the identified points from the sides from which they can be seen.
+    /// Whether the camera sees the identified points from their visible sides.
     pub(super) fn faces(&self, hypothesis: &Hypothesis) -> bool {
         let camera = hypothesis.pose.translation();
         hypothesis.pairs.iter().all(|pair| self.problem.model[pair.model].shows_itself(&camera))

@@ -1,12 +1,14 @@
-//! What an error of the pose is of the points that it transfers.
+//! The error of transferred model points under an error of the pose.
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3::skew};
 
 use crate::ModelPoint;
 
-/// The model points as seen from the camera, by their moments: of a small error ξ = (φ, ρ) of the pose the mean over the points of the
-/// square of what it moves each by is ξᵀ A ξ, A = mean of Jᵀ J, J = (\[p\]×, −I).
+/// The second moments of the model points as seen from the camera.
+///
+/// A small pose error ξ = (φ, ρ) moves the points by a mean square of ξᵀ A ξ, with A the mean of Jᵀ J and J = (\[p\]×,
+/// −I).
 pub(super) struct Transfer {
     moments: Matrix6<f64>,
 }
@@ -24,13 +26,15 @@ impl Transfer {
         Self { moments: moments / model.len().max(1) as f64 }
     }
 
-    /// The predicted error of the model points (m): root mean square over all of them, one standard deviation.
+    /// The predicted error of the model points (m, RMS over the points, one sigma).
     pub(super) fn rms(&self, covariance: &Covariance6<Object, Camera>) -> f64 {
         // tr A Σ, both symmetric.
         self.moments.component_mul(&covariance.matrix).sum().sqrt()
     }
 
-    /// How far apart two poses, one of them about that of these moments, place the model points (m): root mean square.
+    /// The RMS distance (m) between the model points under two poses.
+    ///
+    /// One of the poses must be near that of these moments.
     pub(super) fn between(&self, one: &Transform<Object, Camera>, other: &Transform<Object, Camera>) -> f64 {
         let xi = one.error_to(other);
         xi.dot(&(self.moments * xi)).max(0.0).sqrt()

@@ -1,56 +1,61 @@
-//! A joint fix that does not believe a survey against the images.
+//! Joint fixes that reject surveys in contradiction to the images.
 
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
 use super::{JointFix, Member, ObjectObservations, Placement, joint_fix};
 use crate::{Degenerate, candidates::chi_square};
 
-/// The camera relative to an object, and its covariance.
+/// The camera's pose relative to an object, with its covariance.
 pub type RelativePose = (Transform<Object, Camera>, Covariance6<Object, Camera>);
 
-/// The fixes of the last instant, relative to each object it saw.
+/// The camera poses of the last instant relative to each object that it observed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointFixes {
-    /// For each object the camera's pose relative to it; `None` of objects that the last instant did not see.
+    /// The camera's pose relative to each object; `None` for objects that the last instant did not observe.
     pub object_from_camera: Vec<Option<RelativePose>>,
-    /// The objects that do not stand where they were surveyed, by their indices.
+    /// The indices of displaced objects, whose surveys were rejected.
     pub displaced: Vec<usize>,
-    /// The objects of one or two points that contradict the rest, by their indices: their points take no part.
+    /// The indices of objects with one or two points that contradict the rest; their points were excluded.
     pub left_out: Vec<usize>,
     /// χ² of pixels and surveys together.
     pub chi2: f64,
-    /// Its degrees of freedom.
+    /// The degrees of freedom of χ².
     pub dof: usize,
-    /// What χ² exceeds with one minus the confidence.
+    /// The limit of χ², which a correct fix exceeds with probability one minus the confidence.
     pub chi2_limit: f64,
 }
 
-/// Why there is no joint fix.
+/// The reason for the absence of a joint fix.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unjoined {
-    /// The points determine none.
+    /// The points determine no joint fix.
     #[error(transparent)]
     Degenerate(#[from] Degenerate),
-    /// No surveys that are given up reconcile the images.
+    /// The images contradict each other even without the surveys.
     #[error(
-        "pixels and surveys together have χ² = {chi2:.1}; at most {limit:.1} is likely, whichever surveys are given up"
+        "contradictory images: pixels and surveys have χ² = {chi2:.1}, the limit is {limit:.1}, whichever surveys are \
+         rejected"
     )]
     Contradiction {
-        /// χ² with the surveys that were left.
+        /// χ² with the remaining surveys.
         chi2: f64,
-        /// What a true fix exceeds with one minus the confidence.
+        /// The limit, which a correct fix exceeds with probability one minus the confidence.
         limit: f64,
     },
 }
 
-/// One fix over all `observations_by_frame`, the last of which is asked for; surveys that the images contradict at this `confidence`
-/// are given up, one object after the other: always that without whose survey χ² is least. An object of which no glimpse
-/// has three points cannot say where it stands itself: instead of its survey its points are given up.
+/// One fix over all `observations_by_frame`; the result describes the last instant.
+///
+/// Surveys that contradict the images at this `confidence` are rejected one after the other: always the survey whose
+/// rejection minimises χ². An object with fewer than three points in every instant cannot determine its own pose, so
+/// its points are excluded instead of its survey.
 ///
 /// # Errors
-/// As [`joint_fix`], and where the images contradict each other whatever the surveys are.
+///
+/// Those of [`joint_fix`], and images that contradict each other without the surveys.
 ///
 /// # Panics
+///
 /// As [`joint_fix`].
 pub fn joint_fixes(
     rig: &StereoRig,
@@ -58,7 +63,7 @@ pub fn joint_fixes(
     observations_by_frame: &[ObjectObservations],
     confidence: f64,
 ) -> Result<JointFixes, Unjoined> {
-    /// Points that say where an object stands.
+    /// Number of points that determine an object's pose.
     const ENOUGH: usize = 3;
     let (mut members, mut observations_by_frame) = (members.to_vec(), observations_by_frame.to_vec());
     let (mut displaced, mut left_out) = (Vec::new(), Vec::new());
@@ -67,13 +72,13 @@ pub fn joint_fixes(
         observations_by_frame.iter().map(|g| g.count(object)).max().unwrap_or(0)
     };
     let limit = |fix: &JointFix| chi_square(fix.dof.max(1), confidence);
-    // Written so that a NaN is refused too.
+    // A NaN is rejected as well.
     while !(fix.chi2 <= limit(&fix)) {
         let seen = (0..members.len()).filter(|&o| members[o].placement != Placement::Displaced);
         let (held, weak): (Vec<usize>, Vec<usize>) = seen
             .filter(|&o| max(o, &observations_by_frame) > 0)
             .partition(|&o| max(o, &observations_by_frame) >= ENOUGH);
-        // One object must stand where it is said to: nothing else relates the camera to the site.
+        // One object must keep its stated pose, as nothing else relates the camera to the site.
         let given_up = if held.len() < 2 { Vec::new() } else { held };
         let without = |&object: &usize| {
             let (mut members, mut observations_by_frame) = (members.clone(), observations_by_frame.clone());
@@ -94,7 +99,7 @@ pub fn joint_fixes(
         if fewer[object].placement == Placement::Displaced { &mut displaced } else { &mut left_out }.push(object);
         (members, observations_by_frame, fix) = (fewer, left, better);
     }
-    let instant = observations_by_frame.len() - 1; // a fix of none is refused above
+    let instant = observations_by_frame.len() - 1; // an empty list is rejected above
     let last = &observations_by_frame[instant];
     displaced.sort_unstable();
     left_out.sort_unstable();

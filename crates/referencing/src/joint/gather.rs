@@ -1,4 +1,4 @@
-//! Points of objects that were not fixed by themselves, sought where the others put the camera.
+//! Points of objects without a fix of their own, searched at their predicted positions.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
@@ -9,69 +9,71 @@ use crate::{
     candidates, candidates::chi_square,
 };
 
-/// What a joint fix takes of objects that were not fixed by themselves.
+/// The contribution of objects without a fix of their own to a joint fix.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gathered {
-    /// Objects that take part, by their indices, with their pairs.
+    /// The objects that take part, by index, with their pairs.
     pub added: Vec<(usize, Vec<Correspondence>)>,
-    /// Objects of which something may be in view, and why they take no part.
+    /// The possibly visible objects that take no part, by index, with the reason.
     pub left_out: Vec<(usize, Unadded)>,
 }
 
-/// Why the points of an object take no part in a joint fix.
+/// The reason for which an object's points take no part in a joint fix.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Unadded {
-    /// It may stand anywhere: three points of its own must say where.
-    #[error("no survey says where it stands, and it was not fixed by itself")]
+    /// The object has no survey, so it needs three points of its own.
+    #[error("no survey and no fix of its own: its pose is unknown")]
     Unsurveyed,
-    /// Nothing tells which cloud point is which of its points.
-    #[error("{points} of its points have several candidates where the others put them, or share theirs")]
+    /// The correspondence of its points is ambiguous.
+    #[error("ambiguous candidates: {points} of its points have several near their prediction, or share theirs")]
     Several {
-        /// Points with a candidate that is not theirs alone.
+        /// The number of points with an ambiguous candidate.
         points: usize,
     },
-    /// Chance alone would put as many cloud points there.
+    /// The number of false alarms of its pairs is too large (a-contrario test).
     #[error(
-        "chance gives {expected:.1e} sets of {size} points where the others put them; at most {budget:.1e} are accepted"
+        "possible false alarm: the NFA of {size} points near their predictions is {expected:.1e}, the limit is \
+         {budget:.1e}"
     )]
     AContrario {
-        /// Pairs that were found.
+        /// The number of pairs.
         size: usize,
-        /// Expected number of chance sets of this size or larger.
+        /// The number of false alarms (NFA): the expected number of random sets of this size or larger.
         expected: f64,
-        /// [`Acceptance::max_nfa`].
+        /// The limit, [`Acceptance::max_nfa`].
         budget: f64,
     },
-    /// Together they are not where the others put them.
-    #[error("{size} of its points raise χ² by {chi2:.1}; at most {limit:.1} is likely")]
+    /// Its points contradict their joint prediction.
+    #[error("contradiction: {size} of its points raise χ² by {chi2:.1}, the limit is {limit:.1}")]
     Contradiction {
-        /// Pairs that were found.
+        /// The number of pairs.
         size: usize,
-        /// By how much they raise χ² of pixels and surveys together.
+        /// The increase of χ² of pixels and surveys by these pairs.
         chi2: f64,
-        /// What true pairs exceed with one minus the confidence.
+        /// The limit, which correct pairs exceed with probability one minus the confidence.
         limit: f64,
     },
-    /// With them no joint fix was found.
+    /// The joint fix with its points is degenerate.
     #[error("{0}")]
     Degenerate(#[from] Degenerate),
 }
 
-/// The points of objects that are not among `fixed` and yet bear on the fix of those: one or two points of an object tell
-/// no pose of their own, but where the object should stand by its survey they are four pixels each.
+/// The points of objects outside `fixed` that contribute to their joint fix.
 ///
-/// The joint fix of `fixed` says where the camera is. From there and from its survey every other object's points are
-/// predicted, with the covariance of both, and a cloud point that no fixed object uses is a candidate within the
+/// One or two points of an object determine no pose, but with a survey each of them adds four pixel coordinates. The
+/// joint fix of `fixed` determines the camera's pose. From it and the survey the points of every other object are
+/// predicted, with the covariance of both. A cloud point that no fixed object uses is a candidate within the
 /// Mahalanobis gate of [`Acceptance::confidence`] (Bar-Shalom and Fortmann, *Tracking and Data Association*, 1988),
-/// where Stage 1 has `listed` it, if Stage 1 looked. Pairs are kept that have no other candidate on either
-/// side, where chance gives less than [`Acceptance::max_nfa`] sets of as many, and, since an object's points share the
-/// error of its survey and all share the camera's, where the joint fix with them has a χ² no larger than is likely.
-/// Objects are added in their order.
+/// and, if Stage 1 listed candidates, among those `listed`. A set of pairs is added on three conditions: no pair has
+/// another candidate on either side; the NFA is at most [`Acceptance::max_nfa`]; and the joint fix with the pairs
+/// raises χ² by no more than its limit, since an object's points share the survey's error and all points share the
+/// camera's. Objects are added in their order.
 ///
-/// Nothing is added where `fixed` have no joint fix, or contradict each other: which of them to believe is not known then.
+/// Nothing is added if `fixed` has no joint fix or contradicts itself: the wrong object is unknown then.
 ///
 /// # Panics
-/// When an index is out of range.
+///
+/// If an index is out of range.
 pub fn gather(
     rig: &StereoRig,
     targets: &[Target],
@@ -112,7 +114,7 @@ pub fn gather(
             let next = joint_fix(rig, &members, std::slice::from_ref(&more))?;
             let (size, chi2) = (pairs.len(), next.chi2 - fix.chi2);
             let limit = chi_square(4 * size, acceptance.confidence);
-            // Written so that a NaN is refused too.
+            // A NaN is rejected as well.
             if chi2 <= limit { Ok((more, next)) } else { Err(Unadded::Contradiction { size, chi2, limit }) }
         }) {
             Ok(better) => {
@@ -126,7 +128,7 @@ pub fn gather(
     gathered
 }
 
-/// The joint fix of one glimpse, where its χ² is likely.
+/// The joint fix of one instant, if its χ² is within the limit.
 fn agreeing(
     rig: &StereoRig,
     members: &[Member],
@@ -137,17 +139,17 @@ fn agreeing(
     (fix.chi2 <= chi_square(fix.dof.max(1), confidence)).then_some(fix)
 }
 
-/// Where an object's points should be.
+/// The predicted positions of an object's points, with their candidates.
 struct Gates {
     object: usize,
-    /// The predicted place of each point in the camera, and its covariance without the measurement's.
+    /// The predicted position of each point in the camera frame, and its covariance without measurement noise.
     places: Vec<(Vector3<f64>, Matrix3<f64>)>,
-    /// The candidates of each.
+    /// The candidates of each point.
     lists: Vec<Vec<usize>>,
 }
 
 impl Gates {
-    /// `None` where no pose relative to the object follows from one relative to the site.
+    /// `None` if no pose relative to the object follows from the pose relative to the site.
     fn of(
         object: usize,
         target: &Target,
@@ -169,7 +171,7 @@ impl Gates {
         Some(Self { object, places: target.points.iter().map(place).collect(), lists })
     }
 
-    /// Without the cloud points that are not `free`, nor among those `listed`.
+    /// Removes the cloud points that are not `free` or not `listed`.
     fn only(mut self, free: &[bool], listed: Option<&Candidates>) -> Self {
         for (k, list) in self.lists.iter_mut().enumerate() {
             list.retain(|&j| free[j] && listed.is_none_or(|listed| listed.lists[k].contains(&j)));
@@ -181,7 +183,7 @@ impl Gates {
         self.lists.iter().any(|list| !list.is_empty())
     }
 
-    /// The pairs that have no other candidate on either side.
+    /// The pairs without another candidate on either side.
     fn alone(&self, claims: &[usize]) -> Vec<Correspondence> {
         let pair = |(model, list): (usize, &Vec<usize>)| match list[..] {
             [cloud] if claims[cloud] == 1 => Some(Correspondence { model, cloud }),
@@ -190,7 +192,7 @@ impl Gates {
         self.lists.iter().enumerate().filter_map(pair).collect()
     }
 
-    /// Whether the pairs say anything: there are some, and chance would hardly give as many.
+    /// Whether there are pairs and their NFA is within the limit.
     fn bears(
         &self,
         pairs: &[Correspondence],
@@ -203,15 +205,17 @@ impl Gates {
         }
         let (size, budget) = (pairs.len(), acceptance.max_nfa);
         let expected = self.expected(size, cloud, free, acceptance.confidence);
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         if expected <= budget { Ok(()) } else { Err(Unadded::AContrario { size, expected, budget }) }
     }
 
-    /// The expected number of sets of `size` points or more that chance puts into the gates: Σ_{j ≥ size} e_j(p), e_j the
-    /// elementary symmetric polynomials and p_k the volume of a point's gate times the density of the cloud about it.
+    /// The expected number of random sets of `size` or more points in the gates.
+    ///
+    /// It is Σ_{j ≥ size} e_j(p), with e_j the elementary symmetric polynomials and p_k the volume of a point's gate
+    /// times the density of the cloud about it.
     fn expected(&self, size: usize, cloud: &[MeasuredPoint], free: &[bool], confidence: f64) -> f64 {
         let gate = 4.0 / 3.0 * std::f64::consts::PI * chi_square(3, confidence).powf(1.5);
-        // e_0 … e_size of the points so far; the last has all larger ones as well.
+        // e_0 … e_size of the points so far; the last also counts all larger sets.
         let mut sets = vec![0.0; size + 1];
         sets[0] = 1.0;
         for ((place, spread), list) in self.places.iter().zip(&self.lists) {
@@ -233,7 +237,7 @@ impl Gates {
     }
 }
 
-/// The density (1/m³) of points at these distances from a place: that of the nearest four.
+/// The density (1/m³) of points at these distances from a position, from the nearest four.
 fn density(near: &[(f64, usize)]) -> f64 {
     const NEAREST: usize = 4;
     let count = near.len().min(NEAREST);
@@ -255,18 +259,18 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint, triad};
 
-    /// Three objects of five points each, one cloud, and what is true.
+    /// Three objects of five points each, one cloud, and the ground truth.
     struct Scene {
         rig: StereoRig,
         targets: Vec<Target>,
-        /// Where each object's frame truly stands.
+        /// The true pose of each object's frame.
         truly: Vec<Transform<World, Object>>,
         cloud: Vec<MeasuredPoint>,
-        /// Which point of which object each cloud point shows, of those that show one.
+        /// The object and the point that each of the first cloud points shows.
         shows: Vec<(usize, usize)>,
     }
 
-    /// The first `seen` points of each object, and as many places besides where there is nothing.
+    /// A scene with the first `seen` points of each object, and `clutter` random points.
     fn scene(seen: [usize; 3], survey_sigma: f64, clutter: usize, rng: &mut ChaCha8Rng) -> Scene {
         let rig = rig();
         let (mut objects, mut truly, mut places, mut shows) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -310,7 +314,7 @@ mod tests {
     }
 
     impl Scene {
-        /// The pairs of the first object, which is fixed by itself.
+        /// The pairs of the first object, which has a fix of its own.
         fn fixed(&self) -> Vec<(usize, Vec<Correspondence>)> {
             let own = self.shows.iter().enumerate().filter(|(_, (object, _))| *object == 0);
             vec![(0, own.map(|(cloud, &(_, model))| Correspondence { model, cloud }).collect())]
@@ -320,7 +324,7 @@ mod tests {
             gather(&self.rig, &self.targets, &self.cloud, &[None; 3], &self.fixed(), &Acceptance::default())
         }
 
-        /// The pose relative to the first object by these pairs.
+        /// The pose relative to the first object from these pairs.
         fn fix(&self, all: &[(usize, Vec<Correspondence>)]) -> crate::RelativePose {
             let mut object_observations = ObjectObservations::default();
             for (object, pairs) in all {
@@ -337,11 +341,11 @@ mod tests {
         }
     }
 
-    /// Two points of one object and one of another, neither of which could be fixed: each pair that is found is true, the
-    /// fix is as good as it says and better than that of the object that was fixed by itself, by its own word and
+    /// Two points of one object and one of another, neither with a fix of its own: every pair is true, the covariance
+    /// is consistent (NEES), and the fix is more accurate than that of the first object alone, by its covariance and
     /// over the draws.
     ///
-    /// Seen to fail when the predicted places' covariance has a lever of the other sign.
+    /// Fails if the covariance of the predicted positions has a lever of the wrong sign.
     #[test]
     fn one_or_two_points_of_others_make_the_fix_better() {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
@@ -369,9 +373,9 @@ mod tests {
         assert!(joint < 0.9 * alone, "{joint} {alone}");
     }
 
-    /// Where the others show none of their points, what clutter puts there is not taken for them.
+    /// Clutter near the predicted positions of invisible points is not accepted as points.
     ///
-    /// Seen to fail without the test against chance: 122 sets of 300 scenes.
+    /// Fails without the NFA test: 122 sets in 300 scenes.
     #[test]
     fn clutter_is_not_taken_for_points() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -382,19 +386,19 @@ mod tests {
             refused += gathered.left_out.len();
         }
         assert!(added <= 3, "{added} sets of clutter");
-        assert!(refused > 30, "only {refused} sets of clutter were there to be refused");
+        assert!(refused > 30, "only {refused} sets of clutter were available for rejection");
     }
 
-    /// Seen to fail when the first of several candidates is taken.
+    /// Fails if the first of several candidates is taken.
     #[test]
     fn what_takes_no_part_is_reported_why() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
         let why = |scene: &Scene| scene.gathered().left_out.into_iter().map(|(_, why)| why).collect::<Vec<_>>();
-        // One cloud point is twice there: which of the two is the object's is not known.
+        // A duplicated cloud point: the correspondence is ambiguous.
         let mut twice = scene([5, 1, 0], 5e-4, 0, &mut rng);
         twice.cloud.push(twice.cloud[5]);
         assert_eq!(why(&twice), [Unadded::Several { points: 1 }]);
-        // Each point is within its own gate, all together turn as no rigid object does.
+        // Each point is within its own gate, but together they move as no rigid object does.
         let mut torn = scene([5, 4, 0], 2e-3, 0, &mut rng);
         for (k, point) in torn.cloud[5..].iter_mut().enumerate() {
             let pixels = point.pixels.as_mut().unwrap();
@@ -402,7 +406,7 @@ mod tests {
             pixels.at.right.v += if k % 2 == 0 { 3.0 } else { -3.0 };
         }
         assert!(matches!(why(&torn)[..], [Unadded::Contradiction { size: 4, .. }]), "{:?}", why(&torn));
-        // An object that nobody surveyed.
+        // An object without a survey.
         let unknown = scene([5, 2, 0], 5e-4, 0, &mut rng);
         let mut targets = unknown.targets.clone();
         targets[1].world_from_object = None;
@@ -410,7 +414,7 @@ mod tests {
         let lists = [Some(&listed), Some(&listed), None];
         let said = gather(&unknown.rig, &targets, &unknown.cloud, &lists, &unknown.fixed(), &Acceptance::default());
         assert_eq!(said, Gathered { added: Vec::new(), left_out: vec![(1, Unadded::Unsurveyed)] });
-        // Stage 1 looked, and listed nothing.
+        // Stage 1 ran and listed nothing.
         let none = Candidates { lists: vec![Vec::new(); 5] };
         let lists = [Some(&listed), Some(&none), None];
         let scene = scene([5, 2, 0], 5e-4, 0, &mut rng);

@@ -1,10 +1,10 @@
-//! One fix over everything in view: several objects, several instants, one rig.
+//! Joint fix: one estimate of camera and object poses from all visible objects over several instants.
 //!
-//! A site's objects are known each by itself, and where they stand to each other by a survey. Its error is the same for all
-//! points of an object and for all instants: six numbers an object, shared, not noise of every point. Poses and those
-//! six are therefore estimated together, and the survey is an observation like the pixels. An object of which one or two
-//! points are in view has no fix of its own, but its survey makes an observation of them all the same: they are sought
-//! where the others put them.
+//! Each object of a site is modelled by itself, and a survey relates the objects. The survey's error is equal for all
+//! points of an object and for all instants: six shared numbers per object, not independent noise of each point. Camera
+//! poses and these six numbers are therefore estimated together, with the survey as an observation beside the pixels.
+//! An object with one or two visible points has no fix of its own, but its survey makes its points usable: they are
+//! searched at their positions predicted from the other objects.
 
 mod displaced;
 mod gather;
@@ -24,31 +24,33 @@ pub use displaced::{JointFixes, RelativePose, Unjoined, joint_fixes};
 pub use gather::{Gathered, Unadded, gather};
 use system::{JointState, System};
 
-/// What is known of where an object stands in the site's frame.
+/// The knowledge of an object's pose in the site's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(
     clippy::large_enum_variant,
     reason = "one an object: a survey's thirty-six numbers are little beside its points"
 )]
 pub enum Placement {
-    /// It stands where it is said to: of the object whose frame is the site's, by definition.
+    /// The stated pose is exact, as that of the object that defines the site's frame.
     Exact,
-    /// It stands there with this covariance of η in `site_from_object_true = site_from_object · Exp(η)`.
+    /// The stated pose has this covariance of η in `site_from_object_true = site_from_object · Exp(η)`.
     Surveyed(Covariance6<Object, Object>),
-    /// It may have been displaced: nothing but the images say where it stands.
+    /// The pose is unknown, as of a displaced object: only the images determine it.
     Displaced,
 }
 
-/// An object of the site.
+/// An object of the site in a joint fix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Member {
-    /// Where it is said to stand: its frame in the site's.
+    /// The stated pose of the object's frame in the site's frame.
     pub site_from_object: Transform<Object, Object>,
-    /// How well that is known.
+    /// The uncertainty of the stated pose.
     pub placement: Placement,
 }
 
-/// What one instant saw: points with the index of their object, model places in that object's frame.
+/// The observed points of one instant.
+///
+/// Each has the index of its object, and model coordinates in that object's frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ObjectObservations {
     /// The points.
@@ -56,42 +58,43 @@ pub struct ObjectObservations {
 }
 
 impl ObjectObservations {
-    /// Adds points of an object.
+    /// Adds observed points of an object.
     pub fn see(&mut self, object: usize, data: &Observations<'_>) {
         self.points.extend(data.points.iter().map(|point| (object, *point)));
     }
 
-    /// How many points of an object it has.
+    /// The number of observed points of an object.
     pub fn count(&self, object: usize) -> usize {
         self.points.iter().filter(|(o, _)| *o == object).count()
     }
 }
 
-/// The fix of all instants.
+/// The joint fix of all instants.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointFix {
-    /// The pose of each instant: the camera in the site's frame, and its covariance.
+    /// The camera's pose in the site's frame and its covariance, for each instant.
     pub site_from_camera: Vec<(Transform<Object, Camera>, Covariance6<Object, Camera>)>,
-    /// Where each object stands, and how well that is now known; a covariance of nought where it is exact.
+    /// The pose of each object in the site's frame and its covariance; zero covariance for an exact pose.
     pub site_from_object: Vec<(Transform<Object, Object>, Covariance6<Object, Object>)>,
     /// χ² of pixels and surveys together.
     pub chi2: f64,
-    /// Its degrees of freedom.
+    /// The degrees of freedom of χ².
     pub dof: usize,
-    /// The covariance of all unknowns together.
+    /// The joint covariance of all unknowns.
     covariance: Mat<f64>,
-    /// For each object the block of its six unknowns.
+    /// The index of each object's block of six unknowns.
     unknowns: Vec<Option<usize>>,
 }
 
 impl JointFix {
-    /// The camera of an instant relative to an object, with its covariance: both err together, and what they share
-    /// cancels.
+    /// The camera's pose relative to an object at one instant, with its covariance.
     ///
-    /// With T_sc = T̂_sc Exp(ξ) and T_so = T̂_so Exp(η): T_oc = T̂_oc Exp(ξ − Ad(T̂_co) η) to first order.
+    /// The errors of camera and object pose are correlated, and their common part cancels. With T_sc = T̂_sc Exp(ξ) and
+    /// T_so = T̂_so Exp(η): T_oc = T̂_oc Exp(ξ − Ad(T̂_co) η) to first order.
     ///
     /// # Panics
-    /// When an index is out of range.
+    ///
+    /// If an index is out of range.
     pub fn object_from_camera(&self, instant: usize, object: usize) -> RelativePose {
         let (site_from_camera, own) = &self.site_from_camera[instant];
         let pose = self.site_from_object[object].0.inverse() * *site_from_camera;
@@ -104,18 +107,20 @@ impl JointFix {
     }
 }
 
-/// The most likely poses of all instants and places of all objects, from the pixels that `rig` saw and the surveys:
-/// least Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η, by Levenberg's and Marquardt's steps on the dense normal equations.
+/// The maximum-likelihood poses of all instants and objects, from pixels and surveys.
 ///
-/// Each instant starts from the unweighted fit of its points, their objects standing where they are said to; an object
-/// displaced by much is found from there as long as others, or most points, stand still.
+/// It minimises Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η by the Levenberg–Marquardt method on the dense normal equations. Each
+/// instant starts from the unweighted fit of its points, with the objects at their stated poses; a far displaced object
+/// is found from there as long as other objects, or most points, are at their stated poses.
 ///
 /// # Errors
-/// [`Degenerate`]: an instant with fewer than three points or with points on a line, points without pixels, a point behind
-/// the camera, or a motion that nothing determines (a displaced object that nobody else's place relates to the site).
+///
+/// [`Degenerate`], for an instant with fewer than three points or with collinear points, points without pixels, a point
+/// behind the camera, or an undetermined motion (a displaced object that no other object relates to the site).
 ///
 /// # Panics
-/// When the index of an object is out of range.
+///
+/// If the index of an object is out of range.
 pub fn joint_fix(
     rig: &StereoRig,
     members: &[Member],

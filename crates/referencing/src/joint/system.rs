@@ -10,19 +10,19 @@ use crate::{
     solve::{PixelTarget, PixelTerms, Term, converged, inverse, rounding},
 };
 
-/// All unknowns: the pose of each instant and the place of each object.
+/// All unknowns: the pose of each instant and of each object.
 #[derive(Debug, Clone)]
 pub(super) struct JointState {
     pub(super) poses: Vec<Transform<Object, Camera>>,
     pub(super) places: Vec<Transform<Object, Object>>,
 }
 
-/// The problem, its weights made ready.
+/// The problem with prepared weights.
 pub(super) struct System<'a> {
     members: &'a [Member],
     observations_by_frame: &'a [ObjectObservations],
     pixel_terms: Vec<PixelTerms<'a>>,
-    /// For each object the block of its six unknowns; `None` where it stands exactly.
+    /// The index of each object's block of six unknowns; `None` for an exact pose.
     unknowns: Vec<Option<usize>>,
     /// The inverse of each survey's covariance.
     surveys: Vec<Option<Matrix6<f64>>>,
@@ -35,11 +35,11 @@ struct Linearized {
     cost: f64,
 }
 
-/// Steps of one descent.
+/// Maximum number of steps of one descent.
 const MAX_STEPS: u64 = 100;
-/// Below this decrement the cost has no digits left to tell better from worse.
+/// Decrement below which the cost is dominated by rounding.
 const NEAR: f64 = 1e-4;
-/// Below this decrement nothing is left to gain.
+/// Decrement below which no improvement is left.
 const NOTHING: f64 = 1e-18;
 
 impl<'a> System<'a> {
@@ -64,7 +64,7 @@ impl<'a> System<'a> {
         let mut unknowns = Vec::with_capacity(members.len());
         let mut surveys = Vec::with_capacity(members.len());
         for (object, member) in members.iter().enumerate() {
-            // What nobody sees is neither estimated nor a motion that nothing determines.
+            // An unobserved object is not estimated, and does not count as an undetermined motion.
             let open = member.placement != Placement::Exact && seen(object);
             unknowns.push(open.then_some(blocks));
             blocks += usize::from(open);
@@ -76,19 +76,21 @@ impl<'a> System<'a> {
         Ok(Self { members, observations_by_frame, pixel_terms, unknowns, surveys, blocks })
     }
 
-    /// The block of an object's six unknowns.
+    /// The index of an object's block of six unknowns.
     pub(super) fn unknown(&self, object: usize) -> Option<usize> {
         self.unknowns[object]
     }
 
-    /// Pixel coordinates and survey numbers, less the unknowns.
+    /// The number of pixel coordinates and survey numbers minus that of the unknowns.
     pub(super) fn dof(&self) -> usize {
         let pixels: usize =
             self.observations_by_frame.iter().map(|object_observations| 4 * object_observations.points.len()).sum();
         (pixels + 6 * self.surveys.iter().flatten().count()).saturating_sub(6 * self.blocks)
     }
 
-    /// `live`: weights at the fitted points; else at the measured ones, so that costs can be compared.
+    /// The normal equations at a state; `live` evaluates the weights at the fitted points.
+    ///
+    /// Otherwise the weights are those at the measured points, so that costs are comparable.
     fn linearize(&self, state: &JointState, live: bool) -> Result<Linearized, Degenerate> {
         let size = 6 * self.blocks;
         let mut all = Linearized { normal: Mat::zeros(size, size), gradient: Mat::zeros(size, 1), cost: 0.0 };
@@ -102,7 +104,7 @@ impl<'a> System<'a> {
                 let term = if live { pixel_terms.live(k, &at) } else { pixel_terms.frozen(k, &at) };
                 let term = term.ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
                 all.cost += term.cost;
-                // Under T Exp(ξ) the place moves by [p]× φ − ρ, under S Exp(η) by R (ρ − [P]× φ).
+                // Under T Exp(ξ) the point moves by [p]× φ − ρ, under S Exp(η) by R (ρ − [P]× φ).
                 let mut by_pose = Matrix3x6::zeros();
                 by_pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&skew(&at));
                 by_pose.fixed_view_mut::<3, 3>(0, 3).fill_with_identity();
@@ -147,7 +149,7 @@ impl<'a> System<'a> {
         JointState { poses: poses.collect(), places: places.collect() }
     }
 
-    /// The least cost near a state, and that cost.
+    /// The minimum of the cost near a state, and its cost.
     pub(super) fn minimize(&self, mut state: JointState) -> Result<(JointState, f64), Degenerate> {
         let (mut here, mut damping) = (self.linearize(&state, false)?, 0.0);
         for _ in 0..MAX_STEPS {
@@ -189,8 +191,9 @@ impl<'a> System<'a> {
     }
 }
 
-/// How η moves under Exp(η) Exp(δ), at δ = 0: I + ad/2 + ad²/12, ad = \[ \[φ\]×, 0; \[ρ\]×, \[φ\]× \]; what is left out is of
-/// fourth order. (Barfoot, *State Estimation for Robotics*, 2017, Sec. 7.1.5.)
+/// The derivative of η under Exp(η) Exp(δ) at δ = 0: I + ad/2 + ad²/12, ad = \[ \[φ\]×, 0; \[ρ\]×, \[φ\]× \].
+///
+/// The error is of fourth order (Barfoot, *State Estimation for Robotics*, 2017, Sec. 7.1.5).
 fn right_jacobian_inverse(eta: &Vector6<f64>) -> Matrix6<f64> {
     let turn = skew(&eta.fixed_rows::<3>(0).into_owned());
     let mut ad = Matrix6::zeros();
@@ -201,7 +204,7 @@ fn right_jacobian_inverse(eta: &Vector6<f64>) -> Matrix6<f64> {
 }
 
 impl Linearized {
-    /// Adds JₐᵀW J_b to the block (a, b), a ≥ b: the lower half is what is factorised.
+    /// Adds JₐᵀW J_b to the block (a, b), a ≥ b; only the lower half is factorised.
     fn add(&mut self, a: usize, b: usize, by_a: &Matrix3x6<f64>, by_b: &Matrix3x6<f64>, term: &Term) {
         let block = by_a.transpose() * term.information * by_b;
         for i in 0..6 {
@@ -229,7 +232,9 @@ impl Linearized {
         if decrement.is_finite() { Ok((step, decrement)) } else { Err(self.singular()) }
     }
 
-    /// That the normal equations have no factor, with their least eigenvalue once they are scaled to ones on the diagonal.
+    /// The error for normal equations without a Cholesky factor.
+    ///
+    /// It states the smallest eigenvalue after scaling the diagonal to ones.
     fn singular(&self) -> Degenerate {
         let rows = self.normal.nrows();
         let root = |i: usize| if self.normal[(i, i)] > 0.0 { 1.0 / self.normal[(i, i)].sqrt() } else { 0.0 };
@@ -247,16 +252,16 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::Covariance6;
 
-    /// P46. The gradient of χ² by every unknown, at random states, against central differences of χ² itself: ≤ 1e-6 of
-    /// the largest.
+    /// P46. The gradient of χ² by every unknown, at random states, agrees with central differences of χ²: error at most
+    /// 1e-6 of the largest.
     ///
-    /// Seen to fail when a survey's pull is not turned to where the object has moved.
+    /// Fails if the gradient of a survey ignores the object's rotation.
     #[test]
     fn derivatives_are_those_of_the_cost() {
         let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(11));
         for _ in 0..20 {
             let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.3), pose_of(-0.9, 0.2)];
-            // As sharp as the pixels, and not the same in all directions: what turns a survey's pull is seen then.
+            // The survey is as precise as the pixels and anisotropic, so that a wrong rotation of its gradient shows.
             let mut root = nalgebra::Matrix6::from_fn(|_, _| 2e-4 * normal(&mut rng));
             root.set_diagonal(&Vector6::new(1e-3, 2e-3, 4e-4, 3e-3, 6e-4, 1e-3));
             let survey = Covariance6::new(root * root.transpose());

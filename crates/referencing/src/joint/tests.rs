@@ -26,12 +26,12 @@ pub(super) fn instant(k: usize) -> Transform<Object, Camera> {
     Transform::exp(&[0.05 * k as f64, -0.03, 0.1, 0.2 * k as f64, 0.1, -3.0].into())
 }
 
-/// Nearly normal, of variance one: the sum of twelve uniform numbers.
+/// Approximately normal, of variance one: the sum of twelve uniform numbers.
 pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
 }
 
-/// What an instant sees of the objects standing truly there, with `noise` times σ of pixel noise.
+/// The observations of one instant of objects at their true poses, with `noise` times σ of pixel noise.
 pub(super) fn object_observations(
     rig: &StereoRig,
     places: &[Transform<Object, Object>],
@@ -88,10 +88,10 @@ fn a_displaced_object_is_found_where_it_is() {
     for k in [0, 1] {
         assert!(instant(k).error_to(&fix.site_from_camera[k].0).amax() < 1e-8);
     }
-    // Believed to stand where it was surveyed, it spoils the fix, and χ² says so.
+    // Taken at its surveyed pose, it corrupts the fix, and χ² shows it.
     let misled = joint_fix(&rig, &members(Placement::Exact), &seen).unwrap();
     assert!(misled.chi2 > 100.0 * misled.dof as f64, "{}", misled.chi2);
-    // Alone in view and displaced, it says nothing of the site.
+    // A displaced object alone in view does not determine the pose in the site.
     let alone =
         ObjectObservations { points: seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect() };
     let refused = joint_fix(&rig, &members(Placement::Displaced), &[alone]);
@@ -101,8 +101,8 @@ fn a_displaced_object_is_found_where_it_is() {
     assert_eq!(refused, Err(Degenerate::TooFew { found: 2, needed: 3 }));
 }
 
-/// A survey that errs by its covariance, one error an object for all points and both instants: the poses' normalised
-/// error is that of χ²₆, and the objects' surveys are bettered.
+/// A survey with errors by its covariance, one error per object for all points and both instants: the normalised error
+/// of the poses follows χ²₆, and the fix improves the surveyed object poses.
 #[test]
 fn a_survey_is_one_error_an_object() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(3));
@@ -138,8 +138,8 @@ fn a_survey_is_one_error_an_object() {
     assert!((chi2 - dof as f64).abs() < spread, "{chi2} of {dof}");
 }
 
-/// Seen from an object itself, what all objects share cancels: the pose relative to each is as its covariance says, and
-/// better known than from that object's own points, when the survey is good.
+/// The common part of the errors cancels relative to an object: with a precise survey the pose relative to each object
+/// is consistent (NEES), and more accurate than from that object's own points.
 #[test]
 fn relative_to_each_object_the_fix_is_better_than_its_own() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(4));
@@ -154,7 +154,7 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
     for _ in 0..draws {
         let truly = said.map(|place| place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 5e-4)));
         let seen = [0, 1].map(|k| object_observations(&rig, &truly, k, 1.0, &mut rng));
-        let fixes = joint_fixes(&rig, &members, &seen, 0.9999).expect("a likely draw");
+        let fixes = joint_fixes(&rig, &members, &seen, 0.9999).expect("a consistent draw");
         assert_eq!(fixes.displaced, Vec::<usize>::new());
         for object in 0..3 {
             let truth = truly[object].inverse() * instant(1);
@@ -174,7 +174,7 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
     }
 }
 
-/// Three surveyed objects, and where they truly stand: the second elsewhere.
+/// Three surveyed objects and their true poses; the second is displaced.
 fn one_displaced() -> (Vec<Member>, [Transform<Object, Object>; 3]) {
     let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
     let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
@@ -198,7 +198,7 @@ fn a_survey_that_the_images_contradict_is_given_up() {
         let xi = pose.error_to(&truth);
         assert!(xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) < 30.0, "{object}");
     }
-    // Points that no rigid objects explain are refused, whatever the surveys.
+    // Points that no rigid objects explain are rejected for every choice of surveys.
     let mut torn = seen;
     for (k, (_, point)) in torn.points.iter_mut().enumerate() {
         point.pixels.as_mut().unwrap().at.left.v += 20.0 * f64::from(u8::try_from(k % 3).unwrap());
@@ -211,10 +211,10 @@ fn a_survey_that_the_images_contradict_is_given_up() {
     assert_eq!(joint_fixes(&rig, &members, &[], 0.999), none);
 }
 
-/// Never worse than the best single fix: at the same poses the covariance relative to an object is that of its own points at
-/// most, in every direction, whatever the surveys are worth and however few points the others show.
+/// A joint fix is never worse than the best single fix: at equal poses the covariance relative to an object is at most
+/// that of its own points, in every direction, for any survey and any number of points of other objects.
 ///
-/// Seen to fail when what pose and place share does not cancel.
+/// Fails if the correlation of camera and object pose does not cancel.
 #[test]
 fn no_direction_is_known_worse_than_from_the_object_alone() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(9));
@@ -248,9 +248,9 @@ fn no_direction_is_known_worse_than_from_the_object_alone() {
     }
 }
 
-/// Two points of an object that stands elsewhere are given up, not the survey of another.
+/// The two points of a displaced object are excluded, not the survey of another object.
 ///
-/// Seen to fail when an object of one point may be displaced.
+/// Fails if an object with one point may be displaced.
 #[test]
 fn of_an_object_of_two_points_the_points_are_given_up() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(10));

@@ -1,4 +1,4 @@
-//! The answer to a problem, as it is printed.
+//! The printed answer to a problem.
 
 use std::{path::Path, time::Instant};
 
@@ -11,77 +11,78 @@ use crate::{
     Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver, accept::alert_limit,
 };
 
-/// The method that answers: what is used, and under which name it is reported.
+/// The search, solver and acceptance that answer a problem.
 #[derive(Debug, Clone, Copy)]
 pub struct Method<'a> {
     /// The search and its registered name.
     pub search: (&'a str, &'a dyn Search),
     /// The solver and its registered name.
     pub solver: (&'a str, &'a dyn Solver),
-    /// When an answer is believed.
+    /// The limits of the acceptance tests.
     pub acceptance: &'a Acceptance,
-    /// Whether the object is sought further off where it is not found ([`CoherenceProblem::attempt_with_expanding_gates`]).
+    /// Whether to repeat the search with expanding gates ([`CoherenceProblem::attempt_with_expanding_gates`]).
     pub expand_gates: bool,
 }
 
-/// A pose that was not the answer, as it is printed.
+/// The printed form of a pose other than the answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OtherPose {
-    /// camera_from_object.
+    /// The pose, camera_from_object.
     #[serde(rename = "T_cam_obj")]
     pub t_cam_obj: [[f64; 4]; 4],
-    /// Its pairs (model, cloud).
+    /// The pairs (model, cloud).
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<[usize; 2]>,
-    /// How well it explains the data.
+    /// The score of the pose; larger is better.
     pub score: f64,
 }
 
-/// What supports a fix beyond its covariance, as it is printed.
+/// The printed form of a fix's integrity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Support {
-    /// `unmonitored` (three points), `detectable` (four) or `excludable`.
+    /// The grade of redundancy: `unmonitored` (three points), `detectable` (four) or `excludable`.
     pub redundancy: &'static str,
-    /// χ² of the residuals at the most likely pose.
+    /// χ² of the residuals at the maximum-likelihood pose.
     pub chi2: f64,
-    /// Its degrees of freedom.
+    /// The degrees of freedom of χ².
     pub dof: usize,
-    /// What a true set exceeds with one minus the confidence.
+    /// The limit of χ², which a correct set exceeds with probability one minus the confidence.
     pub chi2_limit: f64,
-    /// The farthest that the position moves (m) when one point is left out.
+    /// The largest shift of the position (m) when one point is excluded.
     pub solution_separation: Option<f64>,
-    /// The same when two points are left out, where two wrong matches are assumed to happen.
+    /// The largest shift of the position (m) when two points are excluded.
+    ///
+    /// Absent if two wrong matches are assumed impossible.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub solution_separation_two: Option<f64>,
-    /// The probability that the pose is another, farther off than the alert limit, or the object not there; null of searches that
-    /// count and do not weigh.
+    /// The probability of a wrong pose or of an absent object; null for a counting search.
     pub misidentified: Option<f64>,
-    /// The probability with which the levels may be exceeded.
+    /// The risk: the probability with which an error may exceed its protection level.
     pub risk: f64,
-    /// Radii that the errors of position (m) and attitude (rad) exceed with no more than that risk; null where too few points
-    /// support them, or where the points are mistaken with a greater probability.
+    /// The protection levels; null without redundancy, or if the probability of misidentification exceeds the risk.
     pub protection: Option<Levels>,
-    /// The alert limit (m): a fix whose level of position is beyond it, or that has none, is not available where integrity counts.
+    /// The alert limit (m); a fix whose position level is missing or larger is unavailable for uses that require
+    /// integrity.
     pub alert_limit: f64,
-    /// By how much measured distances are longer than the model's, as a share; null with fewer than four points.
+    /// The scale error between measurement and model; null with fewer than four points.
     pub scale_error: Option<Estimate>,
 }
 
-/// A number and its standard deviation, as they are printed.
+/// The printed form of a number with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
     /// The number.
     pub value: f64,
-    /// Its standard deviation.
+    /// The standard deviation.
     pub sigma: f64,
 }
 
-/// Protection levels, as they are printed.
+/// The printed form of protection levels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Levels {
-    /// Of the position (m).
+    /// The level of the position (m).
     pub position: f64,
-    /// Of the attitude (rad).
+    /// The level of the attitude (rad).
     pub attitude: f64,
 }
 
@@ -103,57 +104,62 @@ impl Support {
     }
 }
 
-/// The answer to one problem, with the keys of FORMATS.
+/// The answer to one problem, with the keys of `docs/formats.md`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Answer {
     /// The file.
     pub file: String,
     /// The problem's name.
     pub id: String,
-    /// `fixed`, `ambiguous`, `rejected` or `degenerate`.
+    /// The outcome: `fix`, `ambiguous`, `rejected` or `degenerate`.
     pub outcome: &'static str,
-    /// Why there is no pose.
+    /// The reason for a missing pose, in kebab-case.
     pub reason: Option<&'static str>,
-    /// The same in a sentence.
+    /// The reason for a missing pose as a sentence.
     pub explanation: Option<String>,
-    /// camera_from_object, if referenced.
+    /// The pose of a fix, camera_from_object.
     #[serde(rename = "T_cam_obj")]
     pub t_cam_obj: Option<[[f64; 4]; 4]>,
-    /// Covariance of object_from_camera, if referenced.
+    /// The covariance of a fix, of object_from_camera.
     pub covariance: Option<[[f64; 6]; 6]>,
-    /// The identified pairs (model, cloud), if referenced.
+    /// The identified pairs (model, cloud) of a fix.
     pub pairs: Option<Vec<[usize; 2]>>,
-    /// The scale of the model against the cloud that a similarity would have, of a solver that finds one, if referenced.
+    /// The scale of the model relative to the cloud.
+    ///
+    /// Present for a fix whose solver estimates a similarity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// The identified cloud points that lie behind the camera (z ≤ 0), if referenced and there are any.
+    /// The identified cloud points behind the camera (z ≤ 0), if a fix has any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub behind: Vec<usize>,
-    /// What was identified and is not believed (model, cloud), if not referenced: at the end of a budget the best so far.
+    /// The rejected pairs (model, cloud), if there is no fix; after an exhausted budget, the best so far.
     pub unbelieved: Option<Vec<[usize; 2]>>,
-    /// What supports the fix beyond its covariance, if referenced.
+    /// The integrity of a fix.
     pub integrity: Option<Support>,
-    /// The poses among which the data do not decide.
+    /// The poses between which the data do not decide.
     pub alternatives: Vec<OtherPose>,
-    /// The best pose that was not believed.
+    /// The best rejected pose.
     pub runner_up: Option<OtherPose>,
-    /// Difference of the scores of the best and the next.
+    /// The score of the best pose minus that of the next.
     pub margin: Option<f64>,
-    /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
+    /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
+    /// probable.
     pub optimal: bool,
-    /// No admissible set has more pairs.
+    /// The proved upper bound of the number of pairs of an admissible set.
     pub consensus_bound: Option<usize>,
-    /// Expected number of chance sets as large as the one found.
+    /// The number of false alarms (NFA) of the set.
     pub nfa: Option<f64>,
-    /// Pair tests of the search.
+    /// The number of pair tests of the search.
     pub pair_tests: Option<u64>,
-    /// Whether all was looked at that may lead to a second copy of the object, whole or in part; of searches that look for one.
+    /// Whether every possible second copy of the object was examined, complete or partial; absent for a search that
+    /// seeks none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub copies_sought: Option<bool>,
-    /// No admissible set is likelier by more than this (nats); of searches that were asked to prove it.
+    /// The upper bound (nats) by which an admissible set may exceed the best pose's evidence; absent unless the search
+    /// proves it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence_gap: Option<f64>,
-    /// Everything derived from the file (ms); reading and parsing not counted.
+    /// The processing time (ms), without reading and parsing.
     pub time_ms: f64,
     /// The search's name.
     pub search: String,
@@ -161,22 +167,22 @@ pub struct Answer {
     pub solver: String,
 }
 
-/// One line of output: an answer, or what is wrong with the file.
+/// One line of output: an answer, or the fault of a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Line {
     /// The answer.
     Answer(Box<Answer>),
-    /// The file could not be used.
+    /// A file that could not be used.
     Failed {
         /// The file.
         file: String,
-        /// What is wrong with it, in one line.
+        /// The fault in one line.
         error: String,
     },
 }
 
-/// The answer to a problem that came from `file`.
+/// Answers a problem that came from `file`.
 pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng: &mut dyn Rng) -> Answer {
     let start = Instant::now();
     let (search, solver) = (method.search.1, method.solver.1);
@@ -254,7 +260,7 @@ impl OtherPose {
     }
 }
 
-/// camera_from_object, row by row.
+/// The matrix camera_from_object, row by row.
 fn rows(object_from_camera: &Transform<Object, Camera>) -> [[f64; 4]; 4] {
     let matrix = object_from_camera.inverse().matrix();
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))

@@ -1,4 +1,4 @@
-//! The problem as a file has it.
+//! The problem of a file.
 
 use std::path::Path;
 
@@ -14,25 +14,25 @@ use crate::{
     site::{COINCIDENT, diameter, nearest_two},
 };
 
-/// The format this reader understands.
+/// The format that this reader supports.
 pub const FORMAT: &str = "coherence-problem/1";
-/// More candidate pairs than this are not listed: no search could use them.
+/// The maximum number of listed candidate pairs; no search could use more.
 const MAX_CANDIDATES: usize = 4_000_000;
-/// Of a problem that may have more, so many model points are looked at before pairs are counted.
+/// The number of model points whose pairs are listed between two counts.
 const AT_A_TIME: usize = 8;
 
-/// Larger files, and clouds of more points, are refused: with them a problem takes less than 500 MB.
+/// The largest file and cloud; they limit a problem to 500 MB of memory.
 const MAX_BYTES: u64 = 48 << 20;
 const MAX_POINTS: usize = 500_000;
-/// A point known worse than this (m) is not known, and the cube of its variance is still a number.
+/// The largest standard deviation (m); the cube of its variance is still finite.
 const MAX_SIGMA: f64 = 1e15;
-/// Largest coordinate of a model (m): beyond, a double no longer tells micrometres. A cloud may have blunders farther away.
+/// The largest model coordinate (m); a double resolves no micrometres beyond. A cloud may have outliers farther away.
 const FARTHEST: f64 = 1e9;
 
-/// An identification problem, checked.
+/// A validated identification problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoherenceProblem {
-    /// Its name.
+    /// The name.
     pub id: String,
     /// The feature points, object frame.
     pub model: Vec<ModelPoint>,
@@ -40,36 +40,36 @@ pub struct CoherenceProblem {
     pub cloud: Vec<MeasuredPoint>,
     /// The distance tolerance Δ (m).
     pub delta: f64,
-    /// The rough pose, if one is known.
+    /// The prior, if one is known.
     pub prior: Option<Prior>,
-    /// The only pairs (model, cloud) to consider, if they are given.
+    /// The putative pairs (model, cloud), if given; no other pairs are considered.
     pub putative: Option<Vec<(usize, usize)>>,
 }
 
 impl CoherenceProblem {
-    /// The problem in `text`, the content of `file`.
+    /// Parses a problem; `file` is the file named in faults.
     ///
     /// # Errors
-    /// The first fault: not JSON, an unknown key or format, a number that is not finite or out of
-    /// its range, two model points in one place, an index that points nowhere, a prior that is no rigid motion.
+    ///
+    /// The first fault: invalid JSON, an unknown key or format, a number that is not finite or out of its range,
+    /// coincident model points, an index out of range, or a prior that is not a rigid motion.
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
         let source = Source { text, file };
         if text.trim_start().starts_with('[') {
-            let fault = source.fault("a list where an object is expected", &[]).value("`[`");
-            return Err(fault.remedy(format!("give one `{FORMAT}` a file, in braces")));
+            let fault = source.fault("a list instead of an object", &[]).value("`[`");
+            return Err(fault.remedy(format!("give one `{FORMAT}` per file, in braces")));
         }
         let raw = source.read()?;
         for (name, rows) in [("model", &raw.model), ("cloud", &raw.cloud)] {
             if rows.len() > MAX_POINTS {
-                let remedy = format!("at most {MAX_POINTS} are taken; thin the points out");
+                let remedy = format!("at most {MAX_POINTS} are accepted; reduce the points");
                 let fault = source.fault(format!("too many points in `{name}`"), &[name]);
                 return Err(fault.value(rows.len()).remedy(remedy));
             }
         }
         if let Some(index) = raw.model.iter().position(|row| row.iter().any(|x| x.abs() > FARTHEST)) {
-            let fault =
-                source.fault(format!("model point {index} is no part of an object"), &["model", &index.to_string()]);
-            return Err(fault.remedy(format!("give metres, none beyond {FARTHEST:e}")));
+            let fault = source.fault(format!("model point {index} is out of range"), &["model", &index.to_string()]);
+            return Err(fault.remedy(format!("give metres, at most {FARTHEST:e}")));
         }
         let is_sigma = |sigma: f64| (0.0..=MAX_SIGMA).contains(&sigma);
         let of_sigma = || format!("give metres, zero to {MAX_SIGMA:e}");
@@ -80,7 +80,7 @@ impl CoherenceProblem {
             if rows.len() != raw.cloud.len() {
                 let value = format!("{} for {}", counted(rows.len(), "row"), counted(raw.cloud.len(), "cloud point"));
                 let fault = source.fault("`sigma_xyz` has the wrong length", &["sigma_xyz"]);
-                return Err(fault.value(value).remedy("give one row a cloud point"));
+                return Err(fault.value(value).remedy("give one row per cloud point"));
             }
             if let Some(index) = rows.iter().position(|row| !row.iter().all(|&sigma| is_sigma(sigma))) {
                 let what = format!("row {index} of `sigma_xyz` is out of range");
@@ -94,11 +94,11 @@ impl CoherenceProblem {
             .map(|(index, at)| ModelPoint::exact(index.to_string(), Point::from(*at)))
             .collect();
         if let Some((i, k, _)) = nearest_two(&model, COINCIDENT) {
-            let fault = source.fault("two model points in one place", &["model", &k.to_string()]);
+            let fault = source.fault("coincident model points", &["model", &k.to_string()]);
             return Err(fault.value(format!("points {i} and {k}")).remedy("remove one"));
         }
-        // Two points or fewer are answered "too few", whatever Δ says of them. The diameter is at least
-        // the diagonal of the shell over √3: it is computed only where that does not settle it.
+        // Models of up to two points are answered `too-few` for every Δ. The diameter is at least the diagonal of the
+        // bounding box over √3: it is computed only if that bound does not suffice.
         let bounding_box = BoundingBox::around(model.iter().map(|point| point.at));
         let settled =
             bounding_box.map_or(0.0, |bounding_box| bounding_box.max.distance(&bounding_box.min)) / 12f64.sqrt();
@@ -113,9 +113,9 @@ impl CoherenceProblem {
             Some(pairs) => {
                 let out = pairs.iter().position(|[i, j]| *i >= raw.model.len() || *j >= raw.cloud.len());
                 if let Some(index) = out {
-                    let what = format!("putative pair {index} points nowhere");
+                    let what = format!("putative pair {index} is out of range");
                     let points = counted(raw.cloud.len(), "cloud point");
-                    let remedy = format!("there are {} model and {points}, from 0", raw.model.len());
+                    let remedy = format!("there are {} model and {points}; count from 0", raw.model.len());
                     return Err(source.fault(what, &["putative", &index.to_string()]).remedy(remedy));
                 }
                 Some(pairs.into_iter().map(|[i, j]| (i, j)).collect())
@@ -136,10 +136,11 @@ impl CoherenceProblem {
         })
     }
 
-    /// Stage 1: which cloud points may be which model points.
+    /// Stage 1: the candidates of each model point.
     ///
     /// # Errors
-    /// There are too many to list.
+    ///
+    /// [`Rejected::TooLarge`] if there are too many to list.
     pub fn candidates(&self) -> Result<Candidates, Rejected> {
         self.candidates_from(self.prior.as_ref())
     }
@@ -157,7 +158,7 @@ impl CoherenceProblem {
         if prior.is_none() {
             return Err(too_large(all, "candidate pairs"));
         }
-        // Shells may hold more than memory does: they are counted as they are filled.
+        // Gates may hold more pairs than memory does: they are counted as they are listed.
         let (mut found, mut size) = (Candidates::default(), 0);
         for part in self.model.chunks(AT_A_TIME) {
             let part = candidates(part, &self.cloud, prior, &Gate::default(), None);
@@ -170,7 +171,7 @@ impl CoherenceProblem {
         Ok(found)
     }
 
-    /// One attempt at the pose.
+    /// One attempt at a fix.
     pub fn attempt(
         &self,
         search: &dyn Search,
@@ -181,8 +182,9 @@ impl CoherenceProblem {
         self.attempt_from(self.prior.as_ref(), (search, solver, acceptance), rng)
     }
 
-    /// The same, and where nothing is found in the shells, in larger ones, then without: the object may have been
-    /// displaced.
+    /// One attempt at a fix with expanding gates, for an object that may be displaced.
+    ///
+    /// If the object is not found, the attempt is repeated with larger gates and then without a prior.
     pub fn attempt_with_expanding_gates(
         &self,
         search: &dyn Search,
@@ -220,7 +222,8 @@ impl RawPrior {
     fn checked(&self, source: Source<'_>) -> Result<Prior, Fault> {
         let matrix = Matrix4::from_fn(|row, column| self.t_cam_obj[row][column]);
         let camera_from_object = Transform::<Camera, Object>::from_matrix(&matrix).map_err(|error| {
-            let fault = source.fault(format!("`prior.T_cam_obj` is no rigid motion: {error}"), &["prior", "T_cam_obj"]);
+            let fault =
+                source.fault(format!("`prior.T_cam_obj` is not a rigid motion: {error}"), &["prior", "T_cam_obj"]);
             fault.remedy("give camera_from_object, a rotation and a translation")
         })?;
         if !(self.shell_half_m > 0.0) {
@@ -231,15 +234,16 @@ impl RawPrior {
     }
 }
 
-/// The problem in a file.
+/// Reads the problem in a file.
 ///
 /// # Errors
-/// As [`read_text`], the file has more than 48 MiB, or [`CoherenceProblem::parse`] refuses it.
+///
+/// Those of [`read_text`] and [`CoherenceProblem::parse`], and a file of more than 48 MiB.
 pub fn read(file: &Path) -> Result<CoherenceProblem, Fault> {
     let bytes = std::fs::metadata(file).map_or(0, |about| about.len());
     if bytes > MAX_BYTES {
-        let remedy = format!("at most {} MiB are read; thin the points out", MAX_BYTES >> 20);
-        return Err(Fault::new("the problem is too large", file).value(format!("{bytes} bytes")).remedy(remedy));
+        let remedy = format!("at most {} MiB are accepted; reduce the points", MAX_BYTES >> 20);
+        return Err(Fault::new("problem file too large", file).value(format!("{bytes} bytes")).remedy(remedy));
     }
     CoherenceProblem::parse(&read_text(file)?, file)
 }

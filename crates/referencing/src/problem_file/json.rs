@@ -1,4 +1,4 @@
-//! The problem as JSON: what its keys hold, and in which words a text that is not so is refused.
+//! The JSON form of a problem: types of its keys, and messages for invalid text.
 
 use std::{fmt, marker::PhantomData, path::Path};
 
@@ -12,7 +12,7 @@ use serde_path_to_error::Segment;
 
 use super::FORMAT;
 
-/// The keys of a problem, not yet checked.
+/// The keys of a problem before validation.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Raw {
@@ -37,7 +37,7 @@ pub(super) struct Raw {
     pub(super) putative: Option<Vec<[usize; 2]>>,
 }
 
-/// The keys of a rough pose, not yet checked.
+/// The keys of a prior before validation.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawPrior {
@@ -46,7 +46,7 @@ pub(super) struct RawPrior {
     pub(super) shell_half_m: f64,
 }
 
-/// What is read of an object alone: a list of the values without their keys would pass for one otherwise.
+/// A value read from an object only; serde would otherwise accept a list of the values without their keys.
 pub(super) struct InBraces<T>(pub(super) T);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for InBraces<T> {
@@ -67,25 +67,26 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for InBraces<T> {
     }
 }
 
-/// The text of a problem and the file it is from: faults are placed by both.
+/// The text of a problem and its file, by which faults are located.
 ///
-/// A path leads to a value: keys, and of lists numbers, `["cloud", "3", "1"]`.
+/// A path leads to a value: keys, and indices of lists, as in `["cloud", "3", "1"]`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Source<'a> {
     pub(super) text: &'a str,
     pub(super) file: &'a Path,
 }
 
-/// A path, and what the reader says of the value there.
+/// A path, and the reader's error at that value.
 type Wrong = (Vec<String>, serde_json::Error);
 
 impl<'a> Source<'a> {
     /// The keys of the problem.
     ///
     /// # Errors
-    /// Another format, or the first thing that is not JSON, or not what its key holds.
+    ///
+    /// Another format, or the first place with invalid JSON or a value of another type.
     pub(super) fn read(self) -> Result<Raw, Fault> {
-        // A path costs time; it is followed only where something is wrong.
+        // Tracking the path costs time, so only invalid text is read a second time with it.
         let read = serde_json::from_str(self.text).map(|InBraces(raw)| raw);
         let raw = read.or_else(|_| self.follow()).map_err(|(path, error)| {
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
@@ -100,7 +101,7 @@ impl<'a> Source<'a> {
         if raw.format == FORMAT { Ok(raw) } else { Err(self.unknown_format(&raw.format)) }
     }
 
-    /// The same, with the path to what is wrong.
+    /// Reads the problem again, tracking the path to the error.
     fn follow(self) -> Result<Raw, Wrong> {
         let mut reader = serde_json::Deserializer::from_str(self.text);
         let InBraces(raw) = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
@@ -115,7 +116,7 @@ impl<'a> Source<'a> {
         Ok(raw)
     }
 
-    /// The fault `what` of the value at `path`, with its place and as it is written.
+    /// The fault `what` of the value at `path`, with its place and its text.
     pub(super) fn fault(self, what: impl Into<String>, path: &[&str]) -> Fault {
         let fault = Fault::new(what, self.file);
         match value_at(self.text, path) {
@@ -126,22 +127,22 @@ impl<'a> Source<'a> {
 
     fn unknown_format(self, format: &str) -> Fault {
         let fault = self.fault("unknown format", &["format"]).value(format!("`{format}`"));
-        fault.remedy(format!("this reader knows `{FORMAT}`"))
+        fault.remedy(format!("this reader supports `{FORMAT}`"))
     }
 
-    /// Line and column of a part of the text.
+    /// The line and column of a part of the text.
     fn place(self, part: &str) -> (usize, usize) {
         place_at(self.text, part.as_ptr() as usize - self.text.as_ptr() as usize)
     }
 
-    /// What the reader of JSON found wrong at `path`.
+    /// The fault for the reader's error at `path`.
     fn wrong(self, path: &[&str], error: &serde_json::Error) -> Fault {
         let full = error.to_string();
         let tail = format!(" at line {} column {}", error.line(), error.column());
         let message = full.strip_suffix(&tail).unwrap_or(&full);
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let about = |what: &str| message.starts_with(what);
-        // A key may hold backticks of its own; those after it do not.
+        // An unknown key may contain backticks; the known keys do not.
         let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.rsplit_once("`, expected "));
         if let Some((key, known)) = unknown {
             let known: Vec<&str> = known.split('`').skip(1).step_by(2).collect();
@@ -152,7 +153,7 @@ impl<'a> Source<'a> {
             return self.of_key("unknown key", key, error).value(format!("`{key}`")).remedy(remedy);
         }
         if let (true, Some(key)) = (about("duplicate field"), quoted.first()) {
-            return self.of_key("a key that is there twice", key, error).value(format!("`{key}`")).remedy("keep one");
+            return self.of_key("duplicate key", key, error).value(format!("`{key}`")).remedy("keep one");
         }
         if let (true, Some(key)) = (about("missing field"), quoted.first()) {
             let path = [path, &[*key]].concat();
@@ -172,18 +173,18 @@ impl<'a> Source<'a> {
         if typed.iter().any(|start| about(start)) {
             let (noun, remedy) = form(path);
             let what = match path {
-                [] => format!("no {noun}"),
-                path if about("number out of range") => format!("`{}` is beyond all numbers", name(path)),
-                path => format!("`{}` is no {noun}", name(path)),
+                [] => format!("expected {noun}"),
+                path if about("number out of range") => format!("`{}` is too large for a number", name(path)),
+                path => format!("`{}` is not {noun}", name(path)),
             };
-            // Where the text is not JSON further on, the value is what was read last.
+            // If the text is invalid JSON further on, the value is the last one read.
             let read = value.is_none() || path.is_empty();
             return if read { self.near(what, error) } else { self.fault(what, path) }.remedy(remedy);
         }
         self.no_json(path, message, error)
     }
 
-    /// A text that is no JSON.
+    /// The fault for invalid JSON.
     fn no_json(self, path: &[&str], message: &str, error: &serde_json::Error) -> Fault {
         let (noun, remedy) = form(path);
         let at = |what: &str| match path {
@@ -192,38 +193,38 @@ impl<'a> Source<'a> {
         };
         let near = |what: &str| self.near(at(what), error);
         if self.text.trim().is_empty() {
-            return Fault::new("an empty file", self.file).remedy(remedy);
+            return Fault::new("empty file", self.file).remedy(remedy);
         }
         match message {
             "expected value" | "expected ident" | "invalid number" => {
                 let word = self.word(error);
                 if ["nan", "inf", "infinity"].contains(&word.trim_start_matches(['+', '-']).to_lowercase().as_str()) {
-                    let fault = Fault::new(at(&format!("{word} is no JSON number")), self.file);
+                    let fault = Fault::new(at(&format!("{word} is not a JSON number")), self.file);
                     return fault.at(Some(self.place(word))).remedy(remedy);
                 }
-                near(if noun == "number" { "no JSON number" } else { "no JSON value" }).remedy(remedy)
+                near(if noun == "a number" { "invalid JSON number" } else { "invalid JSON value" }).remedy(remedy)
             }
             message if message.starts_with("EOF") => {
-                near("the file ends too early").value("").remedy("it seems to be cut off; write it again")
+                near("unexpected end of file").value("").remedy("the file may be truncated; write it again")
             }
             message if message.starts_with("control character") => {
-                near("a line break, tab or other control character in a text")
+                near("a line break, tab or other control character in a string")
                     .remedy("write it as `\\n`, `\\t` or `\\u` and four digits")
             }
             "invalid escape"
             | "invalid unicode code point"
             | "unexpected end of hex escape"
             | "lone leading surrogate in hex escape" => {
-                near("no escape of JSON").remedy("write letters as they are, and a backslash twice")
+                near("invalid JSON escape").remedy("write letters unescaped, and a backslash twice")
             }
-            "trailing comma" => near("a comma before the end").remedy("remove it"),
-            "key must be a string" => near("a key without double quotes").remedy("put it in double quotes"),
+            "trailing comma" => near("trailing comma").remedy("remove it"),
+            "key must be a string" => near("key without double quotes").remedy("put it in double quotes"),
             "trailing characters" if path.is_empty() => {
-                near("something after the end of the problem").remedy("give one problem a file")
+                near("trailing characters after the problem").remedy("give one problem per file")
             }
             "trailing characters" => near("expected `,` or `]`").remedy(remedy),
             message if message.starts_with("expected `,`") => {
-                near(message).remedy("values are parted by commas, and numbers stand without units")
+                near(message).remedy("separate values by commas, and give numbers without units")
             }
             message => near(message).remedy(format!("give `{FORMAT}` as JSON")),
         }
@@ -243,7 +244,7 @@ impl<'a> Source<'a> {
         Fault::new(what, self.file).at(Some(self.place(word))).value(shortened(word))
     }
 
-    /// The byte at which the reader stopped.
+    /// The byte offset at which the reader stopped.
     fn offset(self, error: &serde_json::Error) -> usize {
         let before = self.text.split_inclusive('\n').take(error.line().saturating_sub(1)).map(str::len).sum::<usize>();
         let mut at = (before + error.column().saturating_sub(1)).min(self.text.len());
@@ -253,7 +254,7 @@ impl<'a> Source<'a> {
         at
     }
 
-    /// The word or number at which the reader stopped; where there is none, the letter.
+    /// The word or number at which the reader stopped, or else the character.
     fn word(self, error: &serde_json::Error) -> &'a str {
         let (before, after) = self.text.split_at(self.offset(error));
         let in_word = |c: char| c.is_alphanumeric() || "+-._".contains(c);
@@ -264,14 +265,14 @@ impl<'a> Source<'a> {
     }
 }
 
-/// The value at `path` of a JSON text, as it is written.
+/// The text of the value at `path` of a JSON text.
 fn value_at<'t>(text: &'t str, path: &[&str]) -> Option<&'t str> {
     let Some((step, rest)) = path.split_first() else { return Some(text.trim()) };
     let value = serde_json::Deserializer::from_str(text).deserialize_any(Step(step)).ok()??;
     value_at(value.get(), rest)
 }
 
-/// Keeps the first value of a key, or the value of a number in a list, and skips the others.
+/// A visitor for one step of a path: the first value of a key, or a list element.
 struct Step<'p>(&'p str);
 
 impl<'de> Visitor<'de> for Step<'_> {
@@ -306,13 +307,13 @@ impl<'de> Visitor<'de> for Step<'_> {
     }
 }
 
-/// A value on one line; what is long is cut when it is printed, and need not be copied before.
+/// A value on one line; only its start is copied, since printing truncates it.
 fn shortened(value: &str) -> String {
     let start: String = value.chars().take(1000).collect();
     start.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// A path as it is told: `cloud[3][1]`.
+/// A path in messages, as in `cloud[3][1]`.
 fn name(path: &[&str]) -> String {
     path.iter().fold(String::new(), |name, step| match step.parse::<usize>() {
         Ok(index) => format!("{name}[{index}]"),
@@ -321,31 +322,31 @@ fn name(path: &[&str]) -> String {
     })
 }
 
-/// What the value at `path` must be, and what to give there.
+/// The type of the value at `path`, and the remedy for another.
 fn form(path: &[&str]) -> (&'static str, &'static str) {
     match path {
-        ["format"] => ("text", "give \"coherence-problem/1\""),
-        ["id"] => ("text", "give a name in double quotes, or null"),
+        ["format"] => ("a string", "give \"coherence-problem/1\""),
+        ["id"] => ("a string", "give a name in double quotes, or null"),
         ["model"] => {
-            ("list of points", "give the feature points in the object frame, three numbers x y z each, in metres")
+            ("a list of points", "give the feature points in the object frame, three numbers x y z each, in metres")
         }
         ["cloud"] => {
-            ("list of points", "give the measured points in the camera frame, three numbers x y z each, in metres")
+            ("a list of points", "give the measured points in the camera frame, three numbers x y z each, in metres")
         }
-        ["model" | "cloud", _] => ("point", "give three numbers x y z, in metres"),
-        ["model" | "cloud" | "sigma_xyz", _, _] => ("number", "give a number, in metres"),
-        ["sigma"] => ("number", "give the standard deviation of a measured coordinate, a number in metres"),
-        ["sigma_xyz"] => ("list of rows", "give null, or a row a cloud point of three numbers each, in metres"),
-        ["sigma_xyz", _] => ("row of three numbers", "give three numbers, one a camera axis, in metres"),
-        ["delta"] => ("number", "give the tolerance of distances, a number in metres"),
-        ["prior"] => ("object", "give null, or `T_cam_obj` and `shell_half_m` in braces"),
-        ["prior", "T_cam_obj"] => ("matrix", "give a 4×4 matrix: four rows of four numbers"),
-        ["prior", "T_cam_obj", _] => ("row of four numbers", "give four numbers; the matrix is 4×4"),
-        ["prior", "T_cam_obj", ..] => ("number", "give a number; the matrix is 4×4"),
-        ["prior", "shell_half_m"] => ("number", "give the half-size of the shells, a number in metres"),
-        ["putative"] => ("list of pairs", "give null, or a list of pairs [model, cloud]"),
-        ["putative", _] => ("pair", "give two indices [model, cloud], from 0"),
-        ["putative", ..] => ("index", "give a whole number, from 0"),
-        _ => ("problem", "give one `coherence-problem/1` as JSON, in braces"),
+        ["model" | "cloud", _] => ("a point", "give three numbers x y z, in metres"),
+        ["model" | "cloud" | "sigma_xyz", _, _] => ("a number", "give a number, in metres"),
+        ["sigma"] => ("a number", "give the standard deviation of a measured coordinate, a number in metres"),
+        ["sigma_xyz"] => ("a list of rows", "give null, or one row of three numbers per cloud point, in metres"),
+        ["sigma_xyz", _] => ("a row of three numbers", "give three numbers, one per camera axis, in metres"),
+        ["delta"] => ("a number", "give the distance tolerance, a number in metres"),
+        ["prior"] => ("an object", "give null, or `T_cam_obj` and `shell_half_m` in braces"),
+        ["prior", "T_cam_obj"] => ("a matrix", "give a 4×4 matrix: four rows of four numbers"),
+        ["prior", "T_cam_obj", _] => ("a row of four numbers", "give four numbers; the matrix is 4×4"),
+        ["prior", "T_cam_obj", ..] => ("a number", "give a number; the matrix is 4×4"),
+        ["prior", "shell_half_m"] => ("a number", "give the half-size of the gates, a number in metres"),
+        ["putative"] => ("a list of pairs", "give null, or a list of pairs [model, cloud]"),
+        ["putative", _] => ("a pair", "give two indices [model, cloud], counted from 0"),
+        ["putative", ..] => ("an index", "give a whole number, counted from 0"),
+        _ => ("a problem", "give one `coherence-problem/1` as JSON, in braces"),
     }
 }

@@ -1,4 +1,4 @@
-//! What is legal in a problem and hardly meant.
+//! Warnings about valid but implausible problems.
 
 use std::path::Path;
 
@@ -13,18 +13,18 @@ use crate::{
     solve::{ON_A_LINE, second_ratio},
 };
 
-/// A length below this share of the noise is far below it.
+/// The ratio of a length to the noise below which it is far below the noise.
 const FAR_BELOW: f64 = 0.1;
-/// A shell so many times as large as half of the cloud leaves nothing out.
+/// The ratio of a gate's half-size to half of the cloud above which the gate excludes nothing.
 const FAR_ABOVE: f64 = 10.0;
-/// No object farther off than this (m) is seen.
+/// The distance (m) beyond which an object is out of view.
 const OUT_OF_VIEW: f64 = 1e6;
-/// Larger models are not looked through for symmetries: their triangles are too many.
+/// The maximum number of model points for the symmetry test; larger models have too many triangles.
 const MAX_CHECKED: usize = 100;
-/// A motion that leaves each point within so many standard deviations of another is not told from none.
+/// Distance of mapped points, in standard deviations, up to which a motion equals the identity.
 const DISTINGUISHED: f64 = 3.0;
 
-/// The warnings of a file.
+/// The warnings about a file.
 struct Hints<'a> {
     file: &'a Path,
     all: Vec<Fault>,
@@ -37,10 +37,11 @@ impl Hints<'_> {
 }
 
 impl CoherenceProblem {
-    /// What is legal and hardly meant, of the content of `file`: points too few for a pose, on a line, or too near each other for Δ to
-    /// tell them apart; a symmetric model; points without noise, or with so much that Δ is nothing beside it; putative pairs of which
-    /// no pose follows; a prior that has the object out of sight, or bounds nothing; coordinates that look like other units than
-    /// metres; more candidates than are searched.
+    /// Warnings about valid but implausible contents of `file`.
+    ///
+    /// They cover points too few for a pose, collinear, or too close for Δ; a symmetric model; zero noise, or noise far
+    /// above Δ; putative pairs that determine no pose; a prior that places the object out of view or bounds nothing;
+    /// coordinates that are apparently not in metres; and too many candidates.
     pub fn warnings(&self, file: &Path) -> Vec<Fault> {
         let mut reported = Hints { file, all: Vec::new() };
         self.of_the_model(&mut reported);
@@ -61,32 +62,32 @@ impl CoherenceProblem {
         }
         if let Some((i, k, distance)) = nearest_two(&self.model, 2.0 * self.delta) {
             let value = format!("points {i} and {k}, {} m apart, and Δ = {} m", number(distance), number(self.delta));
-            let remedy = "one may be taken for the other; keep model points 2Δ apart";
-            reported.warn("model points are nearer than 2Δ", value, remedy);
+            let remedy = "they may be confused; keep model points at least 2Δ apart";
+            reported.warn("model points closer than 2Δ", value, remedy);
         }
         if let Some(ratio) = on_a_line(&self.model_places()) {
-            let remedy = "a turn about the line changes nothing that is measured; add a point beside it";
-            reported.warn("the model's points lie on a line", of_extents(ratio), remedy);
+            let remedy = "a rotation about the line changes no measurement; add a point off the line";
+            reported.warn("collinear model points", of_extents(ratio), remedy);
         }
         if let Some((degrees, off)) = self.symmetry() {
             let value = format!(
-                "turned by {degrees:.0}°, each point is within {} m of another, and σ = {} m",
+                "after a rotation by {degrees:.0}° each point is within {} m of another, σ = {} m",
                 number(off),
                 number(self.typical_sigma())
             );
-            let remedy = "both poses explain what is seen; only a prior tells them apart, or a point that has no image";
+            let remedy = "both poses explain the measurements; give a prior, or add a point that breaks the symmetry";
             reported.warn("the model is symmetric", value, remedy);
         }
         let extent = self.extent();
         if self.model.len() > 1 && !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
-            let value = format!("the model lies in a box of {} m from corner to corner", number(extent));
-            reported.warn("units?", value, "coordinates are in metres");
+            let value = format!("the diagonal of the model's bounding box is {} m", number(extent));
+            reported.warn("implausible units", value, "give coordinates in metres");
         }
     }
 
     fn of_the_cloud(&self, reported: &mut Hints<'_>) {
         match self.cloud.len() {
-            0 => return reported.warn("the cloud has no points", "0 points", "nothing can be found in it"),
+            0 => return reported.warn("the cloud has no points", "0 points", "add measured points"),
             few if few < NEEDED => {
                 let value = counted(few, "point");
                 return reported.warn("the cloud has too few points", value, "a pose needs at least three");
@@ -96,50 +97,53 @@ impl CoherenceProblem {
         let places = self.cloud_places();
         let (full, half) = (extent(&places), extent(&nearer_half(&places)));
         if full < COINCIDENT {
-            let value = format!("{} in a box of {} m", counted(places.len(), "point"), number(full));
-            return reported.warn("the cloud's points lie in one place", value, "a pose needs three places");
+            let value = format!("{} in a bounding box of {} m", counted(places.len(), "point"), number(full));
+            return reported.warn("coincident cloud points", value, "a pose needs three distinct points");
         }
         if let Some(ratio) = largest_on_a_line(&places) {
-            let remedy = "a turn about the line changes nothing that is measured; no pose follows";
-            reported.warn("the cloud's points lie on a line", of_extents(ratio), remedy);
+            let remedy = "a rotation about the line changes no measurement; add a point off the line";
+            reported.warn("collinear cloud points", of_extents(ratio), remedy);
         }
         let nearest = nearest_two(&self.model, f64::INFINITY).map_or(0.0, |(.., distance)| distance);
         if nearest > full + self.delta {
             let (full, nearest) = (number(full), number(nearest));
-            let value = format!("a box of {full} m from corner to corner, and no two model points within {nearest} m");
-            reported.warn("the cloud is smaller than the model", value, "coordinates of both are in metres");
+            let value = format!("bounding box with a diagonal of {full} m, no two model points within {nearest} m");
+            reported.warn("the cloud is smaller than the model", value, "give coordinates of both in metres");
         } else if full < SUSPICIOUS[0] || half > SUSPICIOUS[1] {
             let (points, size) = if full < SUSPICIOUS[0] { ("the cloud", full) } else { ("half of the cloud", half) };
-            let value = format!("{points} lies in a box of {} m from corner to corner", number(size));
-            reported.warn("units?", value, "coordinates are in metres");
+            let value = format!("{points} lies in a bounding box with a diagonal of {} m", number(size));
+            reported.warn("implausible units", value, "give coordinates in metres");
         } else if self.model.len() > 1 && all_apart(&places, self.extent() + self.delta) {
-            let value = format!("no two cloud points are within the {} m of the model's box", number(self.extent()));
-            reported.warn("the cloud's points are too far apart", value, "coordinates of both are in metres");
+            let value = format!(
+                "no two cloud points are within {} m, the diagonal of the model's bounding box",
+                number(self.extent())
+            );
+            reported.warn("cloud points too far apart", value, "give coordinates of both in metres");
         }
     }
 
     fn of_the_noise(&self, reported: &mut Hints<'_>) {
         let variances = || self.cloud.iter().map(|point| point.position.covariance.diagonal());
-        let remedy = "nothing is measured better than a nanometre; give its standard deviation";
+        let remedy = "no measurement is more precise than a nanometre; give the standard deviation";
         if let Some(exact) = variances().position(|all| all.max() == 0.0) {
             reported.warn("points without noise", format!("cloud point {exact}, 0 m"), remedy);
         }
         if let Some((point, all)) = variances().enumerate().find(|(_, all)| all.min() == 0.0 && all.max() > 0.0) {
             let row: Vec<String> = all.iter().map(|variance| number(variance.sqrt())).collect();
             let value = format!("cloud point {point}, [{}] m", row.join(", "));
-            reported.warn("an axis without noise beside others", value, remedy);
+            reported.warn("zero noise along one axis", value, remedy);
         }
         let (sigma, extent) = (self.typical_sigma(), self.extent());
         if self.model.len() >= NEEDED && sigma > extent {
             let value =
-                format!("σ = {} m, and the model's box has {} m from corner to corner", number(sigma), number(extent));
-            reported.warn("noise larger than the model", value, "standard deviations are in metres");
+                format!("σ = {} m, the diagonal of the model's bounding box is {} m", number(sigma), number(extent));
+            reported.warn("noise larger than the model", value, "give standard deviations in metres");
         } else if self.delta < FAR_BELOW * sigma {
             let value = format!("Δ = {} m, σ = {} m", number(self.delta), number(sigma));
             reported.warn(
                 "`delta` is far below the noise",
                 value,
-                "hardly a true pair would agree; 3√2 σ lets nearly all agree",
+                "few true pairs would agree; nearly all agree at 3√2 σ",
             );
         }
     }
@@ -152,17 +156,17 @@ impl CoherenceProblem {
             if used.len() < NEEDED {
                 let points = counted(used.len(), &format!("{which} point"));
                 let value = format!("{} of {points}", counted(pairs.len(), "pair"));
-                let remedy = "a pose needs pairs of three; leave `putative` out to have all considered";
+                let remedy = "a pose needs pairs of three; omit `putative` to consider all pairs";
                 return reported.warn("`putative` has too few pairs", value, remedy);
             }
         }
         for (which, used, all) in [("model", &models, self.model_places()), ("cloud", &clouds, self.cloud_places())] {
             let places: Vec<Vector3<f64>> = used.iter().map(|&index| all[index]).collect();
-            // Of all points on a line it is told already.
+            // Collinearity of all points is reported already.
             if let Some(ratio) = largest_on_a_line(&places).filter(|_| largest_on_a_line(&all).is_none()) {
                 let value = format!("{} of {}, {}", used.len(), all.len(), of_extents(ratio));
-                let remedy = "no pose follows from pairs on a line; give pairs of a point beside it";
-                reported.warn(&format!("the {which} points of `putative` lie on a line"), value, remedy);
+                let remedy = "collinear pairs determine no pose; add pairs of a point off the line";
+                reported.warn(&format!("collinear {which} points in `putative`"), value, remedy);
             }
         }
     }
@@ -177,29 +181,32 @@ impl CoherenceProblem {
         let nearest = predicted().map(|place| place.amax()).fold(f64::INFINITY, f64::min);
         let foremost = predicted().map(|place| place.z).fold(f64::NEG_INFINITY, f64::max);
         if nearest > OUT_OF_VIEW {
-            let value = format!("its nearest point is {} m off along an axis", number(nearest));
-            reported.warn("the prior puts the object far away", value, "`T_cam_obj` is camera_from_object, in metres");
+            let value = format!("its nearest point is {} m away along an axis", number(nearest));
+            reported.warn(
+                "the prior places the object too far away",
+                value,
+                "`T_cam_obj` is camera_from_object, in metres",
+            );
         } else if foremost <= 0.0 {
-            let value = format!("its foremost point has z = {} m", number(foremost));
+            let value = format!("its largest z is {} m", number(foremost));
             let remedy = "`T_cam_obj` is camera_from_object, z forward; is it the inverse?";
-            reported.warn("the prior puts the whole object behind the camera", value, remedy);
+            reported.warn("the prior places the object behind the camera", value, remedy);
         }
         let PriorBound::Box(half) = prior.bound else { return };
         let cloud = extent(&nearer_half(&self.cloud_places()));
         if half < FAR_BELOW * self.typical_sigma() {
             let value = format!("{} m, σ = {} m", number(half), number(self.typical_sigma()));
-            let remedy = "hardly a true point would lie in its shell; give by how much the pose may be off";
+            let remedy = "few true points would lie in their gates; give the largest error of the prior";
             reported.warn("`prior.shell_half_m` is far below the noise", value, remedy);
         } else if half > FAR_ABOVE * cloud && self.cloud.len() >= NEEDED {
-            let value = format!("{} m, and half of the cloud lies in a box of {} m", number(half), number(cloud));
-            let remedy =
-                "every point is in every shell; it is in metres, and a prior that bounds nothing is best left out";
-            reported.warn("`prior.shell_half_m` leaves nothing out", value, remedy);
+            let value = format!("{} m, half of the cloud lies in a bounding box of {} m", number(half), number(cloud));
+            let remedy = "every point lies in every gate; give metres, or omit the prior";
+            reported.warn("`prior.shell_half_m` excludes nothing", value, remedy);
         }
     }
 
-    /// A motion of the model onto itself that noise does not tell from none: its turn (°), and how far (m) its points then lie from
-    /// those whose places they take.
+    /// A self-symmetry of the model within the noise: the angle (°), and the largest distance (m) of a mapped point
+    /// from its image point.
     fn symmetry(&self) -> Option<(f64, f64)> {
         if self.model.len() > MAX_CHECKED {
             return None;
@@ -210,14 +217,18 @@ impl CoherenceProblem {
         reported.find(|(_, off)| *off <= DISTINGUISHED * self.typical_sigma())
     }
 
-    /// What a search would not begin with; shells without points are told only of a prior with which nothing else is wrong.
+    /// Warns of candidates that no search accepts; empty gates are reported only if the prior has no other warning.
     fn of_candidates(&self, reported: &mut Hints<'_>, sound: bool) {
         let max = RigidConsensus::default().max_pairs;
         let mut many = |pairs: String| {
-            reported.warn("too many candidate pairs", format!("{pairs}, and `rigid-consensus` takes {max}"), FEWER);
+            reported.warn(
+                "too many candidate pairs",
+                format!("{pairs}, the limit of `rigid-consensus` is {max}"),
+                FEWER,
+            );
         };
         match self.candidates() {
-            Err(Rejected::TooLarge { size, .. }) => many(format!("{size} at least")),
+            Err(Rejected::TooLarge { size, .. }) => many(format!("at least {size}")),
             Err(refused) => many(refused.to_string()),
             Ok(found) if found.pairs() > max => many(found.pairs().to_string()),
             Ok(found) => {
@@ -225,8 +236,9 @@ impl CoherenceProblem {
                 let some = found.with_candidates();
                 if sound && enough && self.putative.is_none() && some < NEEDED {
                     let value = format!("{some} of {} model points", self.model.len());
-                    let remedy = "a pose needs three; is `T_cam_obj` camera_from_object, and the shell large enough?";
-                    reported.warn("too few shells of the prior hold a cloud point", value, remedy);
+                    let remedy =
+                        "a pose needs three; check that `T_cam_obj` is camera_from_object, or enlarge `shell_half_m`";
+                    reported.warn("too few gates contain a cloud point", value, remedy);
                 }
             }
         }
@@ -240,12 +252,12 @@ impl CoherenceProblem {
         self.cloud.iter().map(|point| point.position.at.coords).collect()
     }
 
-    /// The diagonal of the model's box (m): at least its diameter.
+    /// The diagonal of the model's bounding box (m), at least its diameter.
     fn extent(&self) -> f64 {
         extent(&self.model_places())
     }
 
-    /// The median over the cloud of the standard deviation an axis (m).
+    /// The median over the cloud of the standard deviation per axis (m).
     fn typical_sigma(&self) -> f64 {
         let mut all: Vec<f64> =
             self.cloud.iter().map(|point| (point.position.covariance.trace() / 3.0).sqrt()).collect();
@@ -254,7 +266,7 @@ impl CoherenceProblem {
     }
 }
 
-/// The diagonal of the box of points (m).
+/// The diagonal of the bounding box of points (m).
 fn extent(places: &[Vector3<f64>]) -> f64 {
     let corner =
         |outer: fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| places.iter().copied().reduce(|a, b| outer(&a, &b));
@@ -262,25 +274,25 @@ fn extent(places: &[Vector3<f64>]) -> f64 {
     min.zip(greatest).map_or(0.0, |(min, greatest)| (greatest - min).norm())
 }
 
-/// Second extent over first of three points or more that lie on a line, or in one place.
+/// The ratio of second to first extent of three or more collinear or coincident points; `None` for others.
 fn on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
-    // Squares of the largest numbers are none.
+    // The scaling prevents overflow of the squares of large numbers.
     let largest = places.iter().map(|at| at.amax()).fold(f64::MIN_POSITIVE, f64::max);
     let ratio = || second_ratio(places.iter().map(|at| at / largest));
     (places.len() >= NEEDED).then(ratio).filter(|&ratio| ratio < ON_A_LINE)
 }
 
-/// The same in words.
+/// The ratio in words.
 fn of_extents(ratio: f64) -> String {
     format!("second extent over first {ratio:.1e}")
 }
 
-/// [`on_a_line`] of points of which a few may be blunders: far away, they make any cloud long and thin.
+/// [`on_a_line`] without the influence of a few distant outliers, which make any cloud long and thin.
 fn largest_on_a_line(places: &[Vector3<f64>]) -> Option<f64> {
     on_a_line(places).filter(|_| on_a_line(&nearer_half(places)).is_some())
 }
 
-/// The half of the points, three at least, that is nearest to the middle.
+/// The half of the points, at least three, that is nearest to the median.
 fn nearer_half(places: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let kept = places.len().div_ceil(2).max(NEEDED);
     if kept >= places.len() {
@@ -297,9 +309,9 @@ fn nearer_half(places: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     half
 }
 
-/// Whether no two points are within `limit` of each other.
+/// Whether every two points are farther apart than `limit`.
 ///
-/// Swept as [`nearest_two`] sweeps: what is further off along a direction need not be looked at.
+/// It sweeps as [`nearest_two`] does: points farther along the direction are skipped.
 fn all_apart(places: &[Vector3<f64>], limit: f64) -> bool {
     let direction = Vector3::new(1.0, 2f64.sqrt(), 3f64.sqrt()).normalize();
     let mut along: Vec<(f64, &Vector3<f64>)> = places.iter().map(|at| (direction.dot(at), at)).collect();

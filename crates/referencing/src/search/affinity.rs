@@ -1,22 +1,22 @@
-//! The association graph with weights: how well each coherent pair of pairs agrees.
+//! The consistency graph with weights for the agreement of each coherent pair of pairs.
 
 use super::{Rejected, association::Association, grow::max_possible};
 use crate::Problem;
 
-/// A symmetric matrix over the vertices, zero where they are not coherent; its upper half by rows.
+/// A symmetric matrix over the vertices, zero for incoherent ones; its upper half by rows.
 #[derive(Debug)]
 pub(super) struct Affinity {
-    /// Where each row begins.
+    /// Index of the first entry of each row.
     starts: Vec<usize>,
     columns: Vec<u32>,
     weights: Vec<f32>,
 }
 
 impl Affinity {
-    /// Edges weighed by `weight` of their difference over Δ, 0 to 1.
+    /// Edges with the `weight` of their distance difference over Δ, 0 to 1.
     ///
     /// # Errors
-    /// [`Rejected::TooLarge`]: they are more than `max`.
+    /// [`Rejected::TooLarge`] for more than `max` edges.
     pub(super) fn of(
         problem: &Problem<'_>,
         graph: &Association,
@@ -47,7 +47,7 @@ impl Affinity {
         self.columns.len()
     }
 
-    /// M x, and A x with A the graph without its weights.
+    /// M x, and A x with the unweighted graph A.
     pub(super) fn products(&self, x: &[f64], weighted: &mut [f64], plain: &mut [f64]) {
         weighted.fill(0.0);
         plain.fill(0.0);
@@ -66,7 +66,7 @@ impl Affinity {
     }
 }
 
-/// Makes the length of a vector one; false where it has none.
+/// Scales a vector to unit length; false if its length is zero or not finite.
 pub(super) fn normalized(x: &mut [f64]) -> bool {
     let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
     let some = length > 0.0 && length.is_finite();
@@ -76,7 +76,7 @@ pub(super) fn normalized(x: &mut [f64]) -> bool {
     some
 }
 
-/// Vertices by falling weight, those of no weight left out; of equals the first.
+/// Vertices by descending weight, without those of zero weight; among equals the first.
 pub(super) fn by_weight(x: &[f64]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..x.len()).filter(|&v| x[v] > 0.0).collect();
     order.sort_by(|&v, &w| x[w].total_cmp(&x[v]));

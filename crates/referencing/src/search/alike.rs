@@ -1,23 +1,23 @@
-//! Whether every set as large as the best places the object where the best does.
+//! The proof that every set as large as the best gives the same pose.
 
 use nalgebra::Vector3;
 
 use super::{association::Association, clique, orientation::Sense};
 use crate::{Correspondence, Observations, Problem, Tolerance, solve::least_squares};
 
-/// Points nearer to a line than this share of the model's extent fix no rotation about it.
+/// Distance from a line (fraction of the model's extent) below which points determine no rotation about it.
 const SLIM: f64 = 0.05;
-/// The least set that tells something of a pose; fewer pairs agree everywhere.
+/// Minimum size of a set with information on the pose; fewer pairs agree everywhere.
 const MIN: usize = 3;
 
-/// Whether it is proved that every admissible set as large as `best` or larger, seen or not, has
-/// more than a third of `best`'s number of pairs where the rigid motion of `best` puts them, and not all of
-/// these along one line, so that they pin the same motion; and the pair tests spent.
+/// Proves that every admissible set as large as `best` or larger gives the motion of `best`; returns the pair tests
+/// too.
 ///
-/// Large sets have more rivals than can be listed: each point with a second measurement beside it doubles
-/// their number, and they all say the same. Proved by the rest: when the pairs that do not fit the motion
-/// of `best` hold no admissible set of h members, a set of k has k − h + 1 or more that do;
-/// h = k − max(k/3, l), l the most fitting model points along one line.
+/// More than a third of such a set's pairs fit the rigid motion of `best`, and not all of these are collinear, so that
+/// they determine the same motion. A list of the sets would be too long: each point with a second measurement beside it
+/// doubles their number. The proof uses the remaining pairs: if the pairs that do not fit the motion of `best` hold no
+/// admissible set of h members, a set of k has at least k − h + 1 that do; h = k − max(k/3, l), l the maximum number of
+/// collinear fitting model points.
 pub(super) fn all_alike(
     problem: &Problem<'_>,
     graph: &Association,
@@ -45,7 +45,7 @@ pub(super) fn all_alike(
     (largest.complete && largest.found.is_empty(), budget - cliques.left())
 }
 
-/// How far a true pair may be from where the motion puts it (m).
+/// The maximum distance of a true pair from its place under the motion (m).
 pub(super) fn slack(problem: &Problem<'_>, pair: Correspondence) -> f64 {
     match problem.tolerance {
         Tolerance::Fixed(delta) => delta,
@@ -56,14 +56,14 @@ pub(super) fn slack(problem: &Problem<'_>, pair: Correspondence) -> f64 {
     }
 }
 
-/// The most points along one line through two of them.
+/// The maximum number of points along one line through two of them.
 fn largest_along_a_line(points: &[Vector3<f64>]) -> usize {
     let extent = points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f64::max);
     let mut max = points.len().min(2);
     for (i, a) in points.iter().enumerate() {
         for (j, b) in points.iter().enumerate().skip(i + 1) {
             let Some(along) = (b - a).try_normalize(0.0) else { continue };
-            // Nearer than this to the line, which is squared once and for all.
+            // Squared distance from the line, computed once.
             let slim = (SLIM * extent).powi(2);
             let others = points.iter().skip(j + 1).filter(|p| (*p - a).cross(&along).norm_squared() <= slim);
             max = max.max(2 + others.count());
@@ -88,7 +88,7 @@ mod tests {
         assert_eq!(largest_along_a_line(&[at(0.0, 1.0), at(0.0, 0.0), at(1.0, 0.01), at(2.0, 0.0), at(1.0, 1.0)]), 3);
     }
 
-    /// Twelve points seen where they are, and as many again beside them (`shift`, m), each pair a candidate.
+    /// Twelve points measured exactly, and once more displaced by `shift` (m), each pair a candidate.
     fn proved(shift: f64) -> bool {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let places: Vec<Vector3<f64>> = (0..12).map(|_| Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0))).collect();
@@ -112,6 +112,6 @@ mod tests {
     #[test]
     fn measurements_side_by_side_are_alike_and_a_second_object_is_not() {
         assert!(proved(0.01));
-        assert!(!proved(0.5), "the object stands there twice");
+        assert!(!proved(0.5), "the object has a second copy");
     }
 }

@@ -1,4 +1,4 @@
-//! The association graph: candidate pairs as vertices, structural coherence as edges.
+//! The consistency graph: candidate pairs as vertices, structural coherence as edges.
 
 use seafix_geometry::Point;
 
@@ -8,19 +8,18 @@ use crate::{
     lanes::{LANES, ones_of},
 };
 
-/// A clique of this graph is a set of pairs that are all coherent with each other, each model point
-/// and each cloud point used at most once. Vertices stand in an order that depends on coordinates
-/// alone, so that no answer depends on the order in which the cloud came.
+/// The consistency graph, whose cliques are one-to-one sets of mutually coherent pairs.
 ///
-/// Source: Bailey, *et al.*, Data association for mobile robot navigation: a graph theoretic
-/// approach, 2000.
+/// The order of the vertices depends on coordinates alone, so that no answer depends on the order of the cloud.
+///
+/// Source: Bailey, *et al.*, Data association for mobile robot navigation: a graph theoretic approach, 2000.
 #[derive(Debug)]
 pub(crate) struct Association {
     /// The candidate pairs, by model point.
     pub(crate) vertices: Vec<Correspondence>,
-    /// Which pairs are coherent.
+    /// The coherent pairs of vertices.
     pub(crate) adjacency: BitMatrix,
-    /// Pair tests spent on the edges.
+    /// Number of pair tests spent on the edges.
     pub(crate) pair_tests: u64,
 }
 
@@ -29,7 +28,7 @@ impl Association {
     pub(crate) fn of(problem: &Problem<'_>) -> Self {
         let vertices = vertices(problem);
         let mut adjacency = BitMatrix::zeros(vertices.len());
-        // A cheap necessary condition first, and one that suffices; the exact test decides between them.
+        // A cheap necessary condition first, and a sufficient one; the exact test decides between them.
         let mut sites = Sites::default();
         for &pair in &vertices {
             let (model, cloud) = (problem.model[pair.model].at.coords, problem.cloud[pair.cloud].position.at.coords);
@@ -45,7 +44,7 @@ impl Association {
             }
             let first = next_model / LANES;
             sites.compare(a, first, &mut comparisons);
-            // One model point, one cloud point: never two of them.
+            // Two pairs of one model point or of one cloud point are never adjacent.
             let same = same_cloud[a].iter().copied().filter(|&b| b >= next_model);
             same.for_each(|b| comparisons[b / LANES - first].near &= !(1 << (b % LANES)));
             if let Some(compare) = comparisons.first_mut() {
@@ -66,7 +65,7 @@ impl Association {
         Self { vertices, adjacency, pair_tests: count * count.saturating_sub(1) / 2 }
     }
 
-    /// The graph of those vertices alone that are to be kept.
+    /// The subgraph of the vertices to keep.
     pub(super) fn restricted(&self, keep: impl Fn(Correspondence) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.vertices.len()).filter(|&v| keep(self.vertices[v])).collect();
         let mut place = vec![None; self.vertices.len()];
@@ -79,9 +78,9 @@ impl Association {
     }
 }
 
-/// Shares of bounds of Δ: that of two pairs is at most the sum of their first, and at least the sum of their second.
+/// Additive parts of bounds of Δ: the Δ of two pairs is at most the sum of the first, and at least that of the second.
 pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence) -> (f64, f64) {
-    // Distances themselves are rounded, by a share of the coordinates.
+    // Distances have rounding errors relative to the coordinates.
     let (known, measured) = (problem.model[pair.model].at, problem.cloud[pair.cloud].position.at);
     let rounding = 1e-13 * known.coords.amax().max(measured.coords.amax());
     let max = problem.fraction_of_delta(pair) * (1.0 + 1e-9) + rounding;
@@ -92,7 +91,7 @@ pub(super) fn reach(problem: &Problem<'_>, pair: Correspondence) -> (f64, f64) {
     (max, min)
 }
 
-/// For each vertex the later ones of the same cloud point.
+/// The later vertices of the same cloud point, for each vertex.
 fn same_cloud(vertices: &[Correspondence]) -> Vec<Vec<usize>> {
     let mut by_cloud: Vec<usize> = (0..vertices.len()).collect();
     by_cloud.sort_by_key(|&v| (vertices[v].cloud, v));
@@ -103,7 +102,7 @@ fn same_cloud(vertices: &[Correspondence]) -> Vec<Vec<usize>> {
     same_cloud
 }
 
-/// Points by their coordinates; of equals the first.
+/// The indices of points by their coordinates; among equals the first.
 pub(super) fn by_coordinates<F>(points: impl Iterator<Item = Point<F>>) -> Vec<usize> {
     let points: Vec<_> = points.map(|point| point.coords).collect();
     let mut order: Vec<usize> = (0..points.len()).collect();
@@ -114,8 +113,8 @@ pub(super) fn by_coordinates<F>(points: impl Iterator<Item = Point<F>>) -> Vec<u
     order
 }
 
-/// The candidate pairs in the order of their coordinates, model first; those with a coordinate that is not finite
-/// agree with nothing and are left out.
+/// The candidate pairs in the order of their coordinates, model first. Pairs with a coordinate that is not finite are
+/// excluded, since they agree with nothing.
 pub(super) fn vertices(problem: &Problem<'_>) -> Vec<Correspondence> {
     fn ranks<F>(points: impl Iterator<Item = Point<F>>) -> Vec<usize> {
         let order = by_coordinates(points);

@@ -1,4 +1,4 @@
-//! Backtracking: subsets with pruning.
+//! Backtracking over subsets of the model points.
 
 use rand::Rng;
 use seafix_component::Component;
@@ -15,23 +15,25 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// The largest admissible set, as `maximum-clique`, without a graph: each subset of model points once, in place of the
-/// paper's ordered samples, one candidate after the other, and nothing below a pair that contradicts one chosen. What is
-/// chosen strikes what contradicts it from the lists of the points to come (forward checking); a branch ends when the
-/// points that still have candidates are too few to beat the best (bound).
+/// Backtracking with forward checking (Haralick and Elliott 1980): the largest admissible set, without a graph.
 ///
-/// Exact within the budget; of sets of one size the least residual of a rigid fit decides, then the coordinates. Exponential
-/// in the worst case: Π (m_i + 1) for lists of m_i.
+/// The answer is that of `maximum-clique`. Each subset of model points is visited once, in place of the paper's ordered
+/// samples, one candidate after the other; nothing below a contradicting pair is visited. A choice removes
+/// contradicting candidates from the lists of later points (forward checking). A branch ends if the points that still
+/// have candidates are too few to exceed the best (bound).
+///
+/// Exact within the budget. Among sets of one size the minimum residual of a rigid fit decides, then the coordinates.
+/// Exponential in the worst case: Π (m_i + 1) for lists of m_i.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Backtracking {
-    /// Whether mirror images are refused; `false` is the paper's distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only, as in the paper.
     pub(crate) orientation: bool,
-    /// Whether branches too small for the best are left; `false` only to show that nothing is lost by it.
+    /// Whether branches too small to exceed the best are pruned; `false` serves to show that pruning loses nothing.
     pub(crate) bound: bool,
-    /// Pair tests.
+    /// Maximum number of pair tests.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -49,9 +51,9 @@ impl Component for Backtracking {
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the number of pairs, every two coherent, one-to-one, no four of them mirrored; of equally many the least residual",
+            "the number of pairs, every two coherent, one-to-one, no four of them mirrored; among equals the minimum residual",
         ),
-        ("exact", "within its budget; the answer says whether it is proved"),
+        ("exact", "within its budget; the answer states whether it is proved"),
         ("time", "exponential at worst: Π (m + 1) over lists of m candidates; no graph"),
     ];
 
@@ -92,7 +94,7 @@ impl Search for Backtracking {
         }
         let mut undecided = None;
         if self.orientation {
-            // Three points have no orientation: they may be what is left of a mirror image of more.
+            // Three points have no orientation: they may be the remainder of a larger mirror image.
             run.sense = if size == NEEDED { Sense::Any } else { Sense::Mirrored };
             run.largest(size + 1, 1);
             if let Some(image) = run.found.first().map(|set| run.pairs(set)) {
@@ -133,7 +135,7 @@ struct Run<'a> {
     bound: bool,
     sense: Sense,
     left: u64,
-    /// The least size of interest.
+    /// Minimum size of interest.
     best: usize,
     /// Sets of that size, vertices ascending.
     found: Vec<Vec<usize>>,
@@ -141,18 +143,18 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// The largest sets of at least `min` members, up to `cap`; whether it came to its end.
+    /// Finds the largest sets of at least `min` members, up to `cap`; true if the search is complete.
     fn largest(&mut self, min: usize, cap: usize) -> bool {
         (self.best, self.cap, self.found) = (min, cap, Vec::new());
         let all: Vec<usize> = (0..self.vertices.len()).collect();
-        // Points with few candidates first: what they contradict is struck early.
+        // Points with few candidates first: their contradictions prune early.
         let mut lists: Vec<Vec<usize>> =
             all.chunk_by(|&a, &b| self.vertices[a].model == self.vertices[b].model).map(<[usize]>::to_vec).collect();
         lists.sort_by_key(Vec::len);
         self.extend(&mut Vec::new(), &lists).is_ok()
     }
 
-    /// Sets that begin with `set` and go on with some of these lists, in their order.
+    /// Visits the sets that begin with `set` and continue with some of these lists, in their order.
     fn extend(&mut self, set: &mut Vec<usize>, lists: &[Vec<usize>]) -> Result<(), Spent> {
         for (place, list) in lists.iter().enumerate() {
             if self.bound && set.len() + lists.len() - place < self.best {
@@ -181,7 +183,7 @@ impl Run<'_> {
         }
     }
 
-    /// What of the lists does not contradict `set` with `vertex`; lists that are left empty are dropped.
+    /// The lists without candidates that contradict `set` with `vertex`; empty lists are dropped.
     fn checked(&mut self, set: &[usize], vertex: usize, lists: &[Vec<usize>]) -> Result<Vec<Vec<usize>>, Spent> {
         let mut planes = Vec::new();
         if self.sense != Sense::Any {

@@ -1,8 +1,8 @@
-//! Sets of small numbers as bits, and square matrices of them.
+//! Sets of small numbers as bit masks, and square bit matrices.
 
 use crate::lanes::{LANES as WORD, ones_of};
 
-/// Words that hold `count` bits.
+/// The number of words for `count` bits.
 fn words(count: usize) -> usize {
     count.div_ceil(WORD)
 }
@@ -14,12 +14,12 @@ pub(crate) struct BitSet {
 }
 
 impl BitSet {
-    /// No number below `limit`.
+    /// The empty set of numbers below `limit`.
     pub(crate) fn empty(limit: usize) -> Self {
         Self { words: vec![0; words(limit)] }
     }
 
-    /// Every number below `limit`.
+    /// The set of all numbers below `limit`.
     pub(crate) fn full(limit: usize) -> Self {
         let mut set = Self { words: vec![u64::MAX; words(limit)] };
         if let Some(last) = set.words.last_mut().filter(|_| !limit.is_multiple_of(WORD)) {
@@ -48,7 +48,7 @@ impl BitSet {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// The least number at or above `from`.
+    /// The smallest member at or above `from`.
     pub(crate) fn next(&self, from: usize) -> Option<usize> {
         let mut index = from / WORD;
         let mut word = self.words.get(index)? & (u64::MAX << (from % WORD));
@@ -61,12 +61,12 @@ impl BitSet {
         }
     }
 
-    /// The numbers, ascending.
+    /// The members, ascending.
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         ones(&self.words)
     }
 
-    /// Its words.
+    /// The words of the mask.
     pub(super) fn words(&self) -> &[u64] {
         &self.words
     }
@@ -80,23 +80,23 @@ impl BitSet {
         }
     }
 
-    /// Keeps what is also in `row`.
+    /// Intersects with `row`.
     pub(crate) fn intersect(&mut self, row: &[u64]) {
         self.words.iter_mut().zip(row).for_each(|(word, other)| *word &= other);
     }
 
-    /// Removes what is in `row`, from the word of `from` on.
+    /// Removes the members of `row`, from the word of `from` on.
     pub(crate) fn subtract(&mut self, row: &[u64], from: usize) {
         let first = from / WORD;
         self.words[first..].iter_mut().zip(&row[first..]).for_each(|(word, other)| *word &= !other);
     }
 
-    /// How many of its numbers are also in `row`.
+    /// The number of members in common with `row`.
     pub(crate) fn common(&self, row: &[u64]) -> usize {
         let mut count = 0;
         for (word, other) in self.words.iter().zip(row) {
             let both = word & other;
-            // Counting ones costs more than seeing that there are none, which is the rule in large graphs.
+            // Counting ones costs more than a test for zero, which is the rule in large graphs.
             if both != 0 {
                 count += both.count_ones() as usize;
             }
@@ -105,7 +105,7 @@ impl BitSet {
     }
 }
 
-/// For each vertex of `of` how many of `members` are its neighbours.
+/// The number of neighbours in `members` of each vertex of `of`.
 pub(super) fn degrees(adjacency: &BitMatrix, members: &BitSet, of: &[usize], degrees: &mut Vec<usize>) {
     let first = members.words.iter().position(|&word| word != 0).unwrap_or(0);
     let last = members.words.iter().rposition(|&word| word != 0).map_or(first, |last| last + 1);
@@ -130,7 +130,7 @@ fn ones(words: &[u64]) -> impl Iterator<Item = usize> + '_ {
     words.iter().enumerate().flat_map(|(index, &word)| ones_of(index * WORD, word))
 }
 
-/// Transposes 64 × 64 bits: halves, quarters and so on change places across the diagonal.
+/// Transposes 64 × 64 bits by swapping halves, quarters and so on across the diagonal.
 fn transpose(block: &mut [u64; WORD]) {
     let (mut step, mut mask) = (WORD / 2, u64::MAX >> (WORD / 2));
     while step > 0 {
@@ -146,7 +146,7 @@ fn transpose(block: &mut [u64; WORD]) {
     }
 }
 
-/// A square matrix of bits: the adjacency of a graph.
+/// A square bit matrix: the adjacency of a graph.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct BitMatrix {
     width: usize,
@@ -154,23 +154,23 @@ pub(crate) struct BitMatrix {
 }
 
 impl BitMatrix {
-    /// `size` × `size` zeros.
+    /// The zero matrix of `size` × `size`.
     pub(crate) fn zeros(size: usize) -> Self {
         Self { width: words(size), bits: vec![0; size * words(size)] }
     }
 
-    /// Sets both (i, j) and (j, i).
+    /// Sets (i, j) and (j, i).
     pub(crate) fn connect(&mut self, i: usize, j: usize) {
         self.bits[i * self.width + j / WORD] |= 1 << (j % WORD);
         self.bits[j * self.width + i / WORD] |= 1 << (i % WORD);
     }
 
-    /// Row `i` as words, to be written.
+    /// Row `i` as mutable words.
     pub(super) fn row_mut(&mut self, i: usize) -> &mut [u64] {
         &mut self.bits[i * self.width..(i + 1) * self.width]
     }
 
-    /// Sets (j, i) wherever (i, j) is set, i < j; nothing may be set below the diagonal before.
+    /// Sets (j, i) for every (i, j), i < j; the part below the diagonal must be zero before.
     pub(super) fn mirror_upper(&mut self) {
         let size = self.bits.len() / self.width.max(1);
         for rows in 0..self.width {

@@ -1,4 +1,4 @@
-//! Exact cliques of the association graph, largest first, within a budget.
+//! Exact search for the largest cliques of the consistency graph, within a budget.
 
 use super::{
     association::Association,
@@ -10,58 +10,57 @@ use super::{
 };
 use crate::Problem;
 
-/// Up to this many points every four are tested for orientation while the set grows.
+/// Maximum size up to which every quadruple is tested for orientation while the set grows.
 pub(super) const MAX_ORIENTED: usize = 40;
-/// Further points are tested against the first so many only (four of 500 points are 2.6 · 10⁹), and
-/// the answer is proved by a complete test at the end, or not called optimal.
+/// Number of first points that further points are tested against (500 points have 2.6 · 10⁹ quadruples); a complete
+/// test at the end proves the answer, or it is not called optimal.
 const FEW_ORIENTED: usize = 16;
 
-/// The cliques found and what is proved about the others.
+/// The cliques found, with the bounds proved for the others.
 #[derive(Debug)]
 pub(super) struct Cliques {
-    /// The largest cliques met, up to the cap; vertices ascending.
+    /// The largest cliques found, up to the cap; vertices ascending.
     pub(super) found: Vec<Vec<usize>>,
     /// Whether these are all of their size.
     pub(super) all: bool,
-    /// No admissible clique is larger; equal to the size found when the search was complete.
+    /// Upper bound of the size of an admissible clique; equal to the size found if the search was complete.
     pub(super) bound: usize,
-    /// Whether the search ended by itself.
+    /// Whether the search ended before its budget.
     pub(super) complete: bool,
 }
 
 /// Branch and bound over the cliques that a sense admits.
 ///
-/// Each vertex in turn with its later neighbours as one small graph; there greedy colouring bounds the size
-/// (Tomita and Seki, 2003; San Segundo et al., *An exact bit-parallel algorithm for the maximum clique problem*,
-/// 2011), and before it the n-partite bound: no more members than there are different model points, nor than
-/// different cloud points. Vertices stand by model point, so that the last ones, of one model point less than
-/// are asked for, begin no clique. Vertices with too few neighbours are peeled off first (k-core).
-/// Orientation removes vertices while the clique grows; all bounds hold without it, so the answer
-/// stays exact.
+/// Each vertex in turn forms a small graph with its later neighbours. Greedy colouring bounds the clique size there
+/// (Tomita and Seki, 2003; San Segundo et al., *An exact bit-parallel algorithm for the maximum clique problem*, 2011),
+/// after the n-partite bound: no more members than different model points, nor than different cloud points. Vertices
+/// are sorted by model point, so that the last ones, with one model point fewer than required, begin no clique.
+/// Vertices with too few neighbours are removed first (k-core). Orientation removes vertices while the clique grows;
+/// all bounds hold without it, so that the answer remains exact.
 pub(super) struct Search<'a> {
     graph: &'a Association,
     volumes: Volumes<'a>,
     quadruples: Quadruples,
-    /// What fours are refused.
+    /// The required sense of quadruples.
     sense: Sense,
-    /// Tests left: a vertex coloured, or four points tested for orientation.
+    /// Remaining tests: a vertex coloured, or a quadruple tested for orientation.
     left: u64,
-    /// Neighbours of each vertex.
+    /// Number of neighbours of each vertex.
     degree: Vec<usize>,
-    /// Different model points among each vertex and those after it.
+    /// Number of different model points from each vertex on.
     models_from: Vec<usize>,
     /// Vertices that can be in a clique of interest.
     alive: BitSet,
-    /// Least size that is still of interest.
+    /// Minimum size of interest.
     min: usize,
     /// The largest cliques so far.
     found: Vec<Vec<usize>>,
-    /// With 1 the first of the largest is kept, with more all of the size of interest.
+    /// Maximum number of cliques kept: 1 keeps the first of the largest, more keeps all of the size of interest.
     cap: usize,
     work: Workshop,
 }
 
-/// The end of a search before its time.
+/// The premature end of a search.
 struct Stop;
 
 impl<'a> Search<'a> {
@@ -91,20 +90,19 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Tests not yet spent.
+    /// The remaining tests.
     pub(super) fn left(&self) -> u64 {
         self.left
     }
 
-    /// Refuses other fours from here on.
+    /// Sets the required sense from here on.
     pub(super) fn set_sense(&mut self, sense: Sense) {
         self.sense = sense;
     }
 
-    /// The largest cliques of at least `min` members: the first that was found and up to `cap` that tie with it.
+    /// The largest cliques of at least `min` members: the first found, and up to `cap` of the same size.
     ///
-    /// First one of the largest and the proof that none is larger, then what ties with it, with the
-    /// budget that is left.
+    /// First one of the largest with the proof that none is larger, then the others with the remaining budget.
     pub(super) fn run(&mut self, min: usize, cap: usize) -> Cliques {
         (self.min, self.cap, self.found) = (min.max(1), 1, Vec::new());
         self.greedy();
@@ -113,7 +111,7 @@ impl<'a> Search<'a> {
         let (mut complete, mut bound) = (true, 0);
         for vertex in (0..self.degree.len()).rev() {
             let tie = self.tie();
-            // What this vertex and the later ones have of model points is no more than that.
+            // The number of model points from this vertex on bounds the clique.
             if self.models_from[vertex] < tie || !self.alive.has(vertex) {
                 continue;
             }
@@ -133,7 +131,7 @@ impl<'a> Search<'a> {
         Cliques { found, all, bound: bound.min(self.partite()).max(best), complete }
     }
 
-    /// The neighbours after a vertex, as far as a clique of `min` members with it may need them.
+    /// The neighbours after a vertex that a clique of `min` members with it may contain.
     fn later_neighbours(&mut self, vertex: usize, min: usize) -> Local {
         let mut neighbours = self.alive.clone();
         neighbours.intersect(self.graph.adjacency.row(vertex));
@@ -141,7 +139,7 @@ impl<'a> Search<'a> {
         Local::of(self.graph, neighbours, min, &mut self.work)
     }
 
-    /// Takes vertices away that have too few neighbours left for a clique as large as the largest.
+    /// Removes vertices with too few neighbours for a clique as large as the largest.
     fn peel(&mut self) {
         let (tie, count) = (self.tie(), self.degree.len());
         self.alive = BitSet::full(count);
@@ -159,27 +157,26 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A bound on every clique, by cores: k members have k − 1 neighbours among themselves.
+    /// An upper bound of the clique size by cores: k members have k − 1 neighbours among themselves.
     fn max_possible(&self) -> usize {
         let mut sorted = self.degree.clone();
         sorted.sort_unstable_by(|a, b| b.cmp(a));
-        // The most vertices of which each has one neighbour less than they are.
+        // The maximum number k of vertices with at least k − 1 neighbours each.
         sorted.iter().enumerate().take_while(|(place, degree)| *degree >= place).count()
     }
 
-    /// The size of the largest so far, or the least that is of interest.
+    /// The size of the largest clique so far, or the minimum of interest.
     fn tie(&self) -> usize {
         self.found.first().map_or(self.min, Vec::len)
     }
 
-    /// Adds all cliques as large as the largest, from the vertices at these places of the order;
-    /// whether all were met.
+    /// Adds all cliques as large as the largest, from the vertices `open`; true if all were visited.
     fn ties(&mut self, open: &[usize], cap: usize) -> bool {
         if cap <= 1 || self.found.is_empty() {
             return false;
         }
         (self.min, self.cap) = (self.tie(), cap);
-        let first = self.found.pop().expect("there is one");
+        let first = self.found.pop().expect("a clique");
         let mut all = true;
         for &vertex in open {
             let local = self.later_neighbours(vertex, self.min);
@@ -194,7 +191,7 @@ impl<'a> Search<'a> {
         all
     }
 
-    /// The n-partite bound of the whole graph.
+    /// The n-partite bound of the complete graph.
     fn partite(&self) -> usize {
         let mut clouds: Vec<usize> = self.graph.vertices.iter().map(|pair| pair.cloud).collect();
         clouds.sort_unstable();
@@ -202,13 +199,15 @@ impl<'a> Search<'a> {
         self.models_from.first().copied().unwrap_or(0).min(clouds.len())
     }
 
-    /// A large clique at once, so that the bounds cut from the start: from some of the best connected
-    /// vertices, always the neighbour with most neighbours among those that remain.
+    /// Finds a large clique greedily, so that the bounds prune from the start.
+    ///
+    /// It starts from some of the best connected vertices and always adds the neighbour with most neighbours among the
+    /// rest.
     fn greedy(&mut self) {
         const STARTS: usize = 24;
         let mut starts: Vec<usize> = (0..self.degree.len()).collect();
         starts.sort_by_key(|&vertex| std::cmp::Reverse(self.degree[vertex]));
-        // A quarter of the budget at most: the proof needs the rest.
+        // At most a quarter of the budget: the proof needs the rest.
         let reserve = self.left - self.left / 4;
         for &start in starts.iter().take(STARTS) {
             let mut neighbours = BitSet::full(self.degree.len());
@@ -235,7 +234,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether a vertex makes a refused four with some three members of the clique.
+    /// Whether a vertex forms a rejected quadruple with three members of the clique.
     fn refuses(&mut self, clique: &[usize], vertex: usize) -> bool {
         if self.sense == Sense::Any {
             return false;
@@ -255,7 +254,7 @@ impl<'a> Search<'a> {
         self.found.push(clique);
     }
 
-    /// The cliques of `vertex` and some of its later neighbours.
+    /// Visits the cliques of `vertex` and some of its later neighbours.
     fn within(&mut self, vertex: usize, local: &Local) -> Result<(), Stop> {
         if self.min <= 1 {
             self.keep(&[vertex]);
@@ -295,7 +294,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Removes the candidates that would make a refused four with `added` and two members of the clique.
+    /// Removes the candidates that would form a rejected quadruple with `added` and two members of the clique.
     fn orient(&mut self, local: &Local, clique: &[usize], added: usize, candidates: &mut BitSet) -> Result<(), Stop> {
         if self.sense == Sense::Any || clique.len() < 2 {
             return Ok(());

@@ -1,17 +1,17 @@
-//! The loop of the closest-point searches.
+//! The common loop of the closest-point searches.
 
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::association::vertices;
 use crate::{Correspondence, Problem};
 
-/// What tells one closest-point search from another, and how long it may run.
+/// The distance, fit and limits of a closest-point search.
 pub(super) struct Closest<D, F> {
-    /// How far a pair is from where a pose puts it; a NaN is no candidate.
+    /// Distance of a pair under a pose; a pair with NaN is no candidate.
     pub(super) distance: D,
     /// The pose of some pairs.
     pub(super) fit: F,
-    /// Share of the nearest pairs that is fitted.
+    /// Fraction of the nearest pairs that is fitted.
     pub(super) keep: f64,
     pub(super) iterations: usize,
     pub(super) budget: u64,
@@ -22,8 +22,10 @@ where
     D: Fn(&Transform<Object, Camera>, Correspondence) -> f64,
     F: Fn(&[Correspondence]) -> Option<Transform<Object, Camera>>,
 {
-    /// From `start`: each model point's nearest candidate, the pose of the nearest of these pairs, and again until
-    /// the pairs do not change. The last pose, all candidate pairs, the distances computed, and whether the budget ended it.
+    /// Alternates nearest candidates and pose until the pairs no longer change.
+    ///
+    /// Each round takes the nearest candidate of each model point and fits the pose to the nearest of these pairs.
+    /// Returns the last pose, all candidate pairs, the number of distances, and whether the budget ended the loop.
     pub(super) fn run(
         &self,
         problem: &Problem<'_>,
@@ -49,7 +51,7 @@ where
             if pairs == last {
                 break;
             }
-            // In the order of the vertices, so that sums do not depend on the order of the points.
+            // In the order of the vertices: sums do not depend on the order of the points.
             let chosen: Vec<Correspondence> =
                 vertices.iter().copied().filter(|pair| pairs.binary_search(pair).is_ok()).collect();
             match (self.fit)(&chosen).filter(Transform::is_finite) {

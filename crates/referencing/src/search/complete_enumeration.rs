@@ -1,4 +1,4 @@
-//! Complete enumeration: the paper's search without its shells.
+//! Complete enumeration: the paper's search without gates.
 
 use rand::Rng;
 use seafix_component::Component;
@@ -13,21 +13,22 @@ use super::{
 };
 use crate::Problem;
 
-/// The baseline that shells are held against: every cloud point may be every model point, whatever the prior says, so that
-/// M^q choices stand behind every sample of q model points. Of pairs that were given without a prior it takes those alone.
-/// Longest samples first, the first coherent one is the answer, as in `structural-coherence`.
+/// The baseline without gates (the paper's ref. 35): every cloud point is a candidate of every model point.
 ///
-/// What it says is exact within the budget; Σ_q C(n, q) M^q choices, q! times as many with the paper's ordered samples.
+/// Each sample of q model points has M^q choices, whatever the prior. Pairs given without a prior are taken as they
+/// are. Longest samples first; the first coherent one is the answer, as in `structural-coherence`.
+///
+/// Exact within the budget; Σ_q C(n, q) M^q choices, q! times as many with the paper's ordered samples.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct CompleteEnumeration {
-    /// Which samples are tried.
+    /// Kind of samples.
     pub(crate) samples: Samples,
-    /// Whether mirror images are refused; `false` is distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only.
     pub(crate) orientation: bool,
-    /// Pair tests before it gives up.
+    /// Maximum number of pair tests.
     pub(crate) budget: u64,
-    /// More pairs of a model and a cloud point than this are not searched.
+    /// Maximum number of pairs of a model and a cloud point; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -39,7 +40,7 @@ impl Default for CompleteEnumeration {
 
 impl Component for CompleteEnumeration {
     const NAME: &'static str = "complete-enumeration";
-    const SUMMARY: &'static str = "all cloud points for all model points, longest samples first: no shells";
+    const SUMMARY: &'static str = "all cloud points for all model points, longest samples first, without gates";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, ref. 35";
     const PROPERTIES: seafix_component::Properties = &[
@@ -58,7 +59,7 @@ impl Component for CompleteEnumeration {
 
 impl Search for CompleteEnumeration {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
-        // Without a prior candidates are no shells: they say which pairs there may be.
+        // Candidates given without a prior are no gates: they state the possible pairs.
         if problem.prior.is_none() {
             let points = by_coordinates(problem.model.iter().map(|point| point.at));
             let at = |list: &[usize]| -> Vec<usize> {

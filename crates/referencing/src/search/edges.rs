@@ -1,33 +1,34 @@
-//! Which pairs of vertices may be coherent, sixty-four at a time.
+//! The coherence test for 64 pairs of vertices at a time.
 
 use nalgebra::Vector3;
 
 use crate::lanes::{LANES, packed};
 
-/// Model place, cloud place and reach of every vertex, coordinate by coordinate, filled up to whole words with
-/// places that no distance agrees with.
+/// The vertices by column: model place, cloud place and tolerance.
+///
+/// The columns are padded to complete words with places that agree with no distance.
 #[derive(Debug, Default)]
 pub(super) struct Sites {
     /// Model x, y, z and cloud x, y, z.
     at: [Vec<f64>; 6],
-    /// How far a vertex may stretch a distance at most (m).
+    /// The vertex' part of the largest distance difference that may be coherent (m).
     reach: Vec<f64>,
-    /// How far it may stretch one and be coherent in any case (m); below zero where that cannot be said.
+    /// The vertex' part of the largest distance difference that is coherent in any case (m); negative if there is none.
     sure: Vec<f64>,
 }
 
-/// What one look at 64 pairs says, a bit each.
+/// The results of one comparison with 64 vertices, a bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct EdgeBits {
     /// The distances may agree.
     pub(super) near: u64,
-    /// They do.
+    /// The distances agree.
     pub(super) sure: u64,
 }
 
 impl Sites {
-    /// One more vertex. Distances of two vertices agree only if they differ by no more than the sum of their
-    /// `reach`, and if by no more than the sum of their `sure`, they do.
+    /// Adds a vertex. Two distances may agree only if their difference is at most the sum of the `reach` of both
+    /// vertices, and they do agree if it is at most the sum of `sure`.
     pub(super) fn push(&mut self, model: &Vector3<f64>, cloud: &Vector3<f64>, reach: f64, sure: f64) {
         for (column, &x) in self.at.iter_mut().zip(model.iter().chain(cloud.iter())) {
             column.push(x);
@@ -36,7 +37,7 @@ impl Sites {
         self.sure.push(sure);
     }
 
-    /// Fills the last word.
+    /// Pads the last word.
     pub(super) fn pad(&mut self) {
         let full = self.reach.len().next_multiple_of(LANES);
         self.at.iter_mut().for_each(|column| column.resize(full, f64::NAN));
@@ -44,14 +45,15 @@ impl Sites {
         self.sure.resize(full, f64::NAN);
     }
 
-    /// Vertex `a` with the vertices of word `from` and all later words.
+    /// Compares vertex `a` with the vertices of word `from` and of all later words.
     pub(super) fn compare(&self, a: usize, from: usize, comparisons: &mut Vec<EdgeBits>) {
         compare(&self.at.each_ref().map(Vec::as_slice), &self.reach, &self.sure, a, from, comparisons);
     }
 }
 
-/// With A and B the squared distances in model and cloud, |√A − √B| ≤ r ⇔ A + B ≤ r² or
-/// (A − B)² ≤ r² (2 (A + B) − r²): no root is drawn.
+/// Compares distances without a square root.
+///
+/// For squared distances A and B in model and cloud, |√A − √B| ≤ r ⇔ A + B ≤ r² or (A − B)² ≤ r² (2 (A + B) − r²).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn compare(at: &[&[f64]; 6], reach: &[f64], sure: &[f64], a: usize, from: usize, comparisons: &mut Vec<EdgeBits>) {
     let [mx, my, mz, cx, cy, cz] = at.map(|column| column[from * LANES..].as_chunks::<LANES>().0);
@@ -88,7 +90,8 @@ mod tests {
 
     #[test]
     fn distances_within_reach_are_near_and_surely_within_are_sure() {
-        // On a line: model at 0, 10, 10, 10, cloud at 0, 10.5, 11.5 and nowhere; reach 0.5, sure 0.3 each.
+        // On a line: model at 0 and four times at 10, cloud at 0, 10.5, 10.9, 11.5 and NaN; reach 0.5 and sure 0.3
+        // each.
         let mut sites = Sites::default();
         for (known, measured) in [(0.0, 0.0), (10.0, 10.5), (10.0, 10.9), (10.0, 11.5), (10.0, f64::NAN)] {
             sites.push(&Vector3::new(known, 0.0, 0.0), &Vector3::new(0.0, measured, 0.0), 0.5, 0.3);

@@ -14,24 +14,26 @@ use super::{
 };
 use crate::{Correspondence, Mahalanobis, Observations, Problem, Solver};
 
-/// Minimises Σ rᵀ S⁻¹ r over poses and over the choice of each model point's nearest candidate, by turns from the prior on;
-/// r the residual of a pair, S = Σ_measured + σ_model² I: depth, which stereo measures worst, counts least. The covariances
-/// are those of the points, not of surfaces about them: features have none.
+/// Generalised ICP (Segal, Haehnel and Thrun 2009) with point covariances.
 ///
-/// Not exact: it ends in the minimum next to the prior. N distances an iteration for N candidate pairs, and a
-/// weighted fit. Needs a prior, and covariances that are positive definite: a point without is no candidate.
+/// Alternately minimises Σ rᵀ S⁻¹ r over the pose and over the nearest candidate of each model point, from the prior
+/// on; r is the residual of a pair and S = Σ_measured + σ_model² I. Depth, which stereo measures worst, therefore
+/// counts least. The covariances are those of the points, not of local surfaces, since features have none.
+///
+/// Not exact: it ends in the minimum next to the prior. N distances an iteration for N candidate pairs, and a weighted
+/// fit. Needs a prior, and positive definite covariances: a point without one is no candidate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Gicp {
-    /// Whether mirror images are refused; `false` is the pose alone.
+    /// Whether mirror images are rejected; `false` relies on the pose alone.
     pub(crate) orientation: bool,
-    /// Share of the nearest pairs that is fitted: points out of view have none.
+    /// Fraction of the nearest pairs that is fitted, above 0 and at most 1: points out of view have no true pair.
     pub(crate) keep: f64,
-    /// Iterations at most.
+    /// Maximum number of iterations.
     pub(crate) iterations: usize,
-    /// Distances before it ends.
+    /// Maximum number of distances.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -43,7 +45,7 @@ impl Default for Gicp {
 
 impl Component for Gicp {
     const NAME: &'static str = "gicp";
-    const SUMMARY: &'static str = "as icp, with distances and fit weighed by the covariances";
+    const SUMMARY: &'static str = "as icp, with distances and fit weighted by the covariances";
     const SOURCE: &'static str = "Segal, Haehnel, Thrun, Generalized-ICP, 2009";
     const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "nothing over all poses: it minimises Σ rᵀ S⁻¹ r of nearest candidates, from the prior on"),
@@ -52,15 +54,15 @@ impl Component for Gicp {
     ];
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
+        // The comparison rejects NaN too.
         let fraction = self.keep > 0.0 && self.keep <= 1.0;
-        in_range(fraction, "keep", self.keep, "a share above 0, at most 1")?;
+        in_range(fraction, "keep", self.keep, "a fraction above 0, at most 1")?;
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
         bounded(self.budget, self.max_pairs)
     }
 }
 
-/// Nothing is measured better than this (m).
+/// Minimum standard deviation of a measurement (m).
 const FLOOR: f64 = 1e-6;
 
 impl Search for Gicp {

@@ -13,20 +13,20 @@ use super::{
 };
 use crate::{Observations, Problem, Solver, solve};
 
-/// Minimises Σ min(r², c²) over poses by graduated non-convexity, all candidate pairs being correspondences, c what the
-/// tolerance allows each; what the pose explains, one-to-one, is the answer.
+/// Truncated least squares by graduated non-convexity (Yang et al. 2020) over all candidate pairs.
 ///
-/// Not exact: it follows one minimum from the convex problem on. O(N) a step, some fifty steps for N pairs. Made for
-/// putative correspondences of which a good part is true; where each model point has many candidates it fits their
-/// mean.
+/// Minimises Σ min(r², c²) over poses, with the tolerance c of each pair. The answer is the one-to-one set that the
+/// pose explains. Not exact: it follows one minimum from the convex problem on. O(N) a step, some fifty steps for N
+/// pairs. The method suits putative correspondences with a large fraction of true ones; with many candidates for each
+/// model point it fits their mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct GncTls {
-    /// Whether mirror images are refused; `false` is the pose alone.
+    /// Whether mirror images are rejected; `false` relies on the pose alone.
     pub(crate) orientation: bool,
-    /// By how much μ grows a step.
+    /// Growth factor of μ for each step, above 1 and at most 10.
     pub(crate) growth: f64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -44,7 +44,7 @@ impl Component for GncTls {
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the weight of what one pose explains: it minimises Σ min(r², c²) over poses by graduated non-convexity",
+            "the weight of the pairs that one pose explains: it minimises Σ min(r², c²) by graduated non-convexity",
         ),
         ("exact", "no: it follows one minimum"),
         ("time", "O(N) a step, some fifty steps, for N candidate pairs"),
@@ -61,11 +61,11 @@ impl Search for GncTls {
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
-        // From the convex problem alone: sets of three of thousands of pairs, most of them wrong, lead nowhere.
+        // Only from the convex problem: triples of thousands of pairs, most of them wrong, lead nowhere.
         let solver = solve::GncTls { growth: self.growth, triples: 0, ..solve::GncTls::default() };
         let mut data = Observations::of(&vertices, problem.model, problem.cloud, None);
         for (point, &pair) in data.points.iter_mut().zip(&vertices) {
-            // The solver leaves out what is off by `threshold` standard deviations.
+            // The solver excludes residuals above `threshold` standard deviations.
             let sigma = slack(problem, pair) / solver.threshold;
             point.measured.covariance = nalgebra::Matrix3::identity() * (sigma * sigma);
             point.model_sigma = 0.0;

@@ -1,4 +1,4 @@
-//! From pairs in order of preference to an admissible set: the last step of every strategy that ranks.
+//! Greedy growth of an admissible set from ranked pairs, the last step of every strategy that ranks.
 
 use seafix_geometry::{Camera, Object, Transform};
 
@@ -13,15 +13,17 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Pairs that are looked at where any set will do, and how many sets are begun with them.
+/// Maximum number of pairs examined for any admissible set, and number of sets begun with them.
 const MAX_GROWN: usize = 2048;
 const BEGINNINGS: usize = 16;
 
-/// Fours that are tested of a set too large for all of them.
+/// Maximum number of quadruples tested for a set that is too large for all of them.
 const MAX_QUADRUPLES: u64 = 1_000_000;
 
-/// Takes each pair in turn that is coherent with all that were taken and makes no refused four with three of
-/// them; in the order taken.
+/// The admissible set that grows from ranked pairs, in the order added.
+///
+/// Each pair in turn joins if it is coherent with all pairs of the set and forms no rejected quadruple with three of
+/// them.
 pub(super) fn grow(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
@@ -38,7 +40,7 @@ pub(super) fn grow(
     taken.into_iter().map(|place| ranked[place]).collect()
 }
 
-/// Whether a vertex is coherent with every one taken and makes no refused four with three of them.
+/// Whether a vertex is coherent with every member and forms no rejected quadruple with three of them.
 pub(super) fn admits(
     volumes: &Volumes<'_>,
     quadruples: &mut Quadruples,
@@ -61,10 +63,10 @@ pub(super) fn admits(
     !quadruples.refused(volumes, sense, members, next)
 }
 
-/// The answer of a strategy that prefers these pairs in this order: the admissible set they grow into.
+/// The answer of a strategy with these ranked pairs: the admissible set that grows from them.
 ///
-/// Where the same beginning grows into more pairs as a mirror image, the set is what is left of that image:
-/// three are no answer, more are not to be believed by themselves.
+/// If the same beginning grows into more pairs as a mirror image, the set is the remainder of that image: three pairs
+/// are rejected, more are undecided.
 ///
 /// # Errors
 /// [`Rejected::NotFound`] with fewer than three, [`Rejected::Mirrored`].
@@ -100,11 +102,10 @@ pub(super) fn conclude(
     Ok(Identification { undecided, ..Identification::unproved(pairs, max_possible(problem), pair_tests) })
 }
 
-/// The same of a search that may have ended at its budget, having spent so many tests: that is why its set is not to be believed,
-/// or why there is none.
+/// The answer of [`conclude`] for a search that may have ended at its budget: its set is then undecided, or missing.
 ///
 /// # Errors
-/// As [`conclude`], but [`Rejected::Budget`] alone where the budget ended.
+/// As [`conclude`], but [`Rejected::Budget`] alone if the budget ended.
 pub(super) fn conclude_within(
     problem: &Problem<'_>,
     ranked: &[Correspondence],
@@ -121,17 +122,17 @@ pub(super) fn conclude_within(
             Ok(Identification { undecided: found.undecided.or(Some(ended)), ..found })
         }
         Err(Rejected::NotFound { bound, .. }) => Err(ended(0, bound)),
-        // What is left of a mirror image may be all that the ranking had so far.
+        // The remainder of a mirror image may be all that the ranking had so far.
         Err(Rejected::Mirrored { .. }) => so_far(problem, orientation, ended(0, max_possible(problem))),
         Err(other) => Err(other),
     }
 }
 
-/// What a search has that came to the end of its budget before it had found three pairs: the largest admissible set that grows
-/// from a few beginnings, unproved, with the reason why it is not to be believed.
+/// The answer of a search that spent its budget before it found three pairs: the largest admissible set that grows from
+/// a few beginnings, without a proof, undecided for the given reason.
 ///
 /// # Errors
-/// The reason itself, where nothing grows.
+/// The reason itself, if nothing grows.
 pub(super) fn so_far(problem: &Problem<'_>, orientation: bool, why: Rejected) -> Result<Identification, Rejected> {
     let Rejected::Budget { budget, bound, mut pair_tests, .. } = why else { return Err(why) };
     let sense = if orientation { Sense::Proper } else { Sense::Any };
@@ -139,7 +140,7 @@ pub(super) fn so_far(problem: &Problem<'_>, orientation: bool, why: Rejected) ->
     let sets = grown(&some, problem, sense, &mut pair_tests);
     let Some(pairs) = sets.into_iter().next() else { return Err(why) };
     if orientation {
-        // What is left of a mirror image is no set of the object's.
+        // The remainder of a mirror image is no set of the object's.
         let images = grown(&some, problem, Sense::Mirrored, &mut pair_tests);
         if images.first().is_some_and(|image| image.len() > pairs.len()) {
             return Err(why);
@@ -156,7 +157,7 @@ pub(crate) fn elsewhere(problem: &Problem<'_>, pose: &Transform<Object, Camera>)
     grown(&evenly(against, MAX_GROWN), problem, Sense::Proper, &mut 0)
 }
 
-/// So many of them, taken evenly.
+/// At most `max` of the pairs, evenly decimated.
 fn evenly(all: Vec<Correspondence>, max: usize) -> Vec<Correspondence> {
     let step = all.len().div_ceil(max).max(1);
     all.into_iter().step_by(step).collect()
@@ -172,12 +173,12 @@ fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, pair_tests:
     };
     let mut sets: Vec<_> = evenly(of.to_vec(), BEGINNINGS).into_iter().map(begun).collect();
     sets.retain(|pairs| pairs.len() >= NEEDED);
-    // Of equals the first in the order of coordinates: no number of a point decides.
+    // Stable: equals remain in the order of coordinates, and the indices of points do not matter.
     sets.sort_by_key(|pairs| std::cmp::Reverse(pairs.len()));
     sets
 }
 
-/// No set has more pairs than there are model points with candidates, nor than there are candidates.
+/// Upper bound of the size of a set: the number of model points with candidates, and of candidates.
 pub(super) fn max_possible(problem: &Problem<'_>) -> usize {
     let mut clouds: Vec<usize> = problem.candidates.lists.iter().flatten().copied().collect();
     clouds.sort_unstable();
@@ -185,7 +186,7 @@ pub(super) fn max_possible(problem: &Problem<'_>) -> usize {
     problem.candidates.with_candidates().min(clouds.len())
 }
 
-/// What every search asks first: three model points with candidates, and no more pairs than it can hold.
+/// Checks the preconditions of every search: three model points with candidates, and at most `max_pairs` pairs.
 ///
 /// # Errors
 /// [`Rejected::TooFew`], [`Rejected::TooLarge`].

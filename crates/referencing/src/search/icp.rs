@@ -13,24 +13,26 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Minimises Σ |H c − p|² over poses H and over the choice of the nearest candidate c of each model point p, by turns: the
-/// nearest `keep` of all pairs are fitted, from the prior on, until they do not change. What the last pose explains is
-/// the answer.
+/// Trimmed ICP (Besl and McKay 1992, Chetverikov et al. 2002).
 ///
-/// Not exact: it ends in the minimum next to the prior, and clutter in the shells holds it back. N distances an
+/// Alternately minimises Σ |H c − p|² over the pose H and over the nearest candidate c of each model point p: the
+/// nearest `keep` of all pairs are fitted, from the prior on, until they no longer change. The answer is the set that
+/// the last pose explains.
+///
+/// Not exact: it ends in the minimum next to the prior, and clutter in the gates holds it back. N distances an
 /// iteration for N candidate pairs. Needs a prior.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Icp {
-    /// Whether mirror images are refused; `false` is the pose alone.
+    /// Whether mirror images are rejected; `false` relies on the pose alone.
     pub(crate) orientation: bool,
-    /// Share of the nearest pairs that is fitted: points out of view have none.
+    /// Fraction of the nearest pairs that is fitted, above 0 and at most 1: points out of view have no true pair.
     pub(crate) keep: f64,
-    /// Iterations at most.
+    /// Maximum number of iterations.
     pub(crate) iterations: usize,
-    /// Distances before it ends.
+    /// Maximum number of distances.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -43,8 +45,8 @@ impl Default for Icp {
 impl Component for Icp {
     const NAME: &'static str = "icp";
     const SUMMARY: &'static str = "nearest candidates and their least-squares pose in turn, from the prior";
-    const SOURCE: &'static str = "Besl, McKay, A method for registration of 3-D shapes, 1992; the share kept: Chetverikov et al., The trimmed \
-                                  iterative closest point algorithm, 2002";
+    const SOURCE: &'static str = "Besl, McKay, A method for registration of 3-D shapes, 1992; the fraction kept: \
+                                  Chetverikov et al., The trimmed iterative closest point algorithm, 2002";
     const PROPERTIES: seafix_component::Properties = &[
         ("maximises", "nothing over all poses: it minimises Σ r² of nearest candidates, from the prior on"),
         ("exact", "no: it ends in the minimum next to the prior"),
@@ -52,9 +54,9 @@ impl Component for Icp {
     ];
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
+        // The comparison rejects NaN too.
         let fraction = self.keep > 0.0 && self.keep <= 1.0;
-        in_range(fraction, "keep", self.keep, "a share above 0, at most 1")?;
+        in_range(fraction, "keep", self.keep, "a fraction above 0, at most 1")?;
         in_range(self.iterations > 0, "iterations", self.iterations, "1 or more")?;
         bounded(self.budget, self.max_pairs)
     }

@@ -1,4 +1,4 @@
-//! The interpretation tree: a level a model point, a branch a candidate, and one for none.
+//! The interpretation tree: one level a model point, one branch a candidate, and a wild card.
 
 use rand::Rng;
 use seafix_component::{Component, in_range};
@@ -16,23 +16,27 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// The longest interpretation that a rigid motion explains: every pair of its pairs coherent, and each within the tolerance
-/// of where their least-squares pose puts it (the model test). Depth first, model points as they lie, each candidate in turn
-/// and last the wild card, that the point is not seen.
+/// Interpretation tree (Grimson and Lozano-Pérez 1987): the longest interpretation that a rigid motion explains.
 ///
-/// It visits every interpretation longer than the best, unless `enough` lets it stop at the first that is long enough, as its
-/// authors do; with `enough` = 1 nothing longer passes the model test, but longer sets that are only coherent
-/// may exist. Exponential: Π (m_i + 1) for lists of m_i.
+/// Every two pairs are coherent, and each pair is within the tolerance of its place under their least-squares pose (the
+/// model test). Depth first, model points in the order of their coordinates, each candidate in turn, and last the wild
+/// card for an invisible point.
+///
+/// The search visits every interpretation longer than the best, unless `enough` stops it at the first that is long
+/// enough, as in the original. With `enough` = 1 no longer set passes the model test, but longer sets that are only
+/// coherent may exist. Exponential: Π (m_i + 1) for lists of m_i.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct InterpretationTree {
-    /// Whether mirror images are refused; `false` leaves them to the model test.
+    /// Whether mirror images are rejected; `false` leaves them to the model test.
     pub(crate) orientation: bool,
-    /// Share of the model points with candidates at which an interpretation is accepted at once.
+    /// Fraction of the model points at which an interpretation is accepted at once, above 0 and at most 1.
+    ///
+    /// It refers to the model points with candidates; 1 searches for the longest interpretation.
     pub(crate) enough: f64,
-    /// Pair tests.
+    /// Maximum number of pair tests.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -50,15 +54,15 @@ impl Component for InterpretationTree {
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the number of pairs, every two coherent and each within the tolerance of where their least-squares pose puts it",
+            "the number of pairs, every two coherent and each within the tolerance of its place under their least-squares pose",
         ),
-        ("exact", "within its budget, where `enough` is 1"),
+        ("exact", "within its budget, if `enough` is 1"),
         ("time", "exponential: Π (m + 1) over lists of m candidates"),
     ];
 
     fn check(&self) -> Result<(), String> {
         let fraction = self.enough > 0.0 && self.enough <= 1.0;
-        in_range(fraction, "enough", self.enough, "a share above 0, at most 1")?;
+        in_range(fraction, "enough", self.enough, "a fraction above 0, at most 1")?;
         bounded(self.budget, self.max_pairs)
     }
 }
@@ -107,7 +111,7 @@ struct Tree<'a> {
 
 impl Tree<'_> {
     fn descend(&mut self, level: usize, taken: &mut Vec<usize>) {
-        // The model test is dear: only what would be the longest is put to it.
+        // The model test is expensive: only a set that would be the longest takes it.
         if taken.len() >= NEEDED && taken.len() > self.best.len() && self.explained(taken) {
             self.best.clone_from(taken);
         }

@@ -1,4 +1,4 @@
-//! Joint compatibility: all distances of a hypothesis together, by branch and bound.
+//! Joint compatibility: a common test of all distances of a hypothesis, by branch and bound.
 
 use nalgebra::Vector3;
 use rand::Rng;
@@ -16,25 +16,28 @@ use super::{
 };
 use crate::{Correspondence, Problem, Tolerance, candidates::chi_square};
 
-/// The longest hypothesis whose distances are jointly compatible: D² = hᵀ C⁻¹ h ≤ χ²(confidence), h the differences between
-/// measured and known distances, C their joint covariance; of equally long ones that of the least D².
+/// Joint compatibility branch and bound (Neira and Tardós 2001) on distances.
 ///
-/// Distances need no pose and no prior. Of k points 3k − 6 say everything: those to the first three of the
-/// hypothesis. Distances that share a point err together, and C says so: two errors that are each bearable may
-/// contradict each other. A new pair adds rows to the Cholesky factor of C, and its part to D² (the incremental form).
-/// With Δ alone the points err alike along all axes, so that Δ is three standard deviations of a distance.
+/// The answer is the longest hypothesis whose distances are jointly compatible: D² = hᵀ C⁻¹ h ≤ χ²(confidence), h the
+/// differences between measured and model distances, C their joint covariance; among equally long ones that of minimum
+/// D².
+///
+/// Distances need no pose and no prior. For k points 3k − 6 of them suffice: those to the first three of the
+/// hypothesis. Distances that share a point have correlated errors, which C contains: two errors that are each
+/// tolerable may contradict each other. A new pair adds rows to the Cholesky factor of C, and its part to D² (the
+/// incremental form). With a fixed Δ the noise is isotropic, and Δ counts as three standard deviations of a distance.
 ///
 /// Exact in this measure within the budget. Exponential in the worst case; k² a node.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct JointCompatibility {
-    /// Whether mirror images are refused; `false` is distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only.
     pub(crate) orientation: bool,
-    /// With what probability a true hypothesis is compatible.
+    /// Probability, between 0 and 1, that a true hypothesis is compatible.
     pub(crate) confidence: f64,
-    /// Pair tests.
+    /// Maximum number of pair tests.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -46,14 +49,13 @@ impl Default for JointCompatibility {
 
 impl Component for JointCompatibility {
     const NAME: &'static str = "joint-compatibility";
-    const SUMMARY: &'static str =
-        "the longest hypothesis whose distances are compatible all together, by branch and bound";
+    const SUMMARY: &'static str = "the longest hypothesis whose distances are jointly compatible, by branch and bound";
     const SOURCE: &'static str = "Neira, Tardós, Data association in stochastic mapping using the joint compatibility \
                                   test, 2001; the incremental form: Li, Li, Song, Zou, Yan, IJCBB, 2014";
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the number of pairs whose distances are compatible all together, D² ≤ χ²; of equally many the least D²",
+            "the number of pairs whose distances are jointly compatible, D² ≤ χ²; among equals the minimum D²",
         ),
         ("exact", "in this measure, within its budget"),
         ("time", "exponential at worst; k² a node of k pairs"),
@@ -96,12 +98,12 @@ impl Search for JointCompatibility {
     }
 }
 
-/// The distances of a hypothesis: between which of its members, along which direction, and their joint test.
+/// The distances of a hypothesis with their joint test.
 #[derive(Debug, Clone, Default)]
 struct Joint {
-    /// Members of each distance, the later one second, and its direction in the cloud.
+    /// Members of each distance, the later one second, with its direction in the cloud.
     distances: Vec<([usize; 2], Vector3<f64>)>,
-    /// Lower Cholesky factor of C, row by row, and the differences it has been solved for.
+    /// Lower Cholesky factor of C, row by row, and the differences solved with it.
     factor: Vec<Vec<f64>>,
     solved: Vec<f64>,
     /// D².
@@ -121,7 +123,7 @@ struct Run<'a> {
     pair_tests: u64,
 }
 
-/// Share of a distance's variance that it has for itself: C of distances in one plane is singular.
+/// Fraction of a distance's variance that is independent, since C of coplanar distances is singular.
 const OWN: f64 = 0.01;
 
 impl Run<'_> {
@@ -148,7 +150,7 @@ impl Run<'_> {
         self.descend(level + 1, taken, joint);
     }
 
-    /// The hypothesis with one pair more, if it stays compatible.
+    /// The hypothesis with one pair more, if it remains compatible.
     fn joined(&mut self, joint: &Joint, taken: &[usize], vertex: usize) -> Option<Joint> {
         let mut joint = joint.clone();
         for &other in taken.iter().take(3) {
@@ -171,7 +173,7 @@ impl Run<'_> {
                 off -= x * solved;
             }
             let deviation = variance.sqrt();
-            // Written so that a NaN is refused too.
+            // The negated comparison rejects NaN too.
             if !(deviation > 0.0) {
                 return None;
             }
@@ -185,7 +187,7 @@ impl Run<'_> {
         (joint.square <= self.limits[joint.distances.len()]).then_some(joint)
     }
 
-    /// The covariance of two distances: what the points that they share contribute.
+    /// The covariance of two distances: the contribution of their common points.
     fn covariance(&self, a: [usize; 2], along_a: &Vector3<f64>, b: [usize; 2], along_b: &Vector3<f64>) -> f64 {
         let mut sum = 0.0;
         for (i, &p) in a.iter().enumerate() {

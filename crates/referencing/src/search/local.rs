@@ -1,4 +1,4 @@
-//! The neighbours of one vertex as a small graph.
+//! The neighbourhood of one vertex as a small graph.
 
 use super::{
     association::Association,
@@ -6,23 +6,23 @@ use super::{
 };
 use crate::lanes::{LANES, ones_of};
 
-/// The neighbours of one vertex as a graph of their own.
+/// The subgraph of the neighbours of one vertex.
 #[derive(Debug, Default)]
 pub(super) struct Local {
-    /// Their numbers in the whole graph.
+    /// Their indices in the full graph.
     pub(super) vertices: Vec<usize>,
     pub(super) adjacency: BitMatrix,
-    /// Their model points and cloud points, numbered from 0.
+    /// Their model points and cloud points, renumbered from 0.
     models: Vec<usize>,
     clouds: Vec<usize>,
 }
 
-/// Memory for making such graphs.
+/// Reusable memory for the construction of neighbourhoods.
 #[derive(Debug)]
 pub(super) struct Workshop {
-    /// The place of each vertex of the whole graph in the small one.
+    /// The local index of each vertex of the full graph.
     place: Vec<u32>,
-    /// The number that each model point and each cloud point has in the small graph.
+    /// The local index of each model point and each cloud point.
     models: Names,
     clouds: Names,
     degrees: Vec<usize>,
@@ -41,9 +41,10 @@ impl Workshop {
 }
 
 impl Local {
-    /// Of `members`, neighbours of one vertex, those that can be in a clique of `min` members with it:
-    /// each needs `min − 2` of the others as neighbours. Ordered by degree, so that colouring begins with the
-    /// well-connected. Empty where they are too few.
+    /// The subgraph of those `members` that can be in a clique of `min` with their common neighbour.
+    ///
+    /// Each needs `min − 2` of the others as neighbours. They are sorted by descending degree, so that colouring begins
+    /// with the well-connected. Empty if they are too few.
     pub(super) fn of(graph: &Association, mut members: BitSet, min: usize, work: &mut Workshop) -> Self {
         let mut kept: Vec<usize> = members.iter().collect();
         loop {
@@ -84,13 +85,13 @@ impl Local {
         Self { vertices, adjacency, models, clouds }
     }
 
-    /// The candidate with most neighbours among the candidates; of equals the first of the whole graph.
+    /// The candidate with most neighbours among the candidates; among equals the first of the full graph.
     pub(super) fn best_connected(&self, candidates: &BitSet) -> Option<usize> {
         let worth = |v: usize| (candidates.common(self.adjacency.row(v)), std::cmp::Reverse(self.vertices[v]));
         candidates.iter().max_by_key(|&v| worth(v))
     }
 
-    /// The n-partite bound: different model points and different cloud points among the candidates.
+    /// The n-partite bound: the number of different model points and of different cloud points among the candidates.
     pub(super) fn partite(&self, candidates: &BitSet) -> usize {
         let count = self.vertices.len();
         let (mut models, mut clouds) = (BitSet::empty(count), BitSet::empty(count));
@@ -101,8 +102,9 @@ impl Local {
         models.len().min(clouds.len())
     }
 
-    /// Greedy colouring: vertices with their colours from `min` on, in ascending order of colour.
-    /// A clique among the vertices up to one of them has at most its colour's number of members.
+    /// Greedy colouring: the vertices with colours of at least `min`, in ascending order of colour.
+    ///
+    /// A clique among the vertices up to one of them has at most as many members as its colour.
     pub(super) fn colour(&self, candidates: &BitSet, min: usize) -> Vec<(usize, usize)> {
         let mut coloured = Vec::new();
         let mut rest = candidates.clone();
@@ -124,10 +126,10 @@ impl Local {
     }
 }
 
-/// Numbers from 0 in the place of arbitrary ones.
+/// A renumbering of arbitrary indices from 0.
 #[derive(Debug)]
 struct Names {
-    /// The number of each name, and in which round it was given.
+    /// The number of each index, and the round in which it was assigned.
     given: Vec<(u32, u32)>,
     round: u32,
 }

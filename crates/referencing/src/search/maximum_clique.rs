@@ -1,4 +1,4 @@
-//! Maximum clique: the largest admissible set, proved.
+//! Maximum clique: the largest admissible set, with a proof.
 
 use rand::Rng;
 use seafix_component::Component;
@@ -15,21 +15,25 @@ use super::{
 };
 use crate::{Correspondence, Observations, Problem, solve::least_squares};
 
-/// The largest admissible set of correspondences: every two coherent, one-to-one, no four of them a
-/// mirror image of the model. Exact within the budget; among sets of one size the least residual
-/// of a rigid fit decides, then the coordinates. O(K²) for the graph of K candidate pairs, then at worst exponential in K.
+/// The largest admissible set of correspondences, as a maximum clique of the consistency graph.
+///
+/// Every two pairs are coherent, the set is one-to-one, and no four pairs are a mirror image of the model. The answer
+/// is exact within the budget. Among sets of one size the minimum residual of a rigid fit decides, then the
+/// coordinates. Time O(K²) for the graph of K candidate pairs, then exponential in K at worst.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaximumClique {
-    /// Whether mirror images are refused; `false` is the paper's distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only, as in the paper.
     pub orientation: bool,
-    /// Pair tests beyond those that build the graph.
+    /// Maximum number of pair tests beyond the tests that build the graph.
     pub budget: u64,
-    /// How many other sets of the same size are reported, those that share least with the best first,
-    /// where it is proved that the others are like the best; where it is not, all that were met are.
+    /// Maximum number of alternatives in the answer, those with the fewest common pairs first.
+    ///
+    /// It applies only if all sets of the same size are proved to give the same pose as the best; otherwise the answer
+    /// holds all sets found.
     pub alternatives: usize,
-    /// More candidate pairs than this are not searched: their graph would not fit into memory
-    /// (40 000 take 200 MB).
+    /// Maximum number of candidate pairs; more are rejected, since their graph would not fit into memory (40 000 pairs
+    /// take 200 MB).
     pub max_pairs: usize,
 }
 
@@ -47,9 +51,9 @@ impl Component for MaximumClique {
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the number of pairs, every two coherent, one-to-one, no four of them mirrored; of equally many the least residual",
+            "the number of pairs, every two coherent, one-to-one, no four of them mirrored; among equals the minimum residual",
         ),
-        ("exact", "within its budget; the answer says whether it is proved, and the bound"),
+        ("exact", "within its budget; the answer states whether it is proved, and the bound"),
         ("time", "K²/2 pair tests for K candidate pairs, then exponential at worst"),
     ];
 
@@ -63,7 +67,7 @@ impl Search for MaximumClique {
         feasible(problem, self.max_pairs)?;
         let budget = self.budget;
         let graph = Association::of(problem);
-        // The rest is for the proof that what ties is alike.
+        // The rest is for the proof that equally large sets are alike.
         let fraction = budget - budget / 4;
         let sense = if self.orientation { Sense::Proper } else { Sense::Any };
         let mut cliques = clique::Search::new(problem, &graph, sense, fraction);
@@ -102,7 +106,7 @@ impl Search for MaximumClique {
             }
         }
         if self.orientation && size > MAX_ORIENTED {
-            // In the order of the graph: whom to drop does not depend on the order of the points.
+            // In the order of the graph: the dropped members do not depend on the order of the points.
             let kept = unmirrored(problem, clique.iter().map(|&vertex| graph.vertices[vertex]).collect(), budget);
             pair_tests += kept.pair_tests;
             optimal = optimal && kept.complete && kept.pairs.len() == size;
@@ -127,8 +131,10 @@ impl Search for MaximumClique {
 }
 
 impl MaximumClique {
-    /// Three points have no orientation: where distances alone find more, and all of it is a
-    /// mirror image, the three are what is left of that image.
+    /// Rejects three points that are the remainder of a mirror image.
+    ///
+    /// Three points have no orientation. If distances alone give a larger set that is entirely a mirror image, the
+    /// three belong to that image.
     fn refuse_mirrored(
         &self,
         problem: &Problem<'_>,
@@ -144,8 +150,9 @@ impl MaximumClique {
         }
     }
 
-    /// A mirror image of the model with more points than the set found: then the set is what a flat part
-    /// of that image leaves, and no fix.
+    /// A mirror image of the model with more points than the best set.
+    ///
+    /// The best set is then a planar part of that image and no fix.
     fn larger_image(&self, size: usize, cliques: &mut clique::Search<'_>) -> Option<Rejected> {
         if !self.orientation {
             return None;
@@ -156,7 +163,7 @@ impl MaximumClique {
         images.found.first().map(|image| Rejected::Mirrored { best: image.len(), proved: false })
     }
 
-    /// Puts the rivals that share the fewest pairs with the best set first.
+    /// Sorts the alternatives by ascending number of pairs in common with the best set.
     fn different_first(best: &[Correspondence], alternatives: &mut [Vec<Correspondence>]) {
         alternatives.sort_by_cached_key(|alternative| {
             (alternative.iter().filter(|pair| best.binary_search(pair).is_ok()).count(), alternative.clone())
@@ -171,9 +178,10 @@ fn pairs_of(graph: &Association, clique: &[usize]) -> Vec<Correspondence> {
     pairs
 }
 
-/// The place of the set with the least residual of a rigid fit. Residuals that differ by rounding
-/// only are equal, and then the coordinates decide, in whose order the vertices stand: the answer does
-/// not depend on the order of the cloud.
+/// The index of the set with the minimum residual of a rigid fit.
+///
+/// Residuals that differ by rounding only are equal; then the coordinates decide, which order the vertices: the answer
+/// does not depend on the order of the cloud.
 pub(super) fn min_residual(problem: &Problem<'_>, vertices: &[Correspondence], cliques: &[Vec<usize>]) -> usize {
     let quantum = 1e-9 * problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max);
     let rank = |clique: &[usize]| {
@@ -183,7 +191,7 @@ pub(super) fn min_residual(problem: &Problem<'_>, vertices: &[Correspondence], c
     };
     let ranks: Vec<f64> = cliques.iter().map(|clique| rank(clique)).collect();
     // `min_by` keeps the first of equals, and the cliques are sorted.
-    (0..cliques.len()).min_by(|&a, &b| ranks[a].total_cmp(&ranks[b])).expect("a set was found")
+    (0..cliques.len()).min_by(|&a, &b| ranks[a].total_cmp(&ranks[b])).expect("a clique")
 }
 
 #[cfg(test)]

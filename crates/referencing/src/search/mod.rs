@@ -1,4 +1,4 @@
-//! Searches: which cloud points are which model points.
+//! Searches for the correspondences between model points and cloud points.
 
 use rand::Rng;
 use seafix_component::{Registry, counted, entry, in_range};
@@ -45,44 +45,87 @@ pub use posterior::{Explanation, Posterior, PosteriorProbabilities};
 pub use rigid_consensus::RigidConsensus;
 pub use structural_coherence::{Samples, StructuralCoherence};
 
-/// Decides which cloud points are which model points.
+/// A search for correspondences between model points and cloud points (data association).
 ///
-/// Every search has a budget of pair tests beyond those that build its graph (default 10⁷); past it the answer is the best
-/// identification so far, not `optimal`, with [`Rejected::Budget`] as what leaves it undecided; that alone where no three
-/// pairs were found to agree.
+/// Every search has a budget of pair tests beyond the tests that build its graph (default 10⁷). A search that spends it
+/// returns the best set so far, with `optimal` false and `undecided` set to [`Rejected::Budget`]. It returns
+/// [`Rejected::Budget`] as the error if no three pairs were found to agree.
+///
+/// A minimal search takes the first coherent candidate of each model point:
+///
+/// ```
+/// use rand::{Rng, SeedableRng};
+/// use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
+/// use seafix_referencing::{
+///     Candidates, Correspondence, Identification, ModelPoint, Problem, Rejected, Search, Tolerance,
+/// };
+///
+/// #[derive(Debug)]
+/// struct Greedy;
+///
+/// impl Search for Greedy {
+///     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+///         let mut pairs: Vec<Correspondence> = Vec::new();
+///         for (model, list) in problem.candidates.lists.iter().enumerate() {
+///             let candidate = |&cloud: &usize| Correspondence { model, cloud };
+///             let coherent = |pair: &Correspondence| pairs.iter().all(|other| problem.coherent(*pair, *other));
+///             pairs.extend(list.iter().map(candidate).find(coherent));
+///         }
+///         let bound = problem.model.len();
+///         match pairs.len() {
+///             0..3 => Err(Rejected::NotFound { bound, needed: 3 }),
+///             _ => Ok(Identification::unproved(pairs, bound, 0)),
+///         }
+///     }
+/// }
+///
+/// // Three corners of a box, 3 m in front of the camera.
+/// let corners = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.4, 0.0]];
+/// let model = corners.map(|at| ModelPoint::exact("", Point::from(at)));
+/// let cloud = corners.map(|[x, y, z]| MeasuredPoint {
+///     position: UncertainPoint::isotropic(Point::from([x, y, z + 3.0]), 0.01),
+///     pixels: None,
+/// });
+/// let candidates = Candidates::from_pairs(3, (0..3).flat_map(|i| (0..3).map(move |j| (i, j))));
+/// let tolerance = Tolerance::Fixed(0.02);
+/// let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+/// let found = Greedy.search(&problem, &mut rand_chacha::ChaCha8Rng::seed_from_u64(0))?;
+/// assert_eq!(found.pairs.len(), 3);
+/// # Ok::<(), Rejected>(())
+/// ```
 pub trait Search: Send + Sync + std::fmt::Debug {
-    /// The best set of correspondences by this search's own measure.
+    /// The best set of correspondences by the measure of this search.
     ///
     /// # Errors
-    /// [`Rejected`]: the data allow no answer, with the numbers that say why.
+    /// [`Rejected`] if the data allow no answer, with the numbers that explain it.
     fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Rejected>;
 }
 
 /// A coherent, one-to-one set of correspondences.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
-    /// The set, in the order of the model points.
+    /// The correspondences, in the order of the model points.
     pub pairs: Vec<Correspondence>,
-    /// Other sets of the same size, as far as the search looks for them.
+    /// Other sets of the same size that the search found.
     pub alternatives: Vec<Vec<Correspondence>>,
     /// Whether `alternatives` holds every other set of the same size.
     pub alternatives_complete: bool,
-    /// Whether it is proved that no admissible set is larger; of a search by likelihood, that none is likelier.
+    /// Whether the set is proved to be optimal: no admissible set is larger or, for a search by likelihood, more
+    /// likely.
     pub optimal: bool,
-    /// No admissible set has more pairs than this.
+    /// Upper bound of the number of pairs of an admissible set.
     pub consensus_bound: usize,
-    /// Pair tests spent, those that built the graph included.
+    /// Number of pair tests, including the tests that build the graph.
     pub pair_tests: u64,
-    /// Why the set is not to be believed by itself: a larger set is a mirror image, or the search ended
-    /// before it had seen, or ruled out, every set as large that is unlike it. `None` also of a search
-    /// that looks for no rivals.
+    /// Reason not to accept the set by itself. Either a larger set is a mirror image, or the search ended before it had
+    /// examined or excluded every different set of the same size. `None` also for a search without alternatives.
     pub undecided: Option<Rejected>,
-    /// How likely this pose and others are; `None` of a search that counts.
+    /// Posterior probabilities of this pose and of its alternatives; `None` for a search that counts pairs.
     pub posterior: Option<Posterior>,
 }
 
 impl Identification {
-    /// A set of which nothing is proved but that no admissible set has more than `bound` pairs.
+    /// A set without a proof, except that no admissible set has more than `bound` pairs.
     pub fn unproved(pairs: Vec<Correspondence>, bound: usize, pair_tests: u64) -> Self {
         Self {
             pairs,
@@ -97,83 +140,85 @@ impl Identification {
     }
 }
 
-/// What to do about too many candidates.
-pub(crate) const FEWER: &str = "give a rough pose or smaller shells, or thin the cloud out";
+/// Remedy for too many candidates.
+pub(crate) const FEWER: &str = "give a prior pose or smaller gates, or decimate the cloud";
 
-/// Why nothing was identified.
+/// The reason why a search identified nothing.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Rejected {
     /// Fewer than three model points have a candidate.
-    #[error("{} with a candidate; a pose needs {needed}", counted(*.with_candidates, "model point"))]
+    #[error("too few candidates: {} with a candidate; a pose needs {needed}", counted(*.with_candidates, "model point"))]
     TooFew {
-        /// Model points with at least one candidate.
+        /// Number of model points with a candidate.
         with_candidates: usize,
-        /// How many are needed.
+        /// Minimum number of model points.
         needed: usize,
     },
     /// The largest coherent set is too small.
-    #[error("the largest coherent set has {}; {needed} are needed", counted(*.best, "point"))]
+    #[error("no consensus: the largest coherent set has {}; {needed} are needed", counted(*.best, "point"))]
     NoConsensus {
         /// Size of the largest set.
         best: usize,
-        /// How many are needed.
+        /// Minimum size.
         needed: usize,
     },
-    /// The search ended before it could answer.
+    /// The budget was spent before the search could answer.
     #[error(
-        "the budget of {budget} pair tests, or as much other work, ended; best so far {}, at most {bound} are possible",
+        "search incomplete: the budget of {budget} pair tests or equivalent work is spent; best set so far {}, upper bound {bound}",
         counted(*.best, "point")
     )]
     Budget {
-        /// The budget (pair tests, or what the search counts in place of them).
+        /// The budget (pair tests, or the unit that the search counts in their place).
         budget: u64,
         /// Size of the largest set found.
         best: usize,
-        /// No set is larger than this.
+        /// Upper bound of the size of a set.
         bound: usize,
-        /// Pair tests spent, those that built the graph included.
+        /// Number of pair tests, including the tests that build the graph.
         pair_tests: u64,
     },
-    /// More than the search holds in memory: it did not begin.
-    #[error("{size} {what} are more than the {max} that the search takes; {}", FEWER)]
+    /// The problem exceeds the memory limit of the search, which did not start.
+    #[error("too many {what}: {size}, and the search takes {max}; {}", FEWER)]
     TooLarge {
-        /// How many there are.
+        /// Number of items.
         size: usize,
-        /// What there is too much of.
+        /// The kind of items, in the plural.
         what: &'static str,
-        /// How many may be.
+        /// Maximum number of items.
         max: usize,
-        /// No set is larger than this.
+        /// Upper bound of the size of a set.
         bound: usize,
     },
-    /// A search that proves nothing found too small a set, or none.
-    #[error("no set of {needed} points was found that one pose explains; at most {bound} are possible")]
+    /// A search without a proof found no set, or too small a set.
+    #[error(
+        "no pose found: the search met no set of {needed} points that one pose explains; at most {bound} are possible"
+    )]
     NotFound {
-        /// No set is larger than this.
+        /// Upper bound of the size of a set.
         bound: usize,
-        /// How many are needed.
+        /// Minimum size.
         needed: usize,
     },
-    /// The search begins at a prior, and there is none.
-    #[error("there is no prior, and this search begins at one")]
+    /// The search starts from a prior pose, and none is given.
+    #[error("no prior pose: this search starts from one; give a prior pose or another search")]
     NoPrior,
     /// Only mirror images of the model were found.
-    #[error("{} set, {best} points, is a mirror image of the model", if *proved { "the largest coherent" } else { "the likeliest or largest known" })]
+    #[error("mirror image of the model: {} set has {best} points and is reflected", if *proved { "the largest coherent" } else { "the best known" })]
     Mirrored {
-        /// Its size.
+        /// Size of the mirror image.
         best: usize,
-        /// Whether it is proved that no coherent set of the object has more than three points.
+        /// Whether every coherent set of the object is proved to have at most three points.
         proved: bool,
     },
 }
 
 impl Rejected {
-    /// Whether it says that there is nothing, and not only that nothing was found.
+    /// Whether absence is proved, in contrast to a search that only found nothing.
     pub fn is_proved(&self) -> bool {
         matches!(self, Self::TooFew { .. } | Self::NoConsensus { .. } | Self::Mirrored { proved: true, .. })
     }
 
-    /// The reason as logs and tables have it, in kebab-case.
+    /// The reason in logs and tables, in kebab-case.
     pub fn reason(&self) -> &'static str {
         match self {
             Self::TooFew { .. } => "too-few",
@@ -187,7 +232,7 @@ impl Rejected {
     }
 }
 
-/// All searches.
+/// The registry of searches.
 pub static SEARCHES: Registry<dyn Search> = Registry::new(
     "search",
     &[
@@ -208,15 +253,15 @@ pub static SEARCHES: Registry<dyn Search> = Registry::new(
     ],
 );
 
-/// The default budget of a search: pair tests beyond those that build its graph.
+/// Default budget of a search: pair tests beyond the tests that build its graph.
 pub(crate) const BUDGET: u64 = 10_000_000;
-/// What is wrong with the two limits that most searches have.
+/// Checks the two limits that most searches have.
 fn bounded(budget: u64, max_pairs: usize) -> Result<(), String> {
     in_range(budget > 0, "budget", budget, "1 or more pair tests")?;
     in_range(max_pairs >= NEEDED, "max-pairs", max_pairs, "3 or more candidate pairs")
 }
 
-/// The least set that a pose can come from.
+/// Minimum number of pairs that determine a pose.
 pub(crate) const NEEDED: usize = 3;
-/// Sets of the largest size that are looked at before the best of them is chosen.
+/// Maximum number of sets of the largest size that are compared to choose the best.
 const MAX_TIES: usize = 4096;

@@ -1,49 +1,49 @@
-//! Mirror images: four points and their reflection have the same distances, but volumes of opposite sign.
+//! Mirror images: four points and their reflection have equal distances, but volumes of opposite sign.
 
 use nalgebra::Vector3;
 
 use super::volumes::Volumes;
 use crate::{Correspondence, Problem};
 
-/// Standard deviations by which a model volume must exceed the noise of the measured one to decide.
+/// Standard deviations of the measured volume that a model volume must exceed to decide.
 const DECISIVE: f64 = 3.0;
-/// Volumes below this share of the product of three edges are zero but for rounding.
+/// Volume, as a fraction of the product of three edges, below which it is zero up to rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Whether four pairs are a mirror image: the volume V of the model's tetrahedron is beyond 3 σ of the
-/// measured one's noise, and the measured volume has not its sign.
+/// Whether four pairs are a mirror image.
 ///
-/// 6V = (b − a) · ((c − a) × (d − a)); σ² = Σ_k g_kᵀ Σ_k g_k over the four measured points, g_k the
-/// derivative of the measured volume by point k.
+/// The volume V of the model's tetrahedron exceeds 3 σ of the measured volume, which has the opposite sign: 6V = (b −
+/// a) · ((c − a) × (d − a)); σ² = Σ_k g_kᵀ Σ_k g_k over the four measured points, g_k the derivative of the measured
+/// volume by point k.
 pub(crate) fn mirrored(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
     let model = four.map(|pair| problem.model[pair.model].at.coords);
     let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
     let (known, measured) = (volume(&model), volume(&cloud));
-    // Almost every question ends here: the noise is looked at only where the signs differ.
+    // Almost every test ends here: the noise is computed only if the signs differ.
     if agree(known, measured, &cloud) {
         return false;
     }
     decisive(problem, &four, &model, &cloud, known)
 }
 
-/// Whether the measured volume has the sign of the known one; that of a flat four is rounding, and none.
+/// Whether the measured volume has the sign of the known one; the volume of coplanar points is rounding error.
 fn agree(known: f64, measured: f64, cloud: &[Vector3<f64>; 4]) -> bool {
     known * measured > 0.0 && measured.abs() > ROUNDING * edges(cloud)
 }
 
-/// What a set's fours must be.
+/// The required orientation of a set's quadruples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sense {
-    /// Anything: distances alone decide, as in the paper.
+    /// Any: distances alone decide, as in the paper.
     Any,
     /// Not mirrored.
     Proper,
-    /// Not upright: every four that can tell is a mirror image.
+    /// Not upright: every decisive quadruple is a mirror image.
     Mirrored,
 }
 
 impl Sense {
-    /// The sign of the product of a four's volumes in model and cloud that does not contradict it; `None` where nothing does.
+    /// The sign of the product of a quadruple's volumes in model and cloud that agrees with the sense; `None` for any.
     pub(super) fn sign(self) -> Option<f64> {
         match self {
             Self::Any => None,
@@ -52,7 +52,7 @@ impl Sense {
         }
     }
 
-    /// Whether four pairs contradict it.
+    /// Whether four pairs contradict the sense.
     pub(crate) fn refuses(self, problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
         match self {
             Self::Any => false,
@@ -70,7 +70,7 @@ fn upright(problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
     agree(known, volume(&cloud), &cloud) && decisive(problem, &four, &model, &cloud, known)
 }
 
-/// Whether the model's volume is large enough to tell an image from its reflection.
+/// Whether the model's volume is large enough to distinguish an image from its reflection.
 fn decisive(
     problem: &Problem<'_>,
     four: &[Correspondence; 4],
@@ -98,7 +98,7 @@ fn volume([a, b, c, d]: &[Vector3<f64>; 4]) -> f64 {
     (b - a).dot(&(c - a).cross(&(d - a))) / 6.0
 }
 
-/// Whether every decisive four of the set are a mirror image, and there is one.
+/// Whether every decisive quadruple of the set is a mirror image, and there is at least one.
 pub(crate) fn wholly_mirrored(problem: &Problem<'_>, set: &[Correspondence]) -> bool {
     let mut some = false;
     for four in quadruples(set) {
@@ -124,21 +124,21 @@ pub(crate) fn quadruples(set: &[Correspondence]) -> impl Iterator<Item = [Corres
     })
 }
 
-/// What is left of a large set when no four tested are mirrored.
+/// The remainder of a large set without mirrored quadruples.
 pub(crate) struct Unmirrored {
     pub(crate) pairs: Vec<Correspondence>,
-    /// Whether every four was tested.
+    /// Whether every quadruple was tested.
     pub(crate) complete: bool,
-    /// Fours tested.
+    /// Number of quadruples tested.
     pub(crate) pair_tests: u64,
 }
 
-/// The set without the members of mirrored fours: the member of most of them is dropped, of equals
-/// the last, until there is none.
+/// The set without the members of mirrored quadruples.
 ///
-/// Every four is tested where they are no more than `max`. Of a larger set those are that have three members
-/// in a well-spread core: a member whose image is mirrored is so with every triangle it is far from. What
-/// such a set says is then tested as a whole by the residuals of a rigid fit.
+/// The member of most mirrored quadruples is dropped, among equals the last, until none is mirrored. Every quadruple is
+/// tested if they are at most `max`. For a larger set, only quadruples with three members in a well-spread core are
+/// tested: a mirrored member is mirrored with every distant triangle. The residuals of a rigid fit then test such a set
+/// as a whole.
 pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, max: u64) -> Unmirrored {
     let (mut complete, mut pair_tests) = (true, 0);
     loop {
@@ -172,7 +172,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
         while !opposed.is_empty() {
             let mut count = vec![0u32; pairs.len()];
             opposed.iter().flatten().for_each(|&i| count[i as usize] += 1);
-            let worst = (0..pairs.len()).max_by_key(|&i| count[i]).expect("a four has members");
+            let worst = (0..pairs.len()).max_by_key(|&i| count[i]).expect("a quadruple has members");
             dropped[worst] = true;
             opposed.retain(|four| !four.contains(&(worst as u32)));
         }
@@ -181,13 +181,14 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
     }
 }
 
-/// Mirrored fours that are listed before members are dropped (1.6 MB).
+/// Maximum number of mirrored quadruples listed before members are dropped (1.6 MB).
 const MAX_LISTED: usize = 100_000;
-/// Members of the core of a set that is too large to be tested whole.
+/// Maximum number of members of the core of a set that is too large for a complete test.
 const CORE: usize = 40;
 
-/// Members far from each other in the model, at most [`CORE`], so few that all their triangles with all
-/// members are no more than `max`: always the farthest from those taken, from the first on.
+/// The core of a set by farthest-point sampling in the model, from the first member on.
+///
+/// It has at most [`CORE`] members, and its triangles with all members are at most `max`.
 fn core(problem: &Problem<'_>, pairs: &[Correspondence], max: u64) -> Vec<usize> {
     let at = |i: usize| problem.model[pairs[i].model].at;
     let mut taken = vec![0];
@@ -221,7 +222,7 @@ mod tests {
         assert_eq!((choose(3, 4), choose(4, 4), choose(40, 3), choose(50, 4)), (0, 1, 9880, 230_300));
     }
 
-    /// What is left of 60 points whose last five stand on the wrong side of the plane z = 0.
+    /// The remainder of 60 points, the last five of which lie on the wrong side of the plane z = 0.
     fn left(max: u64) -> Unmirrored {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let places: Vec<Vector3<f64>> = (0..60)
@@ -251,6 +252,6 @@ mod tests {
         assert!(kept.pair_tests >= choose(kept.pairs.len(), 4));
         let kept = left(100_000);
         assert!(!kept.complete && kept.pairs.len() >= 50, "{}", kept.pairs.len());
-        assert!(kept.pairs.iter().all(|pair| pair.model < 55), "the core tells them too");
+        assert!(kept.pairs.iter().all(|pair| pair.model < 55), "the core detects them too");
     }
 }

@@ -1,22 +1,22 @@
-//! What a pose explains.
+//! The pairs that a pose explains.
 
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{alike::slack, bitset::BitSet};
 use crate::{Correspondence, Kabsch, Observations, Problem, Solver};
 
-/// The least-squares pose of some pairs; none where they are too few, on a line or not finite.
+/// The least-squares pose of some pairs; `None` if they are too few, collinear or not finite.
 pub(super) fn fitted(problem: &Problem<'_>, pairs: &[Correspondence]) -> Option<Transform<Object, Camera>> {
     Kabsch::default().solve(&Observations::of(pairs, problem.model, problem.cloud, None)).ok()
 }
 
-/// How far a pair is from where the pose puts it, as a share of what it may be off.
+/// The residual of a pair under a pose, as a fraction of its tolerance.
 pub(crate) fn fraction(problem: &Problem<'_>, pose: &Transform<Object, Camera>, pair: Correspondence) -> f64 {
     let off = (*pose * problem.cloud[pair.cloud].position.at).distance(&problem.model[pair.model].at);
     off / slack(problem, pair)
 }
 
-/// The pairs that a pose puts where they were measured, one-to-one, the nearest first; of equals the first.
+/// The one-to-one pairs within tolerance of a pose, by ascending residual; among equals the first.
 pub(super) fn explained(
     problem: &Problem<'_>,
     vertices: &[Correspondence],
@@ -40,8 +40,8 @@ pub(super) fn explained(
     near
 }
 
-/// A pose fitted again to what it explains until that does not grow; what it then explains, and how well:
-/// Σ (1 − share²).
+/// Alternates the fit and the choice of pairs until the score Σ (1 − fraction²) no longer grows. Returns the score and
+/// the pairs.
 pub(super) fn refined(
     problem: &Problem<'_>,
     vertices: &[Correspondence],

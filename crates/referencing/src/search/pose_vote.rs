@@ -1,4 +1,4 @@
-//! Pose vote: all predictions are off by the same step.
+//! Pose vote: the prior's error displaces all predictions alike.
 
 use nalgebra::Vector3;
 use rand::Rng;
@@ -14,24 +14,27 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Maximises the number of model points whose candidates are displaced alike: the error of the prior is shared by
-/// all predictions p_i, so the offsets c_j − p_i of true pairs (i, j) lie together and those of others do not. From the
-/// offsets with most votes poses are fitted, and fitted again to what they explain; the best explanation is the answer.
+/// Generalised Hough transform (Ballard 1981) over the displacement of the prior.
 ///
-/// Not exact: a rotation of the prior spreads the offsets, by its angle times the model's extent, and beyond `radius`
-/// votes are lost. N log N for N candidate pairs spread evenly, at most the budget. Needs a prior.
+/// Maximises the number of model points whose candidates have the same displacement. All predictions p_i share the
+/// error of the prior, so that the offsets c_j − p_i of true pairs (i, j) cluster and those of others do not. Poses are
+/// fitted to the offsets with most votes, and fitted again to the pairs that they explain; the best explanation is the
+/// answer.
+///
+/// Not exact: a rotation error of the prior spreads the offsets by its angle times the model's extent, and beyond
+/// `radius` votes are lost. Time N log N for N evenly spread candidate pairs, at most the budget. Needs a prior.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct PoseVote {
-    /// Whether mirror images are refused; `false` is the pose alone.
+    /// Whether mirror images are rejected; `false` relies on the pose alone.
     pub(crate) orientation: bool,
-    /// Offsets nearer than this (m) vote for each other.
+    /// Maximum distance (m) of two offsets that vote for each other.
     pub(crate) radius: f64,
-    /// Offsets from which poses are fitted.
+    /// Number of offsets from which poses are fitted.
     pub(crate) tries: usize,
-    /// Pairs of offsets compared and residuals before it ends.
+    /// Maximum number of compared offset pairs and residuals.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -43,13 +46,13 @@ impl Default for PoseVote {
 
 impl Component for PoseVote {
     const NAME: &'static str = "pose-vote";
-    const SUMMARY: &'static str = "the displacement of the prior that most model points share";
+    const SUMMARY: &'static str = "the displacement of the prior with most votes of model points";
     const SOURCE: &'static str = "Ballard, Generalizing the Hough transform to detect arbitrary shapes, 1981; \
                                   the votes: offsets from the predicted places";
     const PROPERTIES: seafix_component::Properties = &[
-        ("maximises", "the number of model points whose candidates are displaced alike from where the prior has them"),
+        ("maximises", "the number of model points whose candidates have the same displacement from the prior"),
         ("exact", "no"),
-        ("time", "N log N for N candidate pairs spread evenly"),
+        ("time", "N log N for N evenly spread candidate pairs"),
     ];
 
     fn check(&self) -> Result<(), String> {
@@ -74,7 +77,7 @@ impl Search for PoseVote {
         let mut support: Vec<(usize, usize)> = Vec::new();
         for v in 0..vertices.len() {
             let near = votes.near(v, &mut pair_tests);
-            // Vertices stand by model point.
+            // Vertices are sorted by model point.
             support.push((near.chunk_by(|&a, &b| vertices[a].model == vertices[b].model).count(), v));
             if pair_tests >= self.budget {
                 ended = Some((self.budget, pair_tests));
@@ -120,11 +123,11 @@ impl Votes {
     }
 
     fn cube(at: &Vector3<f64>, radius: f64) -> [i64; 3] {
-        // Far beyond any sea the cubes are one.
+        // Clamped: all cubes far beyond any sea are one.
         [0, 1, 2].map(|axis| (at[axis] / radius).floor().clamp(-1e15, 1e15) as i64)
     }
 
-    /// The offsets within the radius of one, ascending; itself among them.
+    /// The offsets within the radius of one, itself included, ascending.
     fn near(&self, v: usize, pair_tests: &mut u64) -> Vec<usize> {
         let [x, y, z] = Self::cube(&self.offsets[v], self.radius);
         let mut near = Vec::new();

@@ -1,81 +1,88 @@
-//! What a search by likelihood believes.
+//! The posterior of a search by likelihood.
 
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{RepeatedPattern, StructuredClutter};
 use crate::{Alternative, Correspondence, ModelPoint, rms_apart};
 
-/// Explanations less likely than the best by this much (nats) are not listed: a share of 0.05 %.
+/// Evidence (nats) below the best at which an explanation is not listed; e⁻⁷·⁶ = 0.05 %.
 const NEGLIGIBLE: f64 = 7.6;
 
-/// A pose that explains the data, with the weight of its evidence.
+/// A pose that explains the data, with its evidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// The pairs, in the order of the model points.
     pub pairs: Vec<Correspondence>,
-    /// The most likely pose.
+    /// The MAP pose of these pairs.
     pub object_from_camera: Transform<Object, Camera>,
-    /// ln of the probability of the data given a pose about here, over that given no object at all (nats).
+    /// Log evidence ratio (nats): ln of p(data | a pose near this one) / p(data | no object).
     pub ln_evidence: f64,
-    /// By how much evenly spread clutter would have made that more (nats): the pairs lie where the cloud is crowded.
+    /// Evidence (nats) that the pose loses to dense clutter about its pairs, relative to uniform clutter.
     pub ln_clutter_density: f64,
 }
 
 impl Explanation {
-    /// The same as an alternative, its evidence as the score.
+    /// The explanation as an alternative; its score is the evidence.
     pub(crate) fn alternative(&self) -> Alternative {
         Alternative { object_from_camera: self.object_from_camera, pairs: self.pairs.clone(), score: self.ln_evidence }
     }
 }
 
-/// The poses that may explain the data, the likeliest first.
+/// The poses that may explain the data, the best first.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Posterior {
-    /// The poses; what is less likely than the best by many orders of magnitude is left out.
+    /// The poses, without those whose evidence is orders of magnitude below the best.
     pub explanations: Vec<Explanation>,
-    /// What the cloud shows beside the likeliest: poses that explain points which it leaves, the likeliest first.
+    /// Poses that explain points which the best pose does not use, the best first.
     pub beside: Vec<Explanation>,
-    /// Whether every second copy of the object, whole or in part, is among them, as far as bounds of evidence tell; `None` where none
-    /// was looked for, since nothing is likely enough to be believed.
+    /// Whether the search for second copies of the object was exhaustive, up to the bounds of evidence.
+    ///
+    /// A copy may be complete or partial. `None` if none was searched for, since no pose has enough evidence to be
+    /// accepted.
     pub copies_sought: Option<bool>,
-    /// What a pattern that goes on beyond the object explains of the cloud; `None` of an object without one.
+    /// Evidence of a pattern that continues beyond the object; `None` for an object without a pattern.
     pub repeated_pattern: Option<RepeatedPattern>,
-    /// What shows most that clutter imitates the object; `None` where nothing does.
+    /// The strongest evidence of structured clutter, which resembles the object; `None` without any.
     pub structured_clutter: Option<StructuredClutter>,
-    /// The likeliest of what else was met elsewhere, or, where that is nothing, of what was followed however unlikely it is: the
-    /// answer is held against it.
+    /// The best pose elsewhere, for comparison with the answer.
+    ///
+    /// If no pose elsewhere was met, it is the best of the poses that were followed regardless of their evidence.
     pub unlikely: Option<Explanation>,
-    /// No admissible set has more evidence than the likeliest pose by more than this (nats), clutter being spread evenly: zero where that
-    /// is the most likely, proved. `None` where no proof was sought.
+    /// Upper bound of the evidence (nats) by which another set exceeds the best pose.
+    ///
+    /// It holds for admissible sets under uniform clutter. Zero: the best pose is proved optimal. `None`: no proof was
+    /// requested.
     pub evidence_gap: Option<f64>,
 }
 
-/// What has this evidence (nats) beside the likeliest pose is a second copy of the object, whole or in part.
+/// Minimum evidence (nats) of a second copy of the object, complete or partial, beside the best pose.
 pub(super) const COPY: f64 = 9.0;
 
-/// Clutter alone shows this much evidence (nats) in one frame of twenty: E Σ Λ = 1 where it is spread as the terms have it.
+/// Evidence (nats) that clutter alone reaches in at most one frame of twenty.
+///
+/// Markov's inequality with E Σ Λ = 1 under uniform clutter.
 const ACCIDENT: f64 = 3.0;
 
-/// How often clutter imitates an object, before a frame shows it: so seldom that where nothing shows it no answer depends on it.
+/// ln of the prior probability that clutter resembles the object: so small that it matters only with evidence for it.
 const LN_RESEMBLES: f64 = -11.5;
 
-/// How the belief is shared out.
+/// The posterior probabilities of the hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PosteriorProbabilities {
-    /// That the pose is within the alert limit of the likeliest explanation.
+    /// Probability that the true pose is within the alert limit of the best explanation.
     pub map_estimate: f64,
-    /// That it is elsewhere.
+    /// Probability that the object is elsewhere.
     pub elsewhere: f64,
-    /// That the object is not there.
+    /// Probability that the object is absent.
     pub absent: f64,
-    /// The part of that in which a pattern is there that looks like it.
+    /// Part of `absent` due to a repeated pattern that looks like the object.
     pub alike: f64,
-    /// The part of it that is due to clutter doing more than evenly spread clutter would.
+    /// Part of `absent` due to clutter that is denser or more structured than uniform clutter.
     pub clutter: f64,
 }
 
 impl Posterior {
-    /// The explanations with a share beside the likeliest that place the object elsewhere, one a place.
+    /// The explanations of appreciable probability that place the object elsewhere, one for each place.
     pub fn elsewhere(&self, model: &[ModelPoint], limit: f64) -> Vec<&Explanation> {
         let mut different: Vec<&Explanation> = self.explanations.iter().take(1).collect();
         for other in &self.explanations {
@@ -90,26 +97,28 @@ impl Posterior {
         different
     }
 
-    /// A second copy of the object, elsewhere, whole or in part: a pose that explains other cloud points than the likeliest
-    /// does, and that alone would be believed: no object at all has at most the probability `absence`.
+    /// A second copy of the object elsewhere, complete or partial.
     ///
-    /// Where two poses are each beyond chance, clutter explains neither: it is not the evidence that decides between
-    /// them, but which of two things is the object. Of that the cloud says only how much of each is seen.
-    /// Evidence of nine nats is another one in any case: where two things may be the object, less than certainty that the second is keeps
-    /// from choosing.
+    /// The copy is a pose that explains other cloud points than the best pose, with evidence that would be accepted
+    /// alone: the probability of absence is at most `absence`. Two poses with such evidence are not explained by
+    /// clutter, and their evidence does not decide which of them is the object: it reports only how much of each is
+    /// visible.
+    ///
+    /// Evidence of nine nats is a copy in any case, whatever `absence` is: two possible objects forbid a choice even if
+    /// the second is not certain.
     pub fn copy(&self, model: &[ModelPoint], limit: f64, absence: f64) -> Option<&Explanation> {
         let likely = libm::log((1.0 - absence) / absence).min(COPY);
         self.apart(&self.beside, model, limit).into_iter().find(|other| other.ln_evidence >= likely)
     }
 
-    /// The likeliest pose of all that are elsewhere, however unlikely.
+    /// The best pose elsewhere, whatever its evidence.
     pub fn next(&self, model: &[ModelPoint], limit: f64) -> Option<&Explanation> {
         let known = [&self.explanations[..], &self.beside, self.unlikely.as_slice()];
         let all = known.into_iter().filter_map(|some| self.apart(some, model, limit).first().copied());
         all.max_by(|a, b| a.ln_evidence.total_cmp(&b.ln_evidence))
     }
 
-    /// Those of these poses that are not about the likeliest, in their order.
+    /// The poses that are not near the best, in their order.
     fn apart<'a>(&self, of: &'a [Explanation], model: &[ModelPoint], limit: f64) -> Vec<&'a Explanation> {
         let Some(best) = self.explanations.first() else { return Vec::new() };
         let near =
@@ -117,12 +126,16 @@ impl Posterior {
         of.iter().filter(|other| !near(other)).collect()
     }
 
-    /// The posterior probabilities: P_m = Λ_m/(1 + Σ Λ), Λ the evidence, presence and absence being
-    /// equally likely beforehand; poses within `limit` (m, RMS over the model points) of the likeliest count
-    /// as one with it. A pattern like the object's, alone or around the object, is as likely beforehand. And what looks
-    /// like the object beside it, in the points that it leaves, is what clutter of this cloud can do: without the object it
-    /// would be as likely that clutter did it here. Where another pose shows that the clutter imitates the object
-    /// ([`StructuredClutter`]), the likeliest pose is such an imitation, or the object among them.
+    /// The posterior probabilities of presence, elsewhere and absence.
+    ///
+    /// P_m = Λ_m/(1 + Σ Λ), with evidence Λ and equal prior probabilities of presence and absence. Poses within `limit`
+    /// (m, RMS over the model points) of the best count as one with it. Further hypotheses:
+    ///
+    /// - A repeated pattern, alone or around the object, has the same prior probability.
+    /// - A pose beside the best, in points that the best does not use, shows how much evidence clutter of this cloud
+    ///   produces. Without the object, clutter would have produced the best pose with the same probability.
+    /// - Structured clutter ([`StructuredClutter`]): if another pose shows that clutter resembles the object, the best
+    ///   pose is such clutter too, or the object is present beside such clutter.
     pub fn probabilities(&self, model: &[ModelPoint], limit: f64) -> PosteriorProbabilities {
         let Some(best) = self.explanations.first() else {
             return PosteriorProbabilities { map_estimate: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
@@ -131,7 +144,7 @@ impl Posterior {
             self.repeated_pattern.unwrap_or(RepeatedPattern { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
         let clutter = if beside > ACCIDENT { beside } else { 0.0 };
-        // The object among imitations, and imitations alone.
+        // The object beside structured clutter, and structured clutter alone.
         let among =
             self.structured_clutter.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_RESEMBLES);
         let imitated = self.structured_clutter.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);
@@ -167,7 +180,7 @@ mod tests {
     use super::*;
     use seafix_geometry::Transform;
 
-    /// Seen to fail where a copy must be believed by itself.
+    /// Fails if a copy must be accepted by itself.
     #[test]
     fn nine_nats_are_a_copy_however_sure_a_first_one_must_be() {
         let pose = |x: f64| Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(x, 0.0, 0.0));
@@ -199,13 +212,13 @@ mod tests {
             let probabilities = posterior.probabilities(&[], 0.1);
             assert!(
                 (probabilities.absent - probabilities.clutter) * 0.99 <= (-40.0_f64).exp(),
-                "all else is no object at all"
+                "the other causes of absence have the prior odds of no object"
             );
             probabilities.absent
         };
         let structured_clutter = |ln_evidence, ln_alone| Some(StructuredClutter { ln_evidence, ln_alone });
         assert!(absent(None) < 1e-15 && absent(structured_clutter(-20.0, 0.0)) < 1e-13);
-        // As many of the places elsewhere are filled as of the object's: even odds; far fewer: one to e¹².
+        // As many places elsewhere are filled as places of the object: even odds. Far fewer: odds of one to e¹².
         assert!((absent(structured_clutter(60.0, 0.0)) - 0.5).abs() < 1e-9);
         assert!((absent(structured_clutter(60.0, -12.0)) * 12.0_f64.exp() - 1.0).abs() < 1e-4);
     }

@@ -1,27 +1,27 @@
-//! The fours that one vertex makes with others.
+//! The quadruples of one vertex with three others.
 
 use super::{orientation::Sense, volumes::Volumes};
 use crate::lanes::{LANES, ones_of, packed};
 
-/// Whether a vertex makes a four that contradicts a sense with some three members of a set.
+/// The test whether a vertex and three members of a set contradict a sense.
 ///
-/// Any two members span a plane with the vertex, and a third lies on the same side of it in model and cloud, or is looked at
-/// closely. The memory for the planes is used again from question to question.
+/// Two members span a plane with the vertex. If a third does not lie on the same side of it in model and cloud beyond
+/// doubt, the exact test decides. The memory for the planes is reused.
 #[derive(Debug, Default)]
 pub(super) struct Quadruples {
-    /// Places of the members in model and cloud seen from the vertex, axis by axis.
+    /// Coordinates of the members in model and cloud relative to the vertex, by axis.
     places: [Vec<f64>; 6],
-    /// Normals of the planes in model and cloud, axis by axis, in whole words: of members i < k at k (k − 1)/2 + i.
+    /// Normals of the planes in model and cloud by axis, in complete words: members i < k at k (k − 1)/2 + i.
     normals: [Vec<f64>; 6],
 }
 
-/// How many pairs n things make.
+/// The number of pairs of n items.
 fn pairs(n: usize) -> usize {
     n * n.saturating_sub(1) / 2
 }
 
 impl Quadruples {
-    /// How many a vertex makes with so many members.
+    /// The number of quadruples of a vertex with three of the members.
     pub(super) fn count(members: usize) -> u64 {
         (pairs(members) * members.saturating_sub(2) / 3) as u64
     }
@@ -38,7 +38,7 @@ impl Quadruples {
         span(&self.places, &mut self.normals);
         (2..members.len()).any(|third| {
             self.unclear(third, sign, volumes.doubt()).any(|plane| {
-                // The last k with k (k − 1)/2 ≤ its number.
+                // The last k with k (k − 1)/2 ≤ plane.
                 let second = (8 * plane + 1).isqrt().div_ceil(2);
                 let first = plane - pairs(second);
                 volumes.contradict(sense, [members[first], members[second], members[third], vertex])
@@ -46,7 +46,7 @@ impl Quadruples {
         })
     }
 
-    /// The planes of earlier members on whose two sides a member is not clearly where the sign has it.
+    /// The planes of earlier members for which the side of a member is in doubt or contradicts the sign.
     fn unclear(&self, member: usize, sign: f64, doubt: f64) -> impl Iterator<Item = usize> {
         let place = self.places.each_ref().map(|column| column[member]);
         (0..pairs(member)).step_by(LANES).flat_map(move |begin| {
@@ -77,10 +77,12 @@ fn span(places: &[Vec<f64>; 6], normals: &mut [Vec<f64>; 6]) {
     }
 }
 
-/// On whose same side (`sign` 1) or other side (-1) in model and cloud a place is, beyond doubt: of the first planes, one bit each.
+/// The mask of the planes for which a place clearly has the orientation `sign`.
+///
+/// It is on the same side (1) in model and cloud, or on opposite sides (-1).
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn clear(normals: &[&[f64]; 6], place: &[f64; 6], sign: f64, doubt: f64) -> u64 {
-    let [a, b, c, u, v, w] = normals.map(|column| column.first_chunk::<LANES>().expect("whole words"));
+    let [a, b, c, u, v, w] = normals.map(|column| column.first_chunk::<LANES>().expect("complete words"));
     let mut clear = [0u8; LANES];
     for k in 0..LANES {
         let known = a[k] * place[0] + b[k] * place[1] + c[k] * place[2];
@@ -105,10 +107,10 @@ mod tests {
         assert_eq!([0, 1, 2, 3, 4, 39].map(Quadruples::count), [0, 0, 0, 1, 4, 9139]);
     }
 
-    /// Sets of every size up to forty, some of them with one point on the wrong side of others: as by every four by itself.
+    /// The test agrees with a test of each quadruple.
     ///
-    /// Seen to fail where threes without the third member are asked alone, where a plane is taken for that of other members, and with a
-    /// wrong sign in a normal.
+    /// The sets have up to forty members, some with a point on the wrong side. Fails if triples without the third
+    /// member alone are tested, if a plane is taken for that of other members, and with a wrong sign in a normal.
     #[test]
     fn what_is_refused_makes_a_four_that_contradicts() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);

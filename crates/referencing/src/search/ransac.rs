@@ -13,23 +13,25 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Maximises Σ (1 − r²)₊ over poses, r the residual of each model point's best candidate as a share of what the tolerance
-/// allows (the truncated score of MSAC), over the poses of random triples of candidate pairs; a triple must be coherent
-/// (the edge-length check) before its pose is computed.
+/// RANSAC (Fischler and Bolles 1981) with the truncated score of MSAC.
 ///
-/// Not exact. Triples are drawn until one of true pairs has been among them with `confidence`, as far as the best
-/// share of inliers tells, or the budget ends: O(w⁻³) triples for a share w of true pairs, N residuals for each coherent
-/// one. The best pose is fitted again to what it explains.
+/// Maximises Σ (1 − r²)₊ over the poses of random triples of candidate pairs; r is the residual of each model point's
+/// best candidate as a fraction of its tolerance. A triple must be coherent (edge-length check) before its pose is
+/// computed.
+///
+/// Not exact. Triples are sampled until one of true pairs was among them with the probability `confidence`, according
+/// to the best inlier fraction, or until the budget ends: O(w⁻³) triples for a fraction w of true pairs, N residuals
+/// for each coherent one. The best pose is fitted again to the pairs that it explains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Ransac {
-    /// Whether mirror images are refused; `false` is distances and pose alone.
+    /// Whether mirror images are rejected; `false` relies on distances and pose alone.
     pub(crate) orientation: bool,
-    /// With what probability a triple of true pairs has been drawn when it ends.
+    /// Probability, between 0 and 1, that a triple of true pairs was sampled before the search ends.
     pub(crate) confidence: f64,
-    /// Pair tests and residuals before it ends.
+    /// Maximum number of pair tests and residuals.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched.
+    /// Maximum number of candidate pairs; more are rejected.
     pub(crate) max_pairs: usize,
 }
 
@@ -41,13 +43,13 @@ impl Default for Ransac {
 
 impl Component for Ransac {
     const NAME: &'static str = "ransac";
-    const SUMMARY: &'static str = "poses of random coherent triples, the one that explains most";
+    const SUMMARY: &'static str = "the best of the poses of random coherent triples";
     const SOURCE: &'static str = "Fischler, Bolles, Random sample consensus, 1981; the score: Torr, Zisserman, MLESAC, \
                                   2000; the edge-length check: Zhou, Park, Koltun, Open3D, 2018";
     const PROPERTIES: seafix_component::Properties = &[
-        ("maximises", "Σ (1 − r²) over what a pose explains, over poses of random coherent triples (MSAC)"),
-        ("exact", "no: triples are drawn until it is likely enough that one was true"),
-        ("time", "O(w⁻³) triples for a share w of true pairs, N residuals for each coherent one"),
+        ("maximises", "Σ (1 − r²) over the pairs that a pose explains, over poses of random coherent triples (MSAC)"),
+        ("exact", "no: triples are sampled until one was true with the given confidence"),
+        ("time", "O(w⁻³) triples for a fraction w of true pairs, N residuals for each coherent one"),
     ];
 
     fn check(&self) -> Result<(), String> {
@@ -77,7 +79,7 @@ impl Search for Ransac {
             }
             let Some(pose) = fitted(problem, &[a, b, c]) else { continue };
             pair_tests += count as u64;
-            // Vertices stand by model point: the best candidate of each counts.
+            // Vertices are sorted by model point: the best candidate of each counts.
             let of = |same: &[Correspondence]| {
                 let min = same.iter().map(|&pair| fraction(problem, &pose, pair)).fold(1.0, f64::min);
                 (1.0 - min * min, u64::from(min < 1.0))

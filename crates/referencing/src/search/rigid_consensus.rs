@@ -1,4 +1,4 @@
-//! Rigid consensus: the likeliest pose, with what else is likely.
+//! Rigid consensus: a maximum-a-posteriori search that compares each pose with its alternatives and with absence.
 
 use std::collections::BTreeSet;
 
@@ -18,54 +18,72 @@ use super::{
 };
 use crate::Problem;
 
-/// The likeliest pose, every other pose that may explain the data, and how likely it is that there is none.
+/// Maximum-a-posteriori pose search with Bayesian model comparison (MacKay 2003, ch. 27 and 28).
 ///
-/// Maximises the evidence of a pose against clutter alone,
+/// The search maximises the evidence ratio of a pose against clutter alone,
 ///
 /// Λ = ∫ p(T) B(k) Π_i N(c_j(i) − T p_i; 0, Σ_j + σ_i² I)/ρ_i dT,
 ///
-/// over the sets of pairs and, by Laplace's method, about the best pose T of each: p(T) is the prior (a
-/// Gaussian; a box is read as three standard deviations; without a prior any attitude anywhere in the boxes
-/// of the cloud's parts, between which no object reaches), ρ_i the density of cloud points where model point i is predicted, without
-/// a prior that of the part, and B(k) = k! (n − k)!/(n + 1)!
-/// the share of one set of k visible points when every number from 0 to n is equally likely. So a pose with
-/// fewer but closer points, or nearer to the prior, can outweigh one with more.
+/// over the sets of pairs; the integral over the pose T is Laplace's approximation about the best pose of each set.
 ///
-/// Poses that put a model point outside the box of a prior are none. Where the likeliest poses lie in crowds (on the edges of
-/// a box, in clumps), ρ_i is the density of the nearest points instead, or that about the predicted places of all model points where
-/// clutter is bunched there, and B(k) Π is summed over the subsets of the
-/// pairs, each model point's term over all candidates near its place: what fits in a crowd is as likely clutter. And
-/// beside the object and clutter alone stand more explanations: a pattern that the object repeats in part goes on, with
-/// the object in it or without; and where poses elsewhere explain what clutter spread evenly would not show, clutter
-/// imitates the object, which is among the imitations or not ([`StructuredClutter`]). So do putative pairs that mistake points for their
-/// like, where the model stands as well in other ways on the same places: each of them is met by many.
+/// - p(T) is the prior density: a Gaussian, or a box, whose half-size counts as three standard deviations. Without a
+///   prior it is uniform over all attitudes and over the bounding boxes of the cloud's parts; gaps longer than the
+///   object separate the parts.
+/// - ρ_i is the density of cloud points at the predicted place of model point i; without a prior it is the density of
+///   the part.
+/// - B(k) = k! (n − k)!/(n + 1)! is the probability of one set of k visible points if every number from 0 to n is
+///   equally probable.
 ///
-/// Branch and bound over coherent threes, most promising first: three pairs give a pose, what fits it joins,
-/// the pose is fitted again until the set stands. Looked for are the poses that begin with three coherent
-/// pairs and whose evidence is within e¹⁰ of the best and not below that of absence by e³. A three whose distances
-/// differ much from the model's fits no pose well, and its bound falls by that. The bounds that
-/// prune take the points of a set to lie about as well as the model's do on average, and to fit no better than noise
-/// lets them, by up to four nats: what fits better may be missed where it is hardly of interest.
+/// A pose with fewer but closer points, or nearer to the prior, can therefore outweigh a pose with more points. A pose
+/// that puts a model point outside the prior's box is excluded.
 ///
-/// With `prove`, and where five nats of evidence make the likeliest believable, bounds that hold decide instead which coherent sets are
-/// looked at, of clutter that is spread evenly and by geometry of the first order: what is found joins the poses, and where nothing is
-/// left open the answer is optimal, but where some pairs of its pose had to go since they are not coherent.
+/// # Clutter
 ///
-/// Time O(K²) for the graph of K candidate pairs, then what the bounds leave: seldom more than for the graph, for the proof at worst
-/// exponential in K, and never more than the budget, which is told when it ends the search; the proof has as much again. What is
-/// looked for beside the likeliest pose comes on top: a whole second copy as thoroughly, parts of one for
-/// up to two and a half times that work, imitations for an eighth. So among much clutter a partly seen object beside a whole
-/// copy of it may be passed over, where [`Posterior::copies_sought`] is false; and what shows less evidence than nine nats is no
-/// copy. The tolerance and the prior's greatest rotation prune the graph; they do not judge the pose.
+/// Uniform clutter underestimates the false alarms at the edges of a box and in clumps. The best poses are therefore
+/// weighed again: ρ_i becomes the density of the nearest points, or the density about the predicted places of all model
+/// points if clutter is clumped there. B(k) Π is summed over the subsets of the pairs, and the term of a model point
+/// over all candidates near its place, since a point that fits in dense clutter may be clutter.
+///
+/// The posterior holds further hypotheses:
+///
+/// - A pattern that the object repeats in part continues beyond it, with or without the object: [`RepeatedPattern`].
+/// - Poses elsewhere explain more than uniform clutter would: clutter resembles the object, which may be present
+///   or absent ([`StructuredClutter`]).
+/// - Putative pairs confuse points of similar appearance: the model also fits the same places in another order, and
+///   each of these orders is supported by several pairs.
+///
+/// # Search
+///
+/// Best-first branch and bound over coherent triples. Three pairs give a pose, further pairs that fit it join, and the
+/// pose is fitted again until the set is stable. The search reaches poses that start from three coherent pairs and
+/// whose evidence is at least e⁻¹⁰ of the best and e⁻³ of absence. A triple whose distances differ much from the
+/// model's fits no pose well and lowers its bound accordingly. The pruning bounds assume that the points of a set are
+/// spread as the model's are on average, and that their residuals cost up to four nats as noise demands. A set that
+/// fits better may be missed if its evidence is near the threshold.
+///
+/// With `prove`, and if the evidence of the best pose exceeds five nats, strict bounds decide which coherent sets are
+/// examined. They hold for uniform clutter and to first order in the geometry. A better set joins the posterior. The
+/// answer is optimal if no set remains open, unless some pairs of its pose were removed for lack of coherence.
+///
+/// # Cost
+///
+/// The graph of K candidate pairs takes O(K²). The branch and bound seldom takes more than the graph; the proof is
+/// exponential in K at worst. Each has the budget as its limit, and a search that reaches it reports that. Searches
+/// beside the best pose come on top: for a complete second copy as thorough as the first search, for parts of a copy up
+/// to two and a half times its work, for structured clutter an eighth. In dense clutter a partly visible object beside
+/// a complete copy of it may therefore be missed; [`Posterior::copies_sought`] is then false. A pose of less than nine
+/// nats is not a copy. The tolerance and the maximum rotation of the prior prune the graph; they do not judge the pose.
+///
+/// [`RepeatedPattern`]: super::RepeatedPattern
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigidConsensus {
-    /// Work before the search ends, in words of the graph read (64 pairs each).
+    /// Maximum work of the search, in graph words read (64 pairs each).
     pub budget: u64,
-    /// More candidate pairs than this are not searched: their graph would not fit into memory
-    /// (40 000 take 200 MB).
+    /// Maximum number of candidate pairs; more are rejected, since their graph would not fit into memory (40 000 pairs
+    /// take 200 MB).
     pub max_pairs: usize,
-    /// Whether it is proved that no set is likelier, as far as the budget again does: then the answer is called optimal.
+    /// Whether to prove that no set has more evidence, with the budget once more; a proved answer is `optimal`.
     pub prove: bool,
 }
 
@@ -77,21 +95,21 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const SUMMARY: &'static str = "the likeliest pose, weighed against all others and against no object at all";
+    const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the evidence of a pose against clutter alone: prior, residuals, how many points are seen, and how dense clutter is about each",
+            "the evidence of a pose against clutter alone: prior, residuals, number of visible points, local clutter density",
         ),
         (
             "exact",
-            "to within what its bounds let pass; with `prove` proved, within its budget, that no coherent set is likelier where clutter is spread evenly",
+            "up to its pruning bounds; with `prove`, within its budget, no coherent set has more evidence under uniform clutter",
         ),
         (
             "time",
-            "K²/2 pair tests for K candidate pairs, then mostly as much again; never more than its budget, and two and a half times that for what stands beside the likeliest",
+            "K²/2 pair tests for K candidate pairs, then usually as much again; at most its budget, and 2.5 times that for alternatives",
         ),
     ];
 
@@ -100,23 +118,23 @@ impl Component for RigidConsensus {
     }
 }
 
-/// Poses less likely than no object at all by this much (nats) are not looked for.
+/// Evidence (nats) below that of absence at which a pose is not searched for.
 const FLOOR: f64 = 3.0;
-/// A pose that is more likely than no object by this much (nats) may be believed: only then what else the cloud shows is
-/// looked for.
+/// Minimum evidence (nats) of a pose that may be accepted; only then are alternatives searched for.
 const STRONG: f64 = 5.0;
-/// What is found beside the likeliest pose matters where it is not less likely by this much (nats), and where it is a copy by itself
-/// ([`COPY`]).
+/// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a [`COPY`].
 const BESIDE: f64 = 14.0;
-/// What explains so many points fewer than the likeliest pose is no copy of the object but of a part of it. Where the object has a
-/// pattern that goes on, parts are to be seen beside it anyway, and are not looked for.
+/// Number of points below the best pose at which a pose is only part of a copy.
+///
+/// Parts of an object whose pattern continues are visible beside it anyway and are not searched for.
 const LEAD: usize = 4;
-/// The looks for parts of a copy, and the tenth of it those for imitations, may always cost as much (words read: a fraction of a
-/// millisecond), where the whole was found at once.
+/// Minimum work (words read) of the search for parts, a fraction of a millisecond.
+///
+/// A tenth of it is the minimum for structured clutter. Both apply even if the complete object was found at once.
 const MIN_EFFORT: u64 = 50_000;
-/// Sums in another order differ by less (nats).
+/// Rounding error (nats) of sums in different order.
 const ROUNDING: f64 = 1e-9;
-/// Pair tests of the graph that take as long as a word read.
+/// Pair tests of the graph that take as long as one word read.
 const PAIRS_A_WORD: u64 = 16;
 
 impl Search for RigidConsensus {
@@ -132,11 +150,11 @@ impl Search for RigidConsensus {
         let mut swept = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget).sweep();
         let mut pair_tests = graph.pair_tests + swept.pair_tests;
         let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
-        // What nothing makes believe needs no proof.
+        // A pose that cannot be accepted needs no proof.
         let proved =
             if self.prove && strong(&swept) { prove(problem.model, parts, &mut swept, self.budget) } else { None };
         pair_tests += proved.as_ref().map_or(0, |proved| proved.pair_tests);
-        // Up to a hundred megabytes that nobody needs from here on.
+        // Frees up to a hundred megabytes that are no longer needed.
         swept.pairs = Vec::new();
         let mut clutter_density = ClutterDensity::default();
         let mut weighted = |swept: &mut Swept| {
@@ -147,7 +165,7 @@ impl Search for RigidConsensus {
                 |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
             swept.modes.sort_by(by);
         };
-        // What is not likely even in evenly spread clutter is refused whatever the clutter is like.
+        // A pose that is improbable in uniform clutter is rejected whatever the clutter is like.
         if strong(&swept) {
             weighted(&mut swept);
         }
@@ -158,7 +176,7 @@ impl Search for RigidConsensus {
         if let Some(image) = mirror_image(problem.model, parts, best) {
             return Err(Rejected::Mirrored { best: image.members.len(), proved: false });
         }
-        // A second copy of the object in what is left of the cloud, and a pose to hold the likeliest against.
+        // A second copy of the object in the rest of the cloud, and a pose to compare the best with.
         let mut repeated_pattern = None;
         let mut beside = Swept { complete: true, parts: true, ..Swept::default() };
         let mut copies_sought = None;
@@ -175,14 +193,15 @@ impl Search for RigidConsensus {
             beside = if pattern.is_some() {
                 Seeds::new(problem.model, parts, &taken, (min, STRONG), left).sweep()
             } else {
-                // Parts of it: pairs are looked at for twice, and followed for half of the time that the whole took.
+                // Parts of a copy: pairs are examined for twice, and followed for half, of the time of the complete
+                // search.
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
                 let seeds = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), left);
                 seeds.with_parts(min, left.min(2 * full), left.min(full / 2)).sweep()
             };
-            // Where the object has a pattern that goes on, parts of it are to be seen anyway.
+            // Parts of an object whose pattern continues are visible anyway.
             copies_sought = Some(beside.complete && beside.parts && pattern.is_none());
-            // What poses elsewhere say of the clutter, those that are as likely as no object, in an eighth of that time.
+            // Structured clutter: poses elsewhere with at least the evidence of absence, in an eighth of that time.
             let effort = left.min((work / 8).max(MIN_EFFORT / 10));
             let mut others = Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep();
             pair_tests += others.pair_tests;
@@ -204,8 +223,8 @@ impl Search for RigidConsensus {
         let complete = swept.complete && beside.complete;
         let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
         let evidence_gap = proved.map(gap);
-        // What is returned is coherent throughout: of twenty true points some two are usually further from each
-        // other than the tolerance, and the worst fitting give way. The belief keeps them.
+        // The returned set is coherent throughout: among twenty true points some two usually differ by more than the
+        // tolerance, and the worst fitting are dropped. The posterior keeps them.
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut pair_tests);
         if pairs.len() < NEEDED {
             return if complete { Err(nothing) } else { so_far(problem, true, ended(pairs.len(), pair_tests)) };
@@ -221,7 +240,7 @@ impl Search for RigidConsensus {
         Ok(Identification {
             alternatives: Vec::new(),
             alternatives_complete: false,
-            // What is proved of a pose is not proved of what is left of its pairs where some contradict each other.
+            // A proof for the pose does not hold for the rest of its pairs after some were dropped.
             optimal: evidence_gap == Some(0.0) && pairs.len() == best.members.len(),
             consensus_bound: bound,
             pair_tests,
@@ -252,7 +271,7 @@ mod tests {
     const PLACES: [[f64; 3]; 6] =
         [[0.0, 0.0, 0.0], [1.3, 0.0, 0.0], [0.3, -0.9, 0.0], [0.8, 0.6, 0.5], [-0.4, 0.7, 0.9], [0.1, -0.3, 1.2]];
 
-    /// The points 3 m before the camera, as far off as `wrong` says, each its own candidate.
+    /// The points 3 m in front of the camera with the errors `wrong`, each its own candidate.
     fn answered(prior: Option<&Prior>, wrong: impl Fn(usize) -> Vector3<f64>) -> Result<Identification, Rejected> {
         answered_by(&RigidConsensus::default(), prior, wrong)
     }
@@ -273,41 +292,42 @@ mod tests {
         search.search(&problem, &mut ChaCha8Rng::seed_from_u64(0))
     }
 
-    /// Seen to fail where nothing is asked of the proof, and where the gap is that to no object.
+    /// Fails if the proof is not requested, and if the gap is measured to absence.
     #[test]
     fn an_answer_is_optimal_where_that_is_asked_and_proved() {
         let proving = RigidConsensus { prove: true, ..RigidConsensus::default() };
         let noise = |i: usize| Vector3::new(0.005, -0.005, 0.0025) * (i as f64 - 2.5);
         let [plain, proved] = [&RigidConsensus::default(), &proving].map(|by| answered_by(by, None, noise).unwrap());
-        let gap = |found: &Identification| found.posterior.as_ref().expect("one is weighed").evidence_gap;
+        let gap = |found: &Identification| found.posterior.as_ref().expect("a posterior").evidence_gap;
         assert_eq!((plain.optimal, gap(&plain)), (false, None));
         assert_eq!((proved.optimal, gap(&proved)), (true, Some(0.0)));
         assert_eq!(plain.pairs, proved.pairs);
         assert!(proved.pair_tests > plain.pair_tests);
     }
 
-    /// The first two points are pushed apart by 44 mm, more than Δ, each to 2.2 σ of where the pose of all puts it: one of them goes.
+    /// Two contradicting pairs: one of them is dropped from the answer.
     ///
-    /// Seen to fail where what is proved of the pose is said of the pairs that are left.
+    /// The first two points are pushed apart by 44 mm, more than Δ, each to 2.2 σ of its place under the common pose.
+    /// Fails if the proof for the pose is taken for a proof of the remaining pairs.
     #[test]
     fn what_is_left_of_pairs_that_contradict_each_other_is_not_optimal() {
         let proving = RigidConsensus { prove: true, ..RigidConsensus::default() };
         let apart = |i: usize| Vector3::new([-0.022, 0.022, 0.0, 0.0, 0.0, 0.0][i], 0.0, 0.0);
         let found = answered_by(&proving, None, apart).unwrap();
-        let posterior = found.posterior.as_ref().expect("one is weighed");
+        let posterior = found.posterior.as_ref().expect("a posterior");
         assert_eq!((found.pairs.len(), posterior.explanations[0].pairs.len()), (5, 6));
         assert_eq!((found.optimal, posterior.evidence_gap), (false, Some(0.0)));
     }
 
     #[test]
     fn a_point_that_agrees_in_distances_but_not_in_place_is_left_out() {
-        // The last point is off by 3 cm across and 7 cm in depth: its distances to the others differ by less than
-        // Δ = 4 cm, but it lies eight σ from where their pose puts it.
+        // The last point is off by 3 cm across and 7 cm in depth. Its distances to the others differ by less than Δ = 4
+        // cm, but it lies eight σ from its place under their pose.
         let found = answered(None, |i| if i == 5 { Vector3::new(0.03, 0.03, 0.07) } else { Vector3::zeros() }).unwrap();
         let models: Vec<usize> = found.pairs.iter().map(|pair| pair.model).collect();
         assert_eq!(models, [0, 1, 2, 3, 4]);
         assert!(found.undecided.is_none());
-        assert_eq!(found.posterior.expect("one is weighed").copies_sought, Some(true));
+        assert_eq!(found.posterior.expect("a posterior").copies_sought, Some(true));
     }
 
     #[test]
@@ -326,8 +346,8 @@ mod tests {
             let found = answered(Some(&prior), |_| Vector3::zeros()).unwrap();
             found.posterior.unwrap().explanations[0].ln_evidence
         };
-        // Two standard deviations cost two nats; the pose itself is known to 0.015 m at the camera, 3 m from the
-        // points: ½ · 0.1²/(0.05² + 0.015²) = 1.83.
+        // Two standard deviations cost two nats. The pose itself has σ = 0.015 m at the camera, 3 m from the points: ½
+        // · 0.1²/(0.05² + 0.015²) = 1.83.
         let cost = evidence(0.0) - evidence(0.1);
         assert!((1.73..1.93).contains(&cost), "{cost}");
     }

@@ -1,4 +1,4 @@
-//! Spectral matching: the principal eigenvector of the agreements.
+//! Spectral matching: the principal eigenvector of the agreement matrix.
 
 use rand::Rng;
 use seafix_component::{Component, in_range};
@@ -12,22 +12,25 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Maximises xᵀ M x over |x| = 1, M_ab = 1 − (| |P_a P_b| − |C_a C_b| | / Δ_ab)² for coherent pairs a, b: the principal
-/// eigenvector, by power iteration. Pairs are then taken by falling weight, each that is admissible with those taken.
+/// Spectral matching (Leordeanu and Hebert 2005).
 ///
-/// Exact for the relaxed problem only: nothing is proved of the set. E operations an iteration, E the edges of
-/// the graph, after N²/2 pair tests for N candidate pairs. Where true pairs are few among many accidental agreements
-/// the eigenvector spreads over those.
+/// Maximises xᵀ M x over |x| = 1, M_ab = 1 − (| |P_a P_b| − |C_a C_b| | / Δ_ab)² for coherent pairs a, b: the principal
+/// eigenvector, by power iteration. Pairs are then added in descending order of their weight if they are admissible
+/// with the set.
+///
+/// Exact for the relaxed problem only, without a proof for the set. E operations an iteration for E edges of the graph,
+/// after N²/2 pair tests for N candidate pairs. If true pairs are few among many accidental agreements, the eigenvector
+/// spreads over the latter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Spectral {
-    /// Whether mirror images are refused; `false` is distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only.
     pub(crate) orientation: bool,
-    /// Power iterations at most.
+    /// Maximum number of power iterations.
     pub(crate) iterations: usize,
-    /// More candidate pairs than this are not searched (40 000 take 200 MB).
+    /// Maximum number of candidate pairs; more are rejected (40 000 take 200 MB).
     pub(crate) max_pairs: usize,
-    /// Nor more edges than this (8 bytes each).
+    /// Maximum number of edges; more are rejected (8 bytes each).
     pub(crate) max_edges: usize,
 }
 
@@ -43,8 +46,8 @@ impl Component for Spectral {
     const SOURCE: &'static str = "Leordeanu, Hebert, A spectral technique for correspondence problems using pairwise \
                                   constraints, 2005";
     const PROPERTIES: seafix_component::Properties = &[
-        ("maximises", "xᵀ M x over |x| = 1, M the agreements of pairs; pairs are taken by falling weight"),
-        ("exact", "for the relaxed problem only: nothing is proved of the set"),
+        ("maximises", "xᵀ M x over |x| = 1, M the agreements of pairs; pairs are added by descending weight"),
+        ("exact", "for the relaxed problem only: no proof for the set"),
         ("time", "K²/2 pair tests for K candidate pairs, then E operations an iteration for E agreeing ones"),
     ];
 
@@ -66,7 +69,7 @@ impl Search for Spectral {
         for _ in 0..self.iterations {
             affinity.products(&x, &mut next, &mut plain);
             pair_tests += affinity.edges() as u64;
-            // Half of the last vector keeps eigenvalues of opposite sign from taking turns.
+            // Half of the last vector prevents eigenvalues of opposite sign from alternating.
             let scale = next.iter().copied().fold(0.0, f64::max);
             next.iter_mut().zip(&x).for_each(|(next, x)| *next += 0.5 * scale * x);
             if !normalized(&mut next) {

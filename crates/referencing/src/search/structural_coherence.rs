@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Which samples of q model points are tried.
+/// The kind of samples of q model points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Samples {
@@ -23,20 +23,22 @@ pub enum Samples {
     Combinations,
 }
 
-/// The paper's Stage 2: for q from n down to 3, for each sample of q model points in lexicographic
-/// order, for each choice of one candidate a point, all q(q − 1)/2 distances are compared; the
-/// first sample that agrees in all is the answer.
+/// The paper's Stage 2: enumeration of ordered samples, the longest first.
 ///
-/// Σ_q n!/(n − q)! m^q choices of m candidates a point; with combinations q! times fewer. What the answer says is exact,
-/// what it costs is not bearable beyond some ten points: the budget ends it, and the refusal tells how far it came.
+/// For q from n down to 3, for each sample of q model points in lexicographic order, for each choice of one candidate a
+/// point, all q(q − 1)/2 distances are compared. The first sample whose distances all agree is the answer.
+///
+/// There are Σ_q n!/(n − q)! m^q choices of m candidates a point, with combinations q! times fewer. The answer is
+/// exact, but its cost is prohibitive beyond some ten points: the budget ends the search, and the rejection states the
+/// best set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StructuralCoherence {
-    /// Which samples are tried.
+    /// Kind of samples.
     pub samples: Samples,
-    /// Whether mirror images are refused; `false` is the paper's distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only, as in the paper.
     pub orientation: bool,
-    /// Pair tests before it gives up.
+    /// Maximum number of pair tests.
     pub budget: u64,
 }
 
@@ -54,9 +56,9 @@ impl Component for StructuralCoherence {
     const PROPERTIES: seafix_component::Properties = &[
         (
             "maximises",
-            "the number of model points in the first coherent sample, longest samples first, candidates from the shells",
+            "the number of model points in the first coherent sample, longest samples first, candidates from the gates",
         ),
-        ("exact", "within its budget, of coherence alone"),
+        ("exact", "within its budget, for coherence alone"),
         ("time", "Σ_q n!/(n − q)! m^q choices of m candidates a point; with combinations q! times fewer"),
     ];
 
@@ -71,8 +73,8 @@ impl Search for StructuralCoherence {
         if with_candidates < NEEDED {
             return Err(Rejected::TooFew { with_candidates, needed: NEEDED });
         }
-        // Points are numbered by their coordinates: the answer does not depend on the order they came in.
-        // A model point without candidates is in no sample's product: leaving it out changes no answer.
+        // Sorted by coordinates: the answer does not depend on the order of the points. A model point without
+        // candidates contributes no choice: skipping it changes no answer.
         let vertices = vertices(problem);
         let choices: Vec<usize> = vertices.iter().map(|pair| pair.cloud).collect();
         let mut lists = Vec::new();
@@ -89,28 +91,28 @@ impl Search for StructuralCoherence {
 /// The budget is spent.
 struct Spent;
 
-/// What is left of a sample's choices.
+/// The result of a sample's choices.
 enum Product {
-    /// The first that is coherent.
+    /// The first coherent choice.
     Coherent(Vec<Correspondence>),
-    /// None; no point after this place of the sample was looked at.
+    /// No coherent choice; no point after this place of the sample was examined.
     Refused { deepest: usize },
 }
 
-/// How all samples are refused that begin with the same points.
+/// The rejection of all samples that begin with the same points.
 struct Refused {
-    /// The last of these points; none after it is looked at.
+    /// The last of these points; no later one is examined.
     deepest: usize,
-    /// What that costs for one choice of candidates of the points that follow: pair tests, and drawing.
+    /// Cost for one choice of candidates of the later points: pair tests, and sampling.
     pair_tests: u64,
     sampled: u64,
 }
 
-/// To draw a sample of q points costs as much as q²/256 pair tests: nothing at the paper's scale, and more than its tests
-/// among hundreds of points, of which the first two usually disagree.
+/// Divisor of the cost of a sample: a sample of q points costs q²/256 pair tests. That is nothing at the paper's scale,
+/// but exceeds the tests among hundreds of points, the first two of which usually disagree.
 const DRAWING: u64 = 256;
 
-/// Samples of model points, longest first, and the choices of one candidate each.
+/// Samples of model points, longest first, with the choices of one candidate each.
 pub(super) struct Enumeration<'a> {
     problem: &'a Problem<'a>,
     /// Model points and their candidates.
@@ -119,11 +121,11 @@ pub(super) struct Enumeration<'a> {
     orientation: bool,
     budget: u64,
     pair_tests: u64,
-    /// What drawing samples has cost, in pair tests.
+    /// Cost of sampling so far, in pair tests.
     sampled: u64,
-    /// Size of the largest coherent set met so far, as the beginning of a longer sample.
+    /// Size of the largest coherent set so far, as the beginning of a longer sample.
     best: usize,
-    /// Size of the first, hence largest, coherent sample that was wholly a mirror image.
+    /// Size of the first, hence largest, coherent sample that was entirely a mirror image.
     mirrored: Option<usize>,
 }
 
@@ -138,17 +140,17 @@ impl<'a> Enumeration<'a> {
         Self { problem, lists, samples, orientation, budget, pair_tests: 0, sampled: 0, best: 0, mirrored: None }
     }
 
-    /// The first coherent sample, of at most `longest` points.
+    /// The first coherent sample of at most `longest` points.
     pub(super) fn run(mut self, longest: usize) -> Result<Identification, Rejected> {
         for q in (NEEDED..=self.lists.len().min(longest)).rev() {
             match self.samples_of(q) {
-                // Three points have no orientation: these are what is left of a mirror image.
+                // Three points have no orientation: they are the remainder of a mirror image.
                 Ok(Some(_)) if q == NEEDED && self.mirrored.is_some() => {
                     return Err(Rejected::Mirrored { best: self.mirrored.unwrap_or(q), proved: true });
                 }
                 Ok(Some(mut pairs)) => {
                     pairs.sort_unstable();
-                    // A longer sample was a mirror image: what is left of it is no fix.
+                    // A longer sample was a mirror image: its remainder is no fix.
                     let undecided = self.mirrored.map(|best| Rejected::Mirrored { best, proved: false });
                     return Ok(Identification {
                         optimal: true,
@@ -165,7 +167,7 @@ impl<'a> Enumeration<'a> {
                 }
             }
         }
-        // Two that agree and begin no sample of three were not met.
+        // Two points that agree but begin no sample of three were not met.
         if self.best < 2 && self.lists.len() >= 2 {
             match self.samples_of(2) {
                 Ok(Some(_)) => self.best = 2,
@@ -188,7 +190,7 @@ impl<'a> Enumeration<'a> {
                 Product::Coherent(found) => return Ok(Some(found)),
                 Product::Refused { deepest } => deepest,
             };
-            // All later samples that begin with the same points are refused by the same tests: they are counted, not made.
+            // All later samples with the same beginning fail the same tests: they are counted without being made.
             let after = self.choices(&sample[deepest + 1..]);
             let fraction = |spent: u64| (u128::from(spent) / after) as u64;
             let refused = Refused {
@@ -205,8 +207,8 @@ impl<'a> Enumeration<'a> {
 
     /// The first coherent choice of one candidate for each of these model points.
     ///
-    /// Where a candidate disagrees with one chosen before, so does every choice that begins alike, after as many tests: these are
-    /// counted together.
+    /// If a candidate disagrees with an earlier choice, so does every choice with the same beginning, after as many
+    /// tests: these are counted together.
     fn product_of(&mut self, sample: &[usize]) -> Result<Product, Spent> {
         let q = sample.len();
         let mut after = vec![1_u128; q];
@@ -249,12 +251,13 @@ impl<'a> Enumeration<'a> {
         }
     }
 
-    /// Counts so many choices for a sample of `q` points that each end after as many tests, in which the first `agree` points were
-    /// found to agree.
+    /// Counts `choices` that each end after `pair_tests`.
+    ///
+    /// They belong to a sample of `q` points, the first `agree` of which were in agreement.
     fn count(&mut self, q: usize, pair_tests: u64, choices: u128, agree: usize) -> Result<(), Spent> {
         let drawing = (q * q) as u64 / DRAWING;
         let full = u128::from(self.left() / (drawing + pair_tests)).min(choices);
-        // No more than the budget.
+        // At most the budget.
         self.pair_tests += full as u64 * pair_tests;
         self.sampled += full as u64 * drawing;
         if full > 0 {
@@ -263,7 +266,7 @@ impl<'a> Enumeration<'a> {
         if full == choices {
             return Ok(());
         }
-        // The next choice is the one in which the budget ends.
+        // The budget ends in the next choice.
         self.sampled += drawing;
         let last = self.left();
         self.pair_tests += last;
@@ -272,12 +275,12 @@ impl<'a> Enumeration<'a> {
         Err(Spent)
     }
 
-    /// What is left of the budget.
+    /// The remaining budget.
     fn left(&self) -> u64 {
         self.budget.saturating_sub(self.pair_tests + self.sampled)
     }
 
-    /// Whether no four of pairs that agree in all distances are mirrored.
+    /// Whether no four of the pairs, which agree in all distances, are mirrored.
     fn upright(&mut self, pairs: &[Correspondence]) -> Result<bool, Spent> {
         if !self.orientation {
             return Ok(true);
@@ -297,13 +300,14 @@ impl<'a> Enumeration<'a> {
         Ok(true)
     }
 
-    /// Counts the samples after this one that begin with the same points up to the deepest place that was looked at, without looking
-    /// at them. Where the budget ends in one of them, that one is looked at.
+    /// Counts the later samples with the same beginning, up to the deepest place examined.
+    ///
+    /// They are not examined, except the one in which the budget ends.
     fn pass_over(&mut self, refused: &Refused, sample: &mut [usize]) -> Result<(), Spent> {
         if refused.deepest + 1 == sample.len() {
             return Ok(());
         }
-        // Of the samples that begin like this one up to `place`, this one is counted already.
+        // This sample is already counted among those that begin like it up to `place`.
         let (mut place, mut counted) = (refused.deepest, self.choices(&sample[refused.deepest + 1..]));
         let each = u128::from(refused.pair_tests + refused.sampled);
         loop {
@@ -326,13 +330,13 @@ impl<'a> Enumeration<'a> {
         }
     }
 
-    /// The choices of one candidate for each of these model points.
+    /// The number of choices of one candidate for each of these model points.
     fn choices(&self, sample: &[usize]) -> u128 {
         sample.iter().fold(1, |product, &place| product.saturating_mul(self.lists[place].1.len() as u128))
     }
 
-    /// The choices of candidates for what follows after `place` in all samples that begin like this one: the sum, over these
-    /// samples, of products. Exact up to `max`, and otherwise more than that.
+    /// The number of choices of candidates after `place` in all samples with the same beginning: the sum of products
+    /// over these samples. Exact up to `max`, and otherwise greater than `max`.
     fn continuations(&self, sample: &[usize], place: usize, max: u128) -> u128 {
         let (begun, q) = (&sample[..=place], sample.len() - place - 1);
         let follows = |point: &usize| match self.samples {
@@ -357,16 +361,17 @@ impl<'a> Enumeration<'a> {
     }
 }
 
-/// The pairs of so many points.
+/// The number of pairs of n points.
 fn all_pairs(points: usize) -> u64 {
     (points * points.saturating_sub(1) / 2) as u64
 }
 
-/// The sum of the products of all subsets of `k` of these numbers, none of which is 0: the elementary symmetric polynomial.
-/// Exact up to `max`, and otherwise more than that.
+/// The elementary symmetric polynomial: the sum of the products of all subsets of `k` of these positive numbers.
+///
+/// Exact up to `max`, and otherwise greater than `max`.
 fn products(numbers: &[u128], k: usize, max: u128) -> u128 {
     let n = numbers.len();
-    // There are as many subsets: where there are too many, nothing needs to be summed up.
+    // The number of subsets is a lower bound: if it exceeds `max`, no sum is needed.
     let mut subsets = 1_u128;
     for i in 0..k.min(n - k) {
         subsets = subsets.saturating_mul((n - i) as u128) / (i as u128 + 1);
@@ -377,7 +382,7 @@ fn products(numbers: &[u128], k: usize, max: u128) -> u128 {
     let mut sums = vec![0_u128; k + 1];
     sums[0] = 1;
     for (i, number) in numbers.iter().enumerate() {
-        // Smaller subsets would not grow to k numbers any more.
+        // Smaller subsets could no longer grow to k numbers.
         let min = (k + i + 1).saturating_sub(n).max(1);
         for size in (min..=k.min(i + 1)).rev() {
             sums[size] = sums[size].saturating_add(sums[size - 1].saturating_mul(*number));
@@ -397,8 +402,9 @@ fn next_combination(sample: &mut [usize], place: usize, n: usize) -> bool {
     true
 }
 
-/// The next ordered sample of `0..n` without repetition, in lexicographic order, that differs at `place` or before; false after the
-/// last.
+/// The next ordered sample of `0..n` without repetition that differs at `place` or before; false after the last.
+///
+/// The order is lexicographic.
 fn next_arrangement(sample: &mut [usize], place: usize, n: usize) -> bool {
     for place in (0..=place).rev() {
         let next = (sample[place] + 1..n).find(|value| !sample[..place].contains(value));
@@ -406,7 +412,7 @@ fn next_arrangement(sample: &mut [usize], place: usize, n: usize) -> bool {
             sample[place] = value;
             for later in place + 1..sample.len() {
                 let min = (0..n).find(|value| !sample[..later].contains(value));
-                sample[later] = min.expect("a sample is not longer than what it is drawn from");
+                sample[later] = min.expect("a sample is not longer than its population");
             }
             return true;
         }
@@ -451,7 +457,7 @@ mod tests {
 
     const PLACES: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.5, 0.0], [3.0, 0.4, 1.1]];
 
-    /// Model points and a cloud, point i of it the only candidate of point i.
+    /// Model points and a cloud, whose point i is the only candidate of model point i.
     struct Scene {
         model: Vec<ModelPoint>,
         cloud: Vec<MeasuredPoint>,
@@ -510,8 +516,10 @@ mod tests {
         assert_eq!(budget_of(&ended), (6, 4, 4));
     }
 
-    /// The last of four points agrees with none: it is met at once in first and second place, after one test in third and after three
-    /// in fourth, so that the 24 arrangements take 6 (1 + 1 + 2 + 4) tests and the first three points 3 more. Of subsets it is 4 + 3.
+    /// The last of four points agrees with none.
+    ///
+    /// It is detected after one test in first, second and third place, and after three tests in fourth: the 24
+    /// permutations take 6 (1 + 1 + 2 + 4) tests and the first three points 3 more. Combinations take 4 + 3.
     #[test]
     fn a_point_that_agrees_with_none_costs_what_its_samples_cost() {
         let mut cloud = PLACES;
@@ -528,7 +536,7 @@ mod tests {
         }
     }
 
-    /// Sixteen points agree by 120 distances and 1820 volumes, and to draw them costs as much as one more.
+    /// Sixteen points agree by 120 distances and 1820 volumes, and sampling them costs as much as one more.
     #[test]
     fn to_draw_sixteen_points_costs_as_much_as_a_test() {
         let places: Vec<[f64; 3]> =
@@ -540,7 +548,7 @@ mod tests {
         assert_eq!(budget_of(&ended), (1940, 16, 16));
     }
 
-    /// No three points agree: of three whose second and third do, the two are found, by arrangements or by pairs in the end.
+    /// No three points agree: the two of them that do are found, by permutations or by pairs in the end.
     #[test]
     fn the_size_of_the_largest_set_is_reported_where_it_is_too_small() {
         let (model, mut cloud) = (&PLACES[..3], [[9.0, 9.0, 9.0], PLACES[1], PLACES[2]]);
@@ -565,7 +573,7 @@ mod tests {
         assert_eq!(Scene::of(model, &cloud[..2]).search(&search(Samples::Permutations, 9)), Err(few));
     }
 
-    /// Four points and their mirror image: no fix with orientation, and one without.
+    /// Four points and their mirror image: no fix with orientation, a fix without.
     #[test]
     fn a_mirror_image_is_reported_with_its_size() {
         let image = PLACES.map(|[x, y, z]| [x, y, -z]);
@@ -577,7 +585,7 @@ mod tests {
         }
     }
 
-    /// The four flat points of a mirror image of six fit a motion as well: what they say is undecided.
+    /// Four coplanar points of a mirror image of six also fit a motion: the result is undecided.
     #[test]
     fn the_flat_part_of_a_mirror_image_is_undecided() {
         let model =
@@ -588,7 +596,7 @@ mod tests {
         assert_eq!(found.undecided, Some(Rejected::Mirrored { best: 6, proved: false }));
     }
 
-    /// The first candidates of the list of each point are tried first, those of the last point in turn.
+    /// The first candidates of each list are tried first; those of the last point change fastest.
     #[test]
     fn every_choice_of_candidates_is_tried() {
         let cloud = [[50.0, 0.0, 0.0], [60.0, 9.0, 0.0], [70.0, 0.0, 7.0], PLACES[0], PLACES[1], PLACES[2]];
@@ -599,7 +607,7 @@ mod tests {
         assert_eq!(found.pairs, expected);
     }
 
-    /// All that a search may say, made test by test: samples, choices and pairs in the order that the enumeration counts them in.
+    /// The search test by test: samples, choices and pairs in the order in which the enumeration counts them.
     fn literally(scene: &Scene, problem: &Problem<'_>, search: &StructuralCoherence) -> (Option<usize>, u64, usize) {
         let n = scene.model.len();
         let (mut pair_tests, mut sampled, mut best) = (0, 0, 0);
@@ -652,10 +660,12 @@ mod tests {
         (Some(0), pair_tests, best)
     }
 
-    /// What is counted is what would be tested one by one, wherever the budget ends: at every budget up to the end of small searches,
-    /// and at some of one whose samples are long enough for their drawing to count.
+    /// The counts equal those of a search test by test.
     ///
-    /// Seen to fail with one test too few where a candidate disagrees, and with the sample itself counted twice.
+    /// They are compared at every budget up to the end of small searches, and at some budgets of a search whose samples
+    /// are long enough for their sampling to count.
+    ///
+    /// Fails with one test too few after a disagreement, and with the sample itself counted twice.
     #[test]
     fn what_is_counted_is_what_would_be_tested_one_by_one() {
         use rand::RngExt;

@@ -1,25 +1,25 @@
-//! Signs of many tetrahedra quickly.
+//! Fast signs of tetrahedron volumes.
 
 use nalgebra::Vector3;
 
 use super::orientation::Sense;
 use crate::{Correspondence, Problem};
 
-/// Where each vertex is in model and cloud, side by side, and the exact test behind it.
+/// Coordinates of each vertex in model and cloud, with the exact test of orientation.
 ///
-/// Three vertices span a plane in the model and one in the cloud; a fourth lies on the same side of both, or is
-/// looked at closely.
+/// Three vertices span a plane in the model and one in the cloud. If a fourth does not lie on the same side of both,
+/// the exact test decides.
 #[derive(Debug)]
 pub(super) struct Volumes<'a> {
     problem: &'a Problem<'a>,
     vertices: &'a [Correspondence],
-    /// Places in model and cloud, from those of the first vertex.
+    /// Coordinates in model and cloud, relative to the first vertex.
     at: Vec<[Vector3<f64>; 2]>,
-    /// A product of two volumes nearer to zero than this (m⁶) is not trusted to have the right sign.
+    /// Product of two volumes (m⁶) below which its sign is not trusted.
     doubt: f64,
 }
 
-/// Normals of the planes of three vertices in model and cloud, and the vertex they start from.
+/// Normals of the planes of three vertices in model and cloud, and the vertices.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Plane {
     three: [usize; 3],
@@ -33,7 +33,7 @@ impl<'a> Volumes<'a> {
         let origin = vertices.first().map_or([Vector3::zeros(); 2], place);
         let at: Vec<_> = vertices.iter().map(place).map(|[m, c]| [m - origin[0], c - origin[1]]).collect();
         let extent = |side: usize| at.iter().map(|place: &[Vector3<f64>; 2]| place[side].amax()).fold(0.0, f64::max);
-        // A volume is no greater than 42 extents cubed and rounded by 10⁻¹³ of one.
+        // A volume is at most 42 extents cubed, with a rounding error of 10⁻¹³ of one.
         let doubt = 4e-12 * (extent(0) * extent(1)).powi(3);
         Self { problem, vertices, at, doubt }
     }
@@ -43,7 +43,7 @@ impl<'a> Volumes<'a> {
         Plane { three, normals: [0, 1].map(|side| (b[side] - a[side]).cross(&(c[side] - a[side]))) }
     }
 
-    /// Whether the plane's three and `fourth` contradict the sense.
+    /// Whether the plane's three vertices and `fourth` contradict the sense.
     pub(super) fn refuses(&self, sense: Sense, plane: &Plane, fourth: usize) -> bool {
         let Some(sign) = sense.sign() else { return false };
         let (a, d) = (&self.at[plane.three[0]], &self.at[fourth]);
@@ -52,17 +52,17 @@ impl<'a> Volumes<'a> {
         !(sign * product > self.doubt) && self.contradict(sense, [a, b, c, fourth])
     }
 
-    /// Whether four vertices contradict the sense, by a close look.
+    /// Whether four vertices contradict the sense, by the exact test.
     pub(super) fn contradict(&self, sense: Sense, four: [usize; 4]) -> bool {
         sense.refuses(self.problem, four.map(|v| self.vertices[v]))
     }
 
-    /// What the product of two volumes must exceed (m⁶) for its sign to be trusted.
+    /// Product of two volumes (m⁶) below which its sign is not trusted.
     pub(super) fn doubt(&self) -> f64 {
         self.doubt
     }
 
-    /// Where a vertex is in the model, then in the cloud, axis by axis.
+    /// Coordinates of a vertex in the model, then in the cloud.
     pub(super) fn place(&self, vertex: usize) -> [f64; 6] {
         let [model, cloud] = self.at[vertex];
         [model.x, model.y, model.z, cloud.x, cloud.y, cloud.z]

@@ -13,25 +13,27 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// Maximises the density uᵀ M u / uᵀ u of a set of candidate pairs over u ≥ 0 with u_a u_b = 0 wherever a and b are not
-/// coherent; M_ab = exp(−½ (3 d/Δ)²), d the difference of the two distances, M_aa = 1. Not the largest set but the one
-/// that agrees best, size counting through the sum.
+/// CLIPPER (Lusk, Fathian and How 2021): the densest consistent set.
 ///
-/// Projected gradient ascent on uᵀ M u − d Σ u_a u_b over the incoherent pairs, the penalty d growing until
-/// none of them is left in the support, which is the answer. A local maximum: nothing is proved. E operations a step, E the edges, after
-/// N²/2 pair tests for N candidate pairs.
+/// Maximises uᵀ M u / uᵀ u over u ≥ 0 with u_a u_b = 0 for incoherent candidate pairs a and b; M_ab = exp(−½ (3 d/Δ)²),
+/// d the difference of the two distances, M_aa = 1. The answer is not the largest set but the one that agrees best,
+/// with the size counted through the sum.
+///
+/// Projected gradient ascent on uᵀ M u − d Σ u_a u_b over the incoherent pairs; the penalty d grows until the support,
+/// which is the answer, has no incoherent pair. The result is a local maximum without a proof. E operations a step for
+/// E edges, after N²/2 pair tests for N candidate pairs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct WeightedClique {
-    /// Whether mirror images are refused; `false` is distances alone.
+    /// Whether mirror images are rejected; `false` compares distances only.
     pub(crate) orientation: bool,
-    /// Gradient steps at most.
+    /// Maximum number of gradient steps.
     pub(crate) iterations: usize,
-    /// Operations on edges, and pair tests, before the ascent ends.
+    /// Maximum number of edge operations and pair tests.
     pub(crate) budget: u64,
-    /// More candidate pairs than this are not searched (40 000 take 200 MB).
+    /// Maximum number of candidate pairs; more are rejected (40 000 take 200 MB).
     pub(crate) max_pairs: usize,
-    /// Nor more edges than this (8 bytes each).
+    /// Maximum number of edges; more are rejected (8 bytes each).
     pub(crate) max_edges: usize,
 }
 
@@ -85,11 +87,11 @@ impl Search for WeightedClique {
     }
 }
 
-/// A point u on the sphere, u ≥ 0, and the penalty.
+/// A point u ≥ 0 on the unit sphere, with the penalty.
 struct Ascent<'a> {
     affinity: &'a Affinity,
     u: Vec<f64>,
-    /// M u and C̄ u, C̄ the graph of incoherent pairs.
+    /// M u and C̄ u, with the graph C̄ of incoherent pairs.
     weighted: Vec<f64>,
     apart: Vec<f64>,
     penalty: f64,
@@ -98,11 +100,11 @@ struct Ascent<'a> {
     products: u64,
 }
 
-/// Weights below this share of the whole count as none.
+/// Weight, as a fraction of the total, below which a pair does not count.
 const NONE: f64 = 1e-6;
 
 impl<'a> Ascent<'a> {
-    /// From the numbers of neighbours; the penalty as large as what is gained on average.
+    /// Start from the numbers of neighbours, with a penalty equal to the mean gain.
     fn of(affinity: &'a Affinity, count: usize) -> Self {
         let mut plain = vec![0.0; count];
         let mut weighted = vec![0.0; count];
@@ -126,7 +128,7 @@ impl<'a> Ascent<'a> {
         self.density = self.u.iter().zip(&self.weighted).map(|(u, m)| u * m).sum();
     }
 
-    /// Mean of (M u)_a / (C̄ u)_a over the support where there is something incoherent.
+    /// Mean of (M u)_a / (C̄ u)_a over the support with an incoherent pair; `None` without one.
     fn balance(&self) -> Option<f64> {
         let ratios = self.u.iter().zip(&self.weighted).zip(&self.apart);
         let ratios: Vec<f64> =
@@ -138,7 +140,7 @@ impl<'a> Ascent<'a> {
         self.density - self.penalty * self.u.iter().zip(&self.apart).map(|(u, apart)| u * apart).sum::<f64>()
     }
 
-    /// One step uphill; false where it gains nothing.
+    /// One ascent step; false if it gains nothing.
     fn climb(&mut self) -> bool {
         let (before, from) = (self.value(), self.u.clone());
         let gradient: Vec<f64> =
@@ -159,7 +161,7 @@ impl<'a> Ascent<'a> {
         false
     }
 
-    /// A greater penalty; false where nothing incoherent is left.
+    /// Increases the penalty; false if no incoherent pair is left.
     fn penalize(&mut self) -> bool {
         let more = self.balance();
         self.penalty += more.unwrap_or(0.0).max(0.5 * self.penalty);

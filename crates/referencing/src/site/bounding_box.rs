@@ -1,23 +1,25 @@
-//! Min–max shells: boxes along the axes of a frame.
+//! Bounding boxes along the axes of a frame.
 
 use seafix_geometry::{Frame, Point};
 
-/// The smallest box along the axes of `F` that contains a set of points (the paper's min–max shell).
+/// The smallest box along the axes of `F` that contains a set of points.
+///
+/// It is the paper's min–max shell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundingBox<F> {
-    /// The corner with the least coordinates (m).
+    /// The corner with the smallest coordinates (m).
     pub min: Point<F>,
-    /// The corner with the greatest coordinates (m).
+    /// The corner with the largest coordinates (m).
     pub max: Point<F>,
 }
 
 impl<F: Frame> BoundingBox<F> {
-    /// The shell of these points: every face touches one. `None` of no points.
+    /// The bounding box of the points, each face touching one; `None` without points.
     pub fn around(points: impl IntoIterator<Item = Point<F>>) -> Option<Self> {
         points.into_iter().map(|point| Self { min: point, max: point }).reduce(|a, b| a.union(&b))
     }
 
-    /// The smallest shell that contains both.
+    /// The smallest box that contains both boxes.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
@@ -31,7 +33,9 @@ impl<F: Frame> BoundingBox<F> {
         self.grown_contains(point, 0.0)
     }
 
-    /// Whether the point lies inside the shell moved outwards by `margin` (m), or on its face.
+    /// Whether the point lies in the box enlarged by `margin` (m) on every side.
+    ///
+    /// Its faces belong to the box.
     pub fn grown_contains(&self, point: &Point<F>, margin: f64) -> bool {
         (0..3).all(|axis| {
             point.coords[axis] >= self.min.coords[axis] - margin && point.coords[axis] <= self.max.coords[axis] + margin

@@ -1,4 +1,4 @@
-//! What can be wrong with a site, all of it at once.
+//! The validation of a site, with all faults at once.
 
 use std::{collections::HashMap, path::Path};
 
@@ -12,21 +12,23 @@ use super::{
     target::diameter,
 };
 
-/// Feature points nearer than this (m) are one point written twice.
+/// The distance (m) below which two feature points coincide.
 pub(crate) const COINCIDENT: f64 = 1e-6;
-/// Sine of the angle at P1 below which the base defines no frame.
+/// The sine of the angle at P1 below which the base defines no frame.
 const COLLINEAR: f64 = 1e-3;
-/// Sine of the angle at P1 below which the base's frame is poorly defined.
+/// The sine of the angle at P1 below which the base defines its frame poorly.
 const NEARLY_COLLINEAR: f64 = 0.1;
-/// How far base coordinates may be from the Fig. 2 rule (m).
+/// The tolerance (m) of base coordinates in the Fig. 2 rule.
 const RULE: f64 = 1e-6;
-/// Diameters (m) that make one suspect millimetres or kilometres, and those that no object has.
+/// The range of plausible diameters (m), and the range of possible ones.
+///
+/// Millimetres or kilometres are suspected outside of the first.
 pub(crate) const SUSPICIOUS: [f64; 2] = [0.01, 1e3];
 const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
-/// Standard deviations by which surveyed distances may differ from the model's.
+/// The allowed difference of surveyed and model distances, in standard deviations.
 const SURVEY_SIGMAS: f64 = 4.0;
 
-/// Collects faults and warnings; knows where in the text a key stands.
+/// The collected faults and warnings, with the text for their line numbers.
 struct Checker<'a> {
     text: &'a str,
     file: &'a Path,
@@ -43,7 +45,7 @@ impl Checker<'_> {
         self.faults.push(fault);
     }
 
-    /// Three finite coordinates, or a fault that names whose they are.
+    /// Adds a fault unless the coordinates are finite.
     fn finite(&mut self, what: &str, values: &[f64], path: &[&str]) {
         if !values.iter().all(|value| value.is_finite()) {
             let fault = self.at(format!("{what} is not finite"), path).value(format!("{values:?}"));
@@ -51,23 +53,23 @@ impl Checker<'_> {
         }
     }
 
-    /// A direction: finite, and not zero.
+    /// Adds a fault unless the direction is finite and nonzero.
     fn direction(&mut self, what: &str, normal: &[f64; 3], path: &[&str]) {
         self.finite(what, normal, path);
         if Vector3::from(*normal).norm() < 1e-9 {
-            let fault = self.at(format!("{what} has no direction"), path).value(format!("{normal:?}"));
-            self.fault(fault.remedy("give the direction from which the point is seen, or leave it out"));
+            let fault = self.at(format!("{what} is a zero vector"), path).value(format!("{normal:?}"));
+            self.fault(fault.remedy("give the direction from which the point is visible, or omit the key"));
         }
     }
 
     fn sigma(&mut self, what: &str, value: f64, path: &[&str]) {
         if !(value >= 0.0 && value.is_finite()) {
-            let fault = self.at(format!("{what} is no standard deviation"), path).value(value);
+            let fault = self.at(format!("{what} is not a standard deviation"), path).value(value);
             self.fault(fault.remedy("give a finite number of metres, zero or more"));
         }
     }
 
-    /// Every id but once, and not empty.
+    /// Adds a fault for every empty or repeated identifier.
     fn unique<'i>(&mut self, kind: &str, ids: impl Iterator<Item = &'i str>, path: impl Fn(&str) -> Vec<String>) {
         let mut seen: HashMap<&str, usize> = HashMap::new();
         for (index, id) in ids.enumerate() {
@@ -75,14 +77,15 @@ impl Checker<'_> {
                 let path = path(&index.to_string());
                 line_of(self.text, &path.iter().map(String::as_str).collect::<Vec<_>>())
             };
-            let here = Fault::new(format!("{kind} id"), self.file).on_line(line(index)).value(format!("`{id}`"));
+            let here =
+                Fault::new(format!("{kind} id is empty"), self.file).on_line(line(index)).value(format!("`{id}`"));
             if id.is_empty() {
-                self.faults.push(here.remedy("give it a name"));
+                self.faults.push(here.remedy("give a name"));
             } else if let Some(first) = seen.insert(id, index) {
                 let first = line(first).map_or(String::new(), |line| format!(" on line {line}"));
                 self.faults.push(
                     Fault { what: format!("{kind} id is used twice"), ..here }
-                        .remedy(format!("it is already used{first}; give each its own")),
+                        .remedy(format!("it is already used{first}; choose another id")),
                 );
             }
         }
@@ -93,11 +96,11 @@ impl Checker<'_> {
 pub(super) fn site(raw: &SiteFile, text: &str, file: &Path) -> Result<Site, Vec<Fault>> {
     let mut check = Checker { text, file, faults: Vec::new(), warnings: Vec::new() };
     if raw.axes != AXES {
-        let fault = check.at("unknown rule of axes", &["axes"]).value(format!("`{}`", raw.axes));
-        check.fault(fault.remedy(format!("this reader knows `{AXES}`")));
+        let fault = check.at("unknown axes rule", &["axes"]).value(format!("`{}`", raw.axes));
+        check.fault(fault.remedy(format!("this reader supports `{AXES}`")));
     }
     if raw.objects.is_empty() {
-        let fault = check.at("a site needs an object", &[]).value("0 objects");
+        let fault = check.at("site without objects", &[]).value("0 objects");
         check.fault(fault.remedy("add an [[object]]"));
     }
     check.unique("object", raw.objects.iter().map(|object| object.id.as_str()), |index| {
@@ -106,7 +109,7 @@ pub(super) fn site(raw: &SiteFile, text: &str, file: &Path) -> Result<Site, Vec<
     let ids = || raw.objects.iter().map(|object| object.id.as_str());
     let frame = ids().position(|id| id == raw.site_frame);
     if frame.is_none() && !raw.objects.is_empty() {
-        let fault = check.at("`site_frame` names no object", &["site_frame"]).value(format!("`{}`", raw.site_frame));
+        let fault = check.at("unknown object in `site_frame`", &["site_frame"]).value(format!("`{}`", raw.site_frame));
         check.fault(fault.remedy(suggestion(&raw.site_frame, ids())));
     }
     let objects: Vec<_> =
@@ -126,7 +129,7 @@ fn suggestion<'a>(word: &str, options: impl Iterator<Item = &'a str> + Clone) ->
     }
 }
 
-/// The object, or `None` when faults were found that leave it without meaning.
+/// The object, or `None` after a fault that makes it unusable.
 fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Option<SiteObject> {
     let before = check.faults.len();
     let number = index.to_string();
@@ -147,14 +150,14 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Opti
     for name in &raw.base {
         let found = raw.points.iter().position(|point| point.id == *name);
         if found.is_none() {
-            let fault = check.at(format!("{of}: base names no point"), &["object", &number, "base"]);
+            let fault = check.at(format!("{of}: unknown point in `base`"), &["object", &number, "base"]);
             let ids = raw.points.iter().map(|point| point.id.as_str());
             check.fault(fault.value(format!("`{name}`")).remedy(suggestion(name, ids)));
         }
         base.extend(found);
     }
     if check.faults.len() > before {
-        return None; // geometry of numbers or names that are wrong would only add noise
+        return None; // geometry tests of invalid numbers or names would only repeat the faults
     }
     let base: [usize; 3] = base.try_into().expect("each of the three names was found");
     let points: Vec<ModelPoint> = raw
@@ -193,12 +196,13 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Opti
     })
 }
 
-/// A unit vector is kept to the last bit, so that a file read and written stays the same.
+/// The unit vector; a vector that is already one stays unchanged to the last bit, so that a file read and written stays
+/// the same.
 fn unit(v: Vector3<f64>) -> Vector3<f64> {
     if (v.norm() - 1.0).abs() <= 1e-12 { v } else { v.normalize() }
 }
 
-/// B1: every number finite, every standard deviation one.
+/// B1: finite numbers and valid standard deviations.
 fn numbers(check: &mut Checker<'_>, raw: &ObjectFile, of: &str, number: &str) {
     check.sigma(&format!("{of}: `survey_sigma`"), raw.survey_sigma, &["object", number, "survey_sigma"]);
     for row in raw.base_in_world.iter().flatten() {
@@ -221,20 +225,19 @@ fn numbers(check: &mut Checker<'_>, raw: &ObjectFile, of: &str, number: &str) {
     }
 }
 
-/// B4 and B7: points apart from each other, and metres.
+/// B4 and B7: distinct points, and coordinates in metres.
 fn spread(check: &mut Checker<'_>, points: &[ModelPoint], of: &str, number: &str) {
     for (i, a) in points.iter().enumerate() {
         for b in points[..i].iter().filter(|b| a.at.distance(&b.at) < COINCIDENT) {
-            let fault =
-                check.at(format!("{of}: two points in one place"), &["object", number, "point", &i.to_string()]);
+            let fault = check.at(format!("{of}: coincident points"), &["object", number, "point", &i.to_string()]);
             check.fault(fault.value(format!("`{}` and `{}`", b.id, a.id)).remedy("remove one"));
         }
     }
     let extent = diameter(points);
     let fault = check
-        .at(format!("{of}: units?"), &["object", number])
-        .value(format!("its points lie within {} m of each other", seafix_component::number(extent)))
-        .remedy("coordinates are in metres");
+        .at(format!("{of}: implausible units"), &["object", number])
+        .value(format!("the diameter of its points is {} m", seafix_component::number(extent)))
+        .remedy("give coordinates in metres");
     if !(IMPOSSIBLE[0]..=IMPOSSIBLE[1]).contains(&extent) {
         check.fault(fault);
     } else if !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
@@ -242,39 +245,40 @@ fn spread(check: &mut Checker<'_>, points: &[ModelPoint], of: &str, number: &str
     }
 }
 
-/// B3, and the base coordinates obeying the rule that names the frame.
+/// B3: a base that is not collinear and obeys the rule of axes.
 fn frame_rule(check: &mut Checker<'_>, base: &[Point<Object>; 3], of: &str, number: &str) {
     let [p1, p2, p3] = base.map(|p| p.coords);
     let (a, b) = (p2 - p1, p3 - p1);
     let sine = a.cross(&b).norm() / (a.norm() * b.norm());
     let path = ["object", number, "base"];
     if !(sine >= COLLINEAR) {
-        let fault = check.at(format!("{of}: the base is collinear"), &path);
+        let fault = check.at(format!("{of}: collinear base"), &path);
         check.fault(fault.value(format!("sine {sine:.2e} at P1")).remedy("choose three points that span a plane"));
         return;
     }
     if sine < NEARLY_COLLINEAR {
-        let fault = check.at(format!("{of}: the base is nearly collinear"), &path);
+        let fault = check.at(format!("{of}: nearly collinear base"), &path);
         check
             .warnings
             .push(fault.value(format!("sine {sine:.3} at P1")).remedy("choose points that span a wider angle"));
     }
     let obeys = p1.norm() <= RULE && p3.y.abs() <= RULE && p3.z.abs() <= RULE && p3.x > 0.0 && p2.z.abs() <= RULE;
     if !(obeys && p2.y < 0.0) {
-        // The pose of the rule's own frame is what would repair the file: say what P2 and P3 become.
+        // The remedy states the coordinates of P2 and P3 in the frame of the rule.
         let d = b.norm();
         let (along, across) = (a.dot(&b) / d, a.cross(&b).norm() / d);
-        let fault = check.at(format!("{of}: the base breaks the rule of axes"), &path);
+        let fault = check.at(format!("{of}: the base violates the axes rule"), &path);
         check.fault(
             fault.value(format!("P1 {:?}, P2 {:?}, P3 {:?}", p1.as_slice(), p2.as_slice(), p3.as_slice())).remedy(format!(
-                "in the object's frame P1 is the origin, P2 = [{along}, {}, 0], P3 = [{d}, 0, 0]; move all its points there",
+                "transform all points of the object into the frame with P1 = [0, 0, 0], P2 = [{along}, {}, 0], P3 = \
+                 [{d}, 0, 0]",
                 -across
             )),
         );
     }
 }
 
-/// The surveyed distances of the base agree with the model's.
+/// Adds a fault if surveyed and model distances of the base disagree.
 fn survey(
     check: &mut Checker<'_>,
     world: &[Point<World>; 3],
@@ -288,12 +292,12 @@ fn survey(
         let variance = 2.0 * sigma * sigma + model[i].sigma.powi(2) + model[k].sigma.powi(2);
         let allowed = SURVEY_SIGMAS * variance.sqrt() + RULE;
         if !((surveyed - known).abs() <= allowed) {
-            let what = format!("{of}: survey and model disagree on P{} P{}", i + 1, k + 1);
+            let what = format!("{of}: survey and model disagree on the distance P{} P{}", i + 1, k + 1);
             let fault = check.at(what, &["object", number, "base_in_world"]);
             check.fault(
                 fault
                     .value(format!("{surveyed:.4} m surveyed, {known:.4} m in the model"))
-                    .remedy(format!("they may differ by {allowed:.2e} m; correct one, or `survey_sigma`")),
+                    .remedy(format!("the tolerance is {allowed:.2e} m; correct one of them, or `survey_sigma`")),
             );
         }
     }

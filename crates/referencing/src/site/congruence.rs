@@ -1,4 +1,4 @@
-//! Partial self-congruences: motions that map much of a model onto itself.
+//! Partial self-congruences: motions that map a large part of a model onto itself.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Object, Point, Transform, UncertainPoint};
@@ -6,45 +6,47 @@ use seafix_geometry::{Object, Point, Transform, UncertainPoint};
 use super::{ModelPoint, target::diameter};
 use crate::{Kabsch, Observation, Observations, Solver};
 
-/// A motion must map at least this share of the points, and at least four.
+/// The minimum fraction and the minimum number of points that a motion must map.
 const MIN_FRACTION: f64 = 0.6;
 const MIN_POINTS: usize = 4;
-/// Poses no further apart (m, root mean square over the points), or than this share of the diameter, are
-/// one answer; half of it is what a point may be off its image.
+/// The distance (m, RMS over the points), also as a fraction of the diameter, below which poses are one answer.
+///
+/// Half of it is the tolerance of a mapped point.
 const ALERT_LIMIT: f64 = 0.10;
 const ALERT_FRACTION: f64 = 0.05;
-/// Second side of a triangle over its longest, and its height over that, below which it fixes no motion well. Of a slender model
-/// half of what the best of its triangles has.
+/// The minimum shape ratio of a triangle that determines a motion: the smaller of second side and height over the
+/// longest side.
+///
+/// For a slender model it is half of the best ratio of its triangles.
 const MIN_RATIO: f64 = 0.2;
-/// Comparisons of two points that the search may take; of models too large for all triangles these are
-/// taken evenly until it is spent.
+/// The maximum number of point comparisons. Models too large for all triangles are sampled evenly within it.
 const MAX_WORK: usize = 300_000_000;
-/// More motions than this are not listed.
+/// The maximum number of listed motions.
 const MAX_MOTIONS: usize = 200;
-/// Of larger models a motion is tried on so many points first, of which it must map so many.
+/// The number of points in the first test of a motion of a larger model, and the minimum number mapped.
 const TRIED: usize = 16;
 const TRIED_MAPPED: usize = 5;
 
-/// A motion that maps many points of a model onto points of the model, and is not the identity.
+/// A partial self-congruence: a motion other than the identity that maps many model points onto model points.
 ///
-/// Where no other points are identified, the pose and this motion after it explain the data as well.
+/// If no other points are identified, the pose followed by this motion explains the data equally well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Congruence {
-    /// Where it moves the model: p ↦ `motion` · p.
+    /// The motion of the model: p ↦ `motion` · p.
     pub motion: Transform<Object, Object>,
-    /// The points mapped and those they are mapped onto: indices, ascending.
+    /// The mapped points and their images: indices, ascending.
     pub pairs: Vec<(usize, usize)>,
-    /// The points that it maps onto none: one of them, identified, excludes it.
+    /// The points that the motion maps onto no point; one of them, if identified, excludes the motion.
     pub broken_by: Vec<usize>,
 }
 
-/// All of them, those that map most first.
+/// All self-congruences, in order of falling number of mapped points.
 ///
-/// Of every triangle of points, all triangles of the model that are congruent to it within the tolerance
-/// give a motion each; it is fitted to all points that it maps. Complete up to some fifty points. Of larger
-/// models triangles are taken evenly as far as the work allows: each is mapped whole with a probability of
-/// at least a fifth, so that a motion is missed after ten with one of a tenth, after forty with 10⁻⁴.
-/// (Alignment: Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990.)
+/// Alignment (Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990): each triangle of
+/// points and each congruent triangle of the model, within the tolerance, give a motion, which is then fitted to all
+/// points that it maps. The list is complete for up to about fifty points. Larger models are sampled: triangles are
+/// taken evenly within the work limit. A motion maps a triangle completely with a probability of at least a fifth, so
+/// it is missed after ten triangles with a probability of one tenth, after forty with 10⁻⁴.
 pub(crate) fn congruences(points: &[ModelPoint]) -> Vec<Congruence> {
     let n = points.len();
     if n < MIN_POINTS {
@@ -73,7 +75,7 @@ impl Finder {
         let n = self.at.len();
         let distance: Vec<Vec<f64>> = self.at.iter().map(|a| self.at.iter().map(|b| a.distance(b)).collect()).collect();
         let mut found: Vec<Congruence> = Vec::new();
-        // Of a large model a number of triangles that are far apart: the stride is odd, no multiple of a row.
+        // Large models use distant triangles: the stride is odd, so it is no multiple of a row.
         let triangles = n * (n - 1) * (n - 2) / 6;
         let stride = (triangles.saturating_mul(n * n) / (MAX_WORK / 4)).max(1) | 1;
         let own = |[a, b, c]: [usize; 3]| ratio([distance[a][b], distance[b][c], distance[a][c]]);
@@ -113,7 +115,7 @@ impl Finder {
         }
     }
 
-    /// Adds the motion of these three pairs, if it maps enough points and is not known.
+    /// Adds the motion of these three pairs if it is new and maps enough points.
     fn add(&self, pairs: &[(usize, usize); 3], found: &mut Vec<Congruence>, work: &mut usize) {
         let n = self.at.len();
         let Some(mut motion) = self.fit(pairs) else { return };
@@ -123,9 +125,9 @@ impl Finder {
                 return;
             }
         }
-        // A motion that fails does so after less than half the points.
+        // Average cost: a failing motion fails after fewer than half of the points.
         *work += n * n / 2;
-        // Three points alone fit worse than all: a wider search, then the tolerance itself.
+        // Three points fit worse than all: the first pass doubles the tolerance.
         let mut mapped = self.map(&motion, 2.0 * self.tolerance);
         for _ in 0..2 {
             if mapped.len() < self.min {
@@ -149,7 +151,7 @@ impl Finder {
         }
     }
 
-    /// Whether the motion maps some of a few points, taken evenly.
+    /// Whether the motion maps enough of a few points, taken evenly.
     fn promises(&self, motion: &Transform<Object, Object>) -> bool {
         let limit = 4.0 * self.tolerance * self.tolerance;
         let tried = (0..TRIED).map(|k| *motion * self.at[k * self.at.len() / TRIED]);
@@ -157,7 +159,7 @@ impl Finder {
         tried.filter(mapped).count() >= TRIED_MAPPED
     }
 
-    /// The points within `tolerance` of a point after the motion, one to one, nearest first.
+    /// The points whose image lies within `tolerance` of a point, one to one, the nearest first.
     fn map(&self, motion: &Transform<Object, Object>, tolerance: f64) -> Vec<(usize, usize)> {
         let n = self.at.len();
         let mut onto: Vec<Option<(usize, f64)>> = vec![None; n];
@@ -181,7 +183,7 @@ impl Finder {
         pairs
     }
 
-    /// The motion of least squares that takes each first point of the pairs to the second.
+    /// The least-squares motion that maps the first point of each pair onto the second.
     fn fit(&self, pairs: &[(usize, usize)]) -> Option<Transform<Object, Object>> {
         let observation = |&(from, onto): &(usize, usize)| Observation {
             measured: UncertainPoint::isotropic(Point::from(self.at[from].coords), self.tolerance),
@@ -193,25 +195,27 @@ impl Finder {
         Kabsch::default().solve(&data).ok().map(|motion| motion.relabel())
     }
 
-    /// How far two motions place the points apart: root mean square (m).
+    /// The distance of the points under two motions (m, RMS).
     fn apart(&self, a: &Transform<Object, Object>, b: &Transform<Object, Object>) -> f64 {
         let sum: f64 = self.at.iter().map(|p| ((*a * *p).coords - (*b * *p).coords).norm_squared()).sum();
         (sum / self.at.len() as f64).sqrt()
     }
 }
 
-/// Whether a motion that maps these pairs is known.
+/// Whether a known motion maps these pairs.
 fn known(found: &[Congruence], pairs: &[(usize, usize); 3]) -> bool {
     found.iter().any(|congruence| pairs.iter().all(|pair| congruence.pairs.binary_search(pair).is_ok()))
 }
 
-/// All threes of n places, ascending.
+/// All triples of n indices, ascending.
 fn triples(n: usize) -> impl Iterator<Item = [usize; 3]> {
     (0..n).flat_map(move |a| (a + 1..n).flat_map(move |b| (b + 1..n).map(move |c| [a, b, c])))
 }
 
-/// The lesser of second side and height over the longest side of a triangle of these sides: how far it is from a line, and its
-/// corners from each other. Zero of none.
+/// The shape ratio of a triangle with these sides: the smaller of second side and height over the longest side; zero
+/// for a point.
+///
+/// It measures the distance from a line and between the corners.
 fn ratio(mut sides: [f64; 3]) -> f64 {
     sides.sort_by(f64::total_cmp);
     let [a, b, c] = sides;
@@ -222,21 +226,21 @@ fn ratio(mut sides: [f64; 3]) -> f64 {
 }
 
 impl Congruence {
-    /// How far (m) the farthest of the points that it maps comes to lie from the one that it is mapped onto.
+    /// The largest distance (m) between a mapped point and its image point.
     pub(crate) fn farthest_off(&self, points: &[ModelPoint]) -> f64 {
         let off = |&(from, onto): &(usize, usize)| (self.motion * points[from].at).distance(&points[onto].at);
         self.pairs.iter().map(off).fold(0.0, f64::max)
     }
 
-    /// What the motion does, for people: how far it turns and shifts the points.
+    /// The motion in words: rotation and translation of the points, and the number of mapped points.
     pub fn describe(&self, points: &[ModelPoint]) -> String {
         let degrees = self.motion.rotation().angle().to_degrees();
         let centre = points.iter().map(|p| p.at.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
         let shift = ((self.motion * Point::from(centre)).coords - centre).norm();
         let what = match (degrees > 1.0, shift > 1e-3) {
-            (true, false) => format!("a turn by {degrees:.0} degrees"),
-            (false, _) => format!("a shift by {shift:.2} m"),
-            (true, true) => format!("a turn by {degrees:.0} degrees with a shift by {shift:.2} m"),
+            (true, false) => format!("a rotation by {degrees:.0}°"),
+            (false, _) => format!("a translation by {shift:.2} m"),
+            (true, true) => format!("a rotation by {degrees:.0}° with a translation by {shift:.2} m"),
         };
         format!("{what} maps {} of {} points onto others", self.pairs.len(), points.len())
     }
@@ -271,7 +275,7 @@ mod tests {
         assert_eq!(sizes(&corners([1.0, 1.5, 2.2])), [8; 3]);
         let all = congruences(&corners([1.0, 1.5, 2.2]));
         assert!(all.iter().all(|congruence| congruence.broken_by.is_empty()));
-        assert_eq!(all[0].describe(&corners([1.0, 1.5, 2.2])), "a turn by 180 degrees maps 8 of 8 points onto others");
+        assert_eq!(all[0].describe(&corners([1.0, 1.5, 2.2])), "a rotation by 180° maps 8 of 8 points onto others");
     }
 
     #[test]
@@ -285,15 +289,15 @@ mod tests {
 
     #[test]
     fn a_lattice_is_flipped_shifted_and_turned_by_a_quarter() {
-        // Flips: 30 points. Shifts by a column and quarter turns about four places: 25, each flipped or not
-        // (8 + 16). Shifts by a row: 24 (8). Others map 20, and by chance a point off the lattice.
+        // Flips: 30 points. Translations by a column and quarter turns about four points: 25, each flipped or not (8 +
+        // 16). Translations by a row: 24 (8). Others map 20, and by coincidence one point off the lattice.
         let found = sizes(&lattice());
         let of = |size: usize| found.iter().filter(|&&found| found == size).count();
         assert_eq!((of(30), of(25), of(24)), (3, 24, 8), "{found:?}");
         assert!(found[35..].iter().all(|&size| size == 21), "{found:?}");
     }
 
-    /// Seen to fail where every triangle must be a fifth as high as it is long.
+    /// Fails if every triangle must be a fifth as high as it is long.
     #[test]
     fn a_zigzag_is_turned_and_shifted() {
         let zigzag = model((0..8).map(|i| [0.3 * f64::from(i), 0.1 * f64::from(i % 2), 0.0]));

@@ -1,4 +1,4 @@
-//! `seafix-site/1`: the keys of the file, as they are written.
+//! The keys of the file format `seafix-site/1`.
 
 use std::path::Path;
 
@@ -8,9 +8,9 @@ use toml::Spanned;
 
 use super::Site;
 
-/// The format this reader understands.
+/// The format that this reader supports.
 pub(super) const FORMAT: &str = "seafix-site/1";
-/// The rule by which object frames are built: the paper's Fig. 2, right-handed.
+/// The rule that defines object frames: the paper's Fig. 2, right-handed.
 pub(super) const AXES: &str = "p1p3-x/p1p2xp1p3-z/zx-y";
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -64,7 +64,7 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// The keys of `text`; a wrong format is told before its keys are complained about.
+/// The keys of `text`; an unknown format is reported before unknown keys.
 pub(super) fn read(text: &str, file: &Path) -> Result<SiteFile, Fault> {
     #[derive(Deserialize)]
     struct Head {
@@ -76,12 +76,12 @@ pub(super) fn read(text: &str, file: &Path) -> Result<SiteFile, Fault> {
         return Err(Fault::new("unknown format", file)
             .on_line(seafix_component::line_at(text, format.span().start))
             .value(format!("`{}`", format.get_ref()))
-            .remedy(format!("this reader knows `{FORMAT}`")));
+            .remedy(format!("this reader supports `{FORMAT}`")));
     }
     toml::from_str(text).map_err(|error| Fault::in_toml(file, text, &error))
 }
 
-/// The site as text.
+/// The site as text in its file format.
 pub(super) fn write(site: &Site) -> String {
     let objects = site.objects.iter().map(|object| ObjectFile {
         id: object.id.clone(),
@@ -115,5 +115,5 @@ pub(super) fn write(site: &Site) -> String {
         site_frame: site.frame_object().id.clone(),
         objects: objects.collect(),
     };
-    toml::to_string(&file).expect("a site is made of tables, strings and numbers")
+    toml::to_string(&file).expect("a site consists of tables, strings and numbers")
 }

@@ -1,7 +1,7 @@
-//! The site: known objects, their feature points, and where they stand.
+//! The site: known objects, their feature points, and their surveyed poses.
 //!
-//! Two levels, as in the paper: a production system (site) of objects; every object has its own
-//! frame by the Fig. 2 rule, and the site's frame is that of one chosen object.
+//! There are two levels, as in the paper: a production system (site) of objects. Every object has its own frame by the
+//! rule of Fig. 2; the site's frame is that of one chosen object.
 
 mod bounding_box;
 mod check;
@@ -22,30 +22,31 @@ pub(crate) use congruence::congruences;
 pub use target::{NoWorld, Target, TargetKind};
 pub(crate) use target::{diameter, nearest_two};
 
-/// Cosine of the angle between normal and line of sight below which a point shows its back.
+/// The cosine of the largest angle between normal and line of sight of a visible point.
 const BACK: f64 = -0.1;
 
-/// A feature point of a model.
+/// A model point: a feature point of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelPoint {
-    /// Its name, unique in its object.
+    /// The identifier, unique in the object.
     pub id: String,
-    /// Where it is, object frame.
+    /// The position, object frame.
     pub at: Point<Object>,
-    /// Standard deviation of each of its coordinates (m).
+    /// The standard deviation of each coordinate (m).
     pub sigma: f64,
-    /// Unit vector of the side from which it is seen, object frame; `None` if it is seen from everywhere.
+    /// The unit normal of the visible side, object frame; `None` for a point visible from every side.
     pub normal: Option<Vector3<f64>>,
 }
 
 impl ModelPoint {
-    /// A point that is known exactly and seen from everywhere.
+    /// A model point without uncertainty, visible from every side.
     pub fn exact(id: impl Into<String>, at: Point<Object>) -> Self {
         Self { id: id.into(), at, sigma: 0.0, normal: None }
     }
 
-    /// Whether a camera there (object frame) sees it from the side from which it can be seen, or nearly: a surface and an
-    /// attitude are known to some degrees.
+    /// Whether a camera at this position (object frame) sees the point from its visible side.
+    ///
+    /// The limit exceeds 90° by a few degrees, since normals and attitudes are uncertain.
     pub fn shows_itself(&self, camera: &Vector3<f64>) -> bool {
         self.normal.is_none_or(|normal| {
             let ray = camera - self.at.coords;
@@ -53,65 +54,66 @@ impl ModelPoint {
         })
     }
 
-    /// The angle (rad, 0 to π) between the normal and the line of sight to a camera there (object frame); `None` if the point
-    /// is seen from everywhere.
+    /// The angle (rad, 0 to π) between normal and line of sight to a camera position.
+    ///
+    /// The position is in the object frame. `None` for a point visible from every side.
     pub fn incidence_angle(&self, camera: &Vector3<f64>) -> Option<f64> {
         self.normal.map(|normal| normal.angle(&(camera - self.at.coords)))
     }
 
-    /// The greatest angle (rad) between normal and line of sight at which a point still shows itself.
+    /// The largest angle (rad) between normal and line of sight of a visible point.
     pub fn max_incidence_angle() -> f64 {
         libm::acos(BACK)
     }
 }
 
-/// A place worth inspecting: no feature point, but something that the vehicle goes to.
+/// A point of interest: a point that the vehicle inspects and that takes no part in a fix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interest {
-    /// Its name.
+    /// The identifier.
     pub id: String,
-    /// Where it is, object frame.
+    /// The position, object frame.
     pub at: Point<Object>,
-    /// Unit vector of the side from which it is looked at, object frame; `None` where none is given.
+    /// The unit vector towards the viewer, object frame; `None` if unspecified.
     pub normal: Option<Vector3<f64>>,
 }
 
-/// One known object.
+/// A known object of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SiteObject {
-    /// Its name, unique in the site.
+    /// The identifier, unique in the site.
     pub id: String,
-    /// Indices into `points` of P1, P2, P3 of the Fig. 2 rule.
+    /// The indices into `points` of P1, P2, P3 of the Fig. 2 rule.
     pub base: [usize; 3],
     /// The surveyed world coordinates of P1, P2, P3.
     pub base_in_world: Option<[Point<World>; 3]>,
-    /// Standard deviation of each surveyed coordinate (m).
+    /// The standard deviation of each surveyed coordinate (m).
     pub survey_sigma: f64,
-    /// Eq. (1): where the object stands, from the surveyed base; `None` where no world is known.
+    /// The object's pose in the world by Eq. (1), from the surveyed base; `None` without a survey.
     pub world_from_object: Option<Transform<World, Object>>,
     /// The feature points, at least three.
     pub points: Vec<ModelPoint>,
-    /// Points to inspect.
+    /// The points of interest.
     pub interest: Vec<Interest>,
 }
 
 impl SiteObject {
-    /// The min–max shell of the feature points in the object's own frame.
+    /// The bounding box of the feature points in the object's frame.
     pub fn bounding_box(&self) -> BoundingBox<Object> {
         BoundingBox::around(self.points.iter().map(|point| point.at)).expect("an object has at least three points")
     }
 
-    /// The min–max shell of the feature points in the world; `None` where no world is known.
+    /// The bounding box of the feature points in the world; `None` without a survey.
     pub fn bounding_box_in_world(&self) -> Option<BoundingBox<World>> {
         let world_from_object = self.world_from_object?;
         BoundingBox::around(self.points.iter().map(|point| world_from_object * point.at))
     }
 
-    /// How well the survey knows where the object stands: the covariance of
-    /// [`world_from_object`](Self::world_from_object), from that of the nine surveyed coordinates.
+    /// The covariance of [`world_from_object`](Self::world_from_object) that follows from the nine surveyed
+    /// coordinates.
     ///
-    /// Σ = Σ_c (ξ_c⁺ − ξ_c⁻)(ξ_c⁺ − ξ_c⁻)ᵀ / 4, ξ_c^± the pose's step when coordinate c is moved by ±σ. A
-    /// short base turns millimetres of survey into degrees of attitude.
+    /// Σ = Σ_c (ξ_c⁺ − ξ_c⁻)(ξ_c⁺ − ξ_c⁻)ᵀ / 4, with ξ_c^± the change of the pose when coordinate c moves by ±σ. A
+    /// short base turns millimetres of survey error into degrees of attitude.
     pub fn survey_covariance(&self) -> Option<Covariance6<World, Object>> {
         let (base, pose) = (self.base_in_world?, self.world_from_object?);
         let mut sum = Matrix6::zeros();
@@ -130,22 +132,23 @@ impl SiteObject {
     /// The distance (m) between feature points `i` and `k`.
     ///
     /// # Panics
-    /// When an index is out of range.
+    ///
+    /// If an index is out of range.
     pub fn distance(&self, i: usize, k: usize) -> f64 {
         self.points[i].at.distance(&self.points[k].at)
     }
 }
 
-/// All known objects of one place.
+/// The known objects of one place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Site {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Index of the object whose frame is the site's.
+    /// The index of the object whose frame is the site's.
     pub frame: usize,
     /// The objects.
     pub objects: Vec<SiteObject>,
-    /// What is suspicious in the file it came from, but no reason to refuse it.
+    /// Suspicious but valid contents of the file.
     pub warnings: Vec<Fault>,
 }
 
@@ -153,22 +156,24 @@ impl Site {
     /// Reads a site file (`seafix-site/1`).
     ///
     /// # Errors
-    /// A file that cannot be read, or everything that is wrong with it, at once.
+    ///
+    /// An unreadable file, or all faults of its content.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self, Vec<Fault>> {
         let path = path.as_ref();
         let text = seafix_component::read_text(path).map_err(|fault| vec![fault])?;
         Self::parse(&text, path)
     }
 
-    /// The site that `text`, the content of `file`, describes in `seafix-site/1`.
+    /// Parses a site in the format `seafix-site/1`; `file` is the file named in faults.
     ///
     /// # Errors
-    /// Everything that is wrong with it, at once: a fault a line of the file.
+    ///
+    /// All faults of the content, each with its line.
     pub fn parse(text: &str, file: &Path) -> Result<Self, Vec<Fault>> {
         check::site(&file::read(text, file).map_err(|fault| vec![fault])?, text, file)
     }
 
-    /// The same site in `seafix-site/1`.
+    /// The site in the format `seafix-site/1`.
     pub fn to_toml(&self) -> String {
         file::write(self)
     }
@@ -178,20 +183,21 @@ impl Site {
         &self.objects[self.frame]
     }
 
-    /// The object of this name.
+    /// The object with this identifier.
     pub fn object(&self, id: &str) -> Option<&SiteObject> {
         self.objects.iter().find(|object| object.id == id)
     }
 
-    /// The min–max shell of the whole site in the world; `None` unless every object's place is known.
+    /// The bounding box of the site in the world; `None` unless every object is surveyed.
     pub fn bounding_box_in_world(&self) -> Option<BoundingBox<World>> {
         self.objects.iter().map(SiteObject::bounding_box_in_world).reduce(|a, b| Some(a?.union(&b?)))?
     }
 
-    /// What is searched for: each object by itself, or the whole site as one.
+    /// The targets of the site: each object by itself, or the complete site as one.
     ///
     /// # Errors
-    /// [`NoWorld`] when the whole site is asked for and an object's place in the world is unknown.
+    ///
+    /// [`NoWorld`] if the complete site is requested and an object has no surveyed pose.
     pub fn targets(&self, kind: TargetKind) -> Result<Vec<Target>, NoWorld> {
         target::targets(self, kind)
     }

@@ -1,4 +1,4 @@
-//! What one search looks for.
+//! The target of one search.
 
 use std::sync::OnceLock;
 
@@ -9,62 +9,65 @@ use serde::{Deserialize, Serialize};
 use super::{BoundingBox, Congruence, ModelPoint, Site, SiteObject, congruence};
 use crate::{Member, Placement, Prior, PriorBound};
 
-/// What is searched for.
+/// The kind of target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TargetKind {
     /// Each object by itself, in its own frame.
     #[default]
     Object,
-    /// Each object by itself, in its own frame; then all that were found, and those of the frames before, are solved
-    /// together, their surveyed places with the poses.
+    /// Each object by itself, in its own frame, and a joint solution afterwards.
+    ///
+    /// The joint solution estimates the poses and the surveyed object poses from all identified objects, those of
+    /// earlier frames included.
     Joint,
     /// All points of the site at once, in the site's frame.
     Site,
 }
 
-/// The whole site cannot be one target: an object's place in the world is unknown.
+/// The complete site as one target requires a surveyed pose of every object.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the whole site cannot be one target: object `{object}` has no `base_in_world`; add it, or use target = \"object\""
+    "cannot search the complete site as one target: object `{object}` has no `base_in_world`; add it, or use target = \
+     \"object\""
 )]
 pub struct NoWorld {
-    /// The object without a place.
+    /// The object without a surveyed pose.
     pub object: String,
 }
 
-/// A set of feature points in one frame that a search looks for.
+/// A target: feature points in one frame that a search looks for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Target {
-    /// The object's name, or the site's.
+    /// The name of the object, or of the site.
     pub name: String,
     /// The feature points, in the target's frame.
     pub points: Vec<ModelPoint>,
-    /// Where the target's frame stands; `None` where no world is known.
+    /// The pose of the target's frame in the world; `None` without a survey.
     pub world_from_object: Option<Transform<World, Object>>,
-    /// How well that place is known; `None` where no world is known.
+    /// The covariance of the pose in the world; `None` without a survey.
     pub survey: Option<Covariance6<World, Object>>,
-    /// For each object in it, in the site's order, the place of its first point; empty of an object by itself.
+    /// The index of each object's first point, in the site's order; empty for a single object.
     firsts: Vec<usize>,
-    /// Computed when they are first asked for.
+    /// Computed on demand.
     congruences: OnceLock<Vec<Congruence>>,
 }
 
 impl Target {
-    /// The greatest distance between two of its points (m).
+    /// The largest distance between two of the points (m).
     pub fn diameter(&self) -> f64 {
         diameter(&self.points)
     }
 
-    /// The motions that map much of its points onto each other; found once a target.
+    /// The partial self-congruences of the points; computed once per target.
     pub fn congruences(&self) -> &[Congruence] {
         self.congruences.get_or_init(|| congruence::congruences(&self.points))
     }
 
-    /// The rough pose relative to the target, from the rough pose in the world: what is unsure of
-    /// either is unsure of it. `None` where no world connects them.
+    /// The prior pose relative to the target, from the prior pose in the world; `None` without a survey.
     ///
-    /// With T_wc = T̂_wc Exp(ξ) and T_wo = T̂_wo Exp(η): T_oc = T̂_oc Exp(ξ − Ad(T̂_co) η) to first order.
+    /// Its covariance includes that of the survey. With T_wc = T̂_wc Exp(ξ) and T_wo = T̂_wo Exp(η): T_oc = T̂_oc Exp(ξ
+    /// − Ad(T̂_co) η) to first order.
     pub fn prior(
         &self,
         world_from_camera: &Transform<World, Camera>,
@@ -77,8 +80,10 @@ impl Target {
         Some(Prior { object_from_camera, bound: PriorBound::Gaussian(covariance) })
     }
 
-    /// The place among its points of a point of the site, given as (object, point) indices, when this is the
-    /// `index`-th target of its kind; `None` where it does not belong to it.
+    /// The index in this target of a point of the site; `None` if the target excludes it.
+    ///
+    /// The point is given by its (object, point) indices; `index` is the target's own index among the targets of its
+    /// kind.
     pub fn place_of(&self, index: usize, (object, point): (usize, usize)) -> Option<usize> {
         let place = match self.firsts.is_empty() {
             true => (object == index).then_some(point),
@@ -87,8 +92,9 @@ impl Target {
         place.filter(|&place| place < self.points.len())
     }
 
-    /// How well its place is known, as a joint fix takes it; the site's frame is then the world's. Without a survey
-    /// nothing but the images says where it stands.
+    /// The target as a member of a joint fix; the world is the site's frame.
+    ///
+    /// A target without a survey has an unknown pose, which only the images determine.
     pub fn member(&self) -> Member {
         let site_from_object = self.world_from_object.map_or_else(Transform::identity, |place| place.relabel());
         let placement = match (self.world_from_object, &self.survey) {
@@ -101,7 +107,7 @@ impl Target {
         Member { site_from_object, placement }
     }
 
-    /// The min–max shell of its points in its own frame.
+    /// The bounding box of the points in the target's frame.
     pub fn bounding_box(&self) -> BoundingBox<Object> {
         BoundingBox::around(self.points.iter().map(|point| point.at)).expect("a target has at least three points")
     }
@@ -118,10 +124,10 @@ impl Target {
     }
 }
 
-/// The greatest distance between two of the points (m); 0 of fewer than two.
+/// The largest distance between two of the points (m); 0 for fewer than two.
 ///
-/// The points furthest from the middle are looked at first: two of them are no further apart than both are from it, so
-/// that of thousands of points a few suffice.
+/// The points farthest from the centroid are tested first: the distance of two points is at most the sum of their
+/// distances from it, so a few of thousands suffice.
 pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
     let middle = points.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let mut far: Vec<(f64, &Vector3<f64>)> =
@@ -129,7 +135,7 @@ pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
     far.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
     let mut max = 0.0f64;
     for (i, (from, a)) in far.iter().enumerate() {
-        // The furthest of the others tells whether any can be further from this one than what is known.
+        // The farthest other point bounds every distance from this one.
         if from + far[0].0 <= max {
             break;
         }
@@ -143,11 +149,11 @@ pub(crate) fn diameter(points: &[ModelPoint]) -> f64 {
     max
 }
 
-/// The two nearest of the points that are nearer than `limit` (m), the first of them first, and how far apart they are; `None` where
-/// there are none.
+/// The two nearest points with a distance below `limit` (m): the lower index, the higher index and the distance; `None`
+/// if there are none.
 ///
-/// Swept along a direction that no row of a lattice is square to, as its components have no rational ratio: what is further off along
-/// it than the nearest two are apart need not be looked at.
+/// The points are swept along a direction whose components have no rational ratio, so that no lattice row is
+/// perpendicular to it. A point farther along the sweep than the smallest distance so far is skipped.
 pub(crate) fn nearest_two(points: &[ModelPoint], limit: f64) -> Option<(usize, usize, f64)> {
     let direction = Vector3::new(1.0, 2f64.sqrt(), 3f64.sqrt()).normalize();
     let mut along: Vec<(f64, usize)> =
@@ -177,14 +183,14 @@ pub(super) fn targets(site: &Site, kind: TargetKind) -> Result<Vec<Target>, NoWo
     }
 }
 
-/// All points of the site in the frame of its frame object, carried there through Eq. (1).
+/// All points of the site in the frame of its frame object, transformed by Eq. (1).
 fn full(site: &Site) -> Result<Target, NoWorld> {
     let frame = site.frame_object();
     let (mut points, mut firsts) = (Vec::new(), Vec::new());
     for (index, object) in site.objects.iter().enumerate() {
         let own = index == site.frame;
         let site_from_object: Transform<Object, Object> = if own {
-            Transform::identity() // exactly, whatever the survey rounds
+            Transform::identity() // exact, free of the survey's rounding
         } else {
             let place = |o: &SiteObject| o.world_from_object.ok_or_else(|| NoWorld { object: o.id.clone() });
             (place(frame)?.inverse() * place(object)?).relabel()
@@ -192,8 +198,8 @@ fn full(site: &Site) -> Result<Target, NoWorld> {
         firsts.push(points.len());
         points.extend(object.points.iter().map(|point| {
             let at = site_from_object * point.at;
-            // Within the frame object the survey cancels; to the others both surveys count, the more
-            // the farther the point is from the base that was surveyed.
+            // The survey cancels within the frame object. For other objects both surveys contribute, more for points
+            // farther from the surveyed base.
             let spread = |survey: Option<Covariance6<World, Object>>, at: &Point<Object>| {
                 survey.filter(|_| !own).map_or(0.0, |survey| survey.of_point(at).trace() / 3.0)
             };

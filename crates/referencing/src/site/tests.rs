@@ -1,4 +1,4 @@
-//! Hand-worked sites: one good, and every way to break it.
+//! Hand-made sites: a valid one, and its invalid variants.
 
 use std::path::Path;
 
@@ -55,7 +55,7 @@ fn parse(text: &str) -> Result<Site, Vec<Fault>> {
     Site::parse(text, Path::new("site.toml"))
 }
 
-/// The faults of the good site after one replacement, as they are printed.
+/// The messages of the valid site's faults after one replacement.
 fn faults(from: &str, to: &str) -> Vec<String> {
     assert!(GOOD.contains(from), "the good site has no `{from}`");
     parse(&GOOD.replacen(from, to, 1)).expect_err("the site is broken").iter().map(ToString::to_string).collect()
@@ -87,10 +87,10 @@ fn the_full_site_is_one_target_in_its_frame() {
     let [target] = &site.targets(TargetKind::Site).unwrap()[..] else { panic!("one target") };
     let ids: Vec<&str> = target.points.iter().map(|point| point.id.as_str()).collect();
     assert_eq!(ids, ["plate/A", "plate/B", "plate/C", "frame/A", "frame/B", "frame/C", "frame/D"]);
-    assert_eq!(target.points[2].at, Point::new(2.0, 0.0, 0.0), "the frame object's own points are not touched");
+    assert_eq!(target.points[2].at, Point::new(2.0, 0.0, 0.0), "the points of the frame object stay unchanged");
     assert!(target.points[6].at.distance(&Point::new(5.5, 0.5, -1.0)) < 1e-12);
     assert_eq!(target.points[0].sigma, 0.001);
-    // Between the objects both surveys count, the more the farther from the surveyed bases.
+    // Between objects both surveys contribute, more for points farther from the surveyed bases.
     assert!((0.01f64.hypot(0.02)..0.1).contains(&target.points[6].sigma), "{}", target.points[6].sigma);
     assert!((target.diameter() - (6f64 * 6.0 + 1.0).sqrt()).abs() < 1e-12, "plate/B to frame/C");
     let targets = site.targets(TargetKind::Object).unwrap();
@@ -118,36 +118,33 @@ fn not_a_number_names_its_point() {
 fn two_points_are_too_few() {
     let found = faults("[[object.point]]\nid = \"C\"\nat = [2.0, 0.0, 0.0]\n", "");
     assert!(found[0].starts_with("object `plate` has too few points in site.toml:6: 2 points"), "{found:?}");
-    assert!(found[1].contains("base names no point in site.toml:8: `C`"), "{found:?}");
+    assert!(found[1].contains("unknown point in `base` in site.toml:8: `C`"), "{found:?}");
 }
 
 #[test]
 fn a_collinear_base_is_refused_with_its_sine() {
     let found = faults("at = [0.0, -1.0, 0.0]", "at = [1.0, -0.0005, 0.0]");
-    assert!(
-        found[0].starts_with("object `plate`: the base is collinear in site.toml:8: sine 5.00e-4 at P1"),
-        "{found:?}"
-    );
+    assert!(found[0].starts_with("object `plate`: collinear base in site.toml:8: sine 5.00e-4 at P1"), "{found:?}");
 }
 
 #[test]
 fn a_nearly_collinear_base_is_a_warning() {
     let text = GOOD.replacen("at = [0.0, -1.0, 0.0]", "at = [1.0, -0.05, 0.0]", 1);
     let site = parse(&text.replacen("[10.0, 19.0, 30.0]", "[11.0, 19.95, 30.0]", 1)).unwrap();
-    assert!(site.warnings[0].to_string().contains("the base is nearly collinear"), "{:?}", site.warnings);
+    assert!(site.warnings[0].to_string().contains("nearly collinear base"), "{:?}", site.warnings);
 }
 
 #[test]
 fn points_in_one_place_are_refused_by_both_names() {
     let found = faults("at = [0.5, 0.5, -1.0]", "at = [1.0, 0.0, 1e-7]");
-    assert_eq!(found, ["object `frame`: two points in one place in site.toml:40: `C` and `D`; remove one"]);
+    assert_eq!(found, ["object `frame`: coincident points in site.toml:40: `C` and `D`; remove one"]);
 }
 
 #[test]
 fn an_id_used_twice_names_both_lines() {
     let found = faults("id = \"D\"", "id = \"B\"");
     let expected =
-        "object `frame`: point id is used twice in site.toml:41: `B`; it is already used on line 35; give each its own";
+        "object `frame`: point id is used twice in site.toml:41: `B`; it is already used on line 35; choose another id";
     assert_eq!(found, [expected]);
     let found = faults("id = \"frame\"", "id = \"plate\"");
     assert!(
@@ -184,16 +181,20 @@ point = [{ id = "A", at = [0, 0, 0] }, { id = "B", at = [0, -1500.0, 0] }, { id 
         .replace("[0, -", "[0.0, -");
     let text = text.replace("[2000.0, 0, 0]", "[2000.0, 0.0, 0.0]");
     let site = parse(&text).unwrap();
-    assert!(site.warnings[0].to_string().starts_with("object `o`: units? in site.toml:6"), "{:?}", site.warnings);
+    assert!(
+        site.warnings[0].to_string().starts_with("object `o`: implausible units in site.toml:6"),
+        "{:?}",
+        site.warnings
+    );
     let far = text.replace("2000.0", "2000000.0");
-    assert!(parse(&far).unwrap_err()[0].to_string().starts_with("object `o`: units?"));
+    assert!(parse(&far).unwrap_err()[0].to_string().starts_with("object `o`: implausible units"));
 }
 
 #[test]
 fn the_base_obeys_the_rule_of_axes() {
     // P2 on the other side: the sign that does not cancel in Eq. (1).
     let found = faults("at = [0.0, -1.0, 0.0]", "at = [0.0, 1.0, 0.0]");
-    assert!(found[0].starts_with("object `plate`: the base breaks the rule of axes in site.toml:8"), "{found:?}");
+    assert!(found[0].starts_with("object `plate`: the base violates the axes rule in site.toml:8"), "{found:?}");
     assert!(found[0].contains("P2 = [0, -1, 0], P3 = [2, 0, 0]"), "{found:?}");
 }
 
@@ -202,10 +203,10 @@ fn survey_and_model_must_agree() {
     let found = faults("[12.0, 20.0, 30.0]", "[12.2, 20.0, 30.0]");
     assert_eq!(found.len(), 2, "P1 P3 and P2 P3: {found:?}");
     assert!(
-        found[0].contains("disagree on P1 P3 in site.toml:9: 2.2000 m surveyed, 2.0000 m in the model"),
+        found[0].contains("disagree on the distance P1 P3 in site.toml:9: 2.2000 m surveyed, 2.0000 m in the model"),
         "{found:?}"
     );
-    // Within four standard deviations of a distance it is a survey.
+    // A difference within four standard deviations is valid.
     assert!(parse(&GOOD.replacen("[12.0, 20.0, 30.0]", "[12.03, 20.0, 30.0]", 1)).is_ok());
 }
 

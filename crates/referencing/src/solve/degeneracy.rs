@@ -1,4 +1,4 @@
-//! How far points spread: what tells a line from a plane.
+//! Tests for degenerate configurations of points.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::in_range;
@@ -6,9 +6,9 @@ use seafix_component::in_range;
 use super::Degenerate;
 use crate::{Observation, Observations};
 
-/// Whether the setting `key` is a share that leaves something: from 0 to below 1.
+/// Checks that the setting `key` is a fraction from 0 to below 1.
 pub(super) fn fraction(key: &str, value: f64) -> Result<(), String> {
-    in_range((0.0..1.0).contains(&value), key, value, "a share from 0 to below 1")
+    in_range((0.0..1.0).contains(&value), key, value, "a fraction from 0 to below 1")
 }
 
 /// The centroid of points.
@@ -27,18 +27,20 @@ fn scatter(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> Matri
     scatter
 }
 
-/// Whether the second extent is at least `min` of the first by a margin that needs no eigenvalues: with the
-/// eigenvalues l₁ ≥ l₂ ≥ l₃ of the scatter, l₂/l₁ ≥ (l₁l₂ + l₁l₃ + l₂l₃) / 2(l₁ + l₂ + l₃)².
+/// A sufficient test of the ratio of second to first extent, without eigenvalues.
+///
+/// With the eigenvalues l₁ ≥ l₂ ≥ l₃ of the scatter, l₂/l₁ ≥ (l₁l₂ + l₁l₃ + l₂l₃) / 2(l₁ + l₂ + l₃)²; the ratio is at
+/// least `min` if that bound is.
 fn clearly_wide(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone, min: f64) -> bool {
     let s = scatter(points);
     let minor = |i: usize, j: usize| s[(i, i)] * s[(j, j)] - s[(i, j)] * s[(i, j)];
     minor(0, 1) + minor(0, 2) + minor(1, 2) > 4.0 * min * min * s.trace() * s.trace()
 }
 
-/// Points whose second extent is less than this share of the first lie on a line.
+/// Ratio of second to first extent below which points are collinear.
 pub(crate) const ON_A_LINE: f64 = 1e-3;
 
-/// Second singular value over the first of the points about their centroid: 0 on a line, 1 on a disc.
+/// The ratio of second to first singular value of the points about their centroid: 0 on a line, 1 on a disc.
 pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> f64 {
     let scatter = scatter(points);
     let mut values: [f64; 3] = scatter.symmetric_eigenvalues().into();
@@ -46,7 +48,7 @@ pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> +
     if values[2] > 0.0 { (values[1].max(0.0) / values[2]).sqrt() } else { 0.0 }
 }
 
-/// Refuses too few points, and coordinates and noise that are not finite.
+/// Rejects too few points, and coordinates and noise that are not finite.
 pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     let found = data.points.len();
     if found < needed {
@@ -59,10 +61,9 @@ pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degen
     noise.map_or(Ok(()), |index| Err(Degenerate::Noise { index }))
 }
 
-/// Refuses what [`finite`] refuses and, where a rig is given, points that it cannot have seen, or too far away to be
-/// measured by it.
+/// Rejects as [`finite`] does and, with a rig, points behind the camera or too far away.
 pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
-    // Sound points, which nearly all are, are known in one pass: what is not finite leaves no finite sum.
+    // One pass accepts valid points, which are the rule: a number that is not finite leaves no finite sum.
     let (mut sum, mut front) = (0.0, true);
     for point in &data.points {
         let (seen, known) = (&point.measured.at.coords, &point.model.coords);
@@ -82,7 +83,7 @@ pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degener
     Ok(())
 }
 
-/// Refuses what [`seen`] refuses, and points (measured or model) on a line: second extent below `min` of the first.
+/// Rejects as [`seen`] does, and collinear points, measured or model: second extent below `min` of the first.
 pub(super) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<(), Degenerate> {
     seen(data, needed)?;
     let model = data.points.iter().map(|point| point.model.coords);
@@ -91,17 +92,17 @@ pub(super) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<
         return Ok(());
     }
     let ratio = second_ratio(model).min(second_ratio(measured));
-    // Written so that a NaN is refused too.
+    // A NaN is rejected as well.
     if ratio >= min { Ok(()) } else { Err(Degenerate::Collinear { ratio, min }) }
 }
 
-/// A distance known to no better than this share of itself is none: the parallax is within three of its standard
-/// deviations of nought.
+/// Largest relative standard deviation of a distance; the parallax of farther points is within three standard
+/// deviations of zero.
 const FAR: f64 = 1.0 / 3.0;
 
-/// Refuses points so far away that not one distance is known to [`FAR`] of itself: two views of them are one view.
+/// Rejects points too far away to measure even one distance to [`FAR`]: the two views then coincide.
 fn near(data: &Observations<'_>) -> Result<(), Degenerate> {
-    // σ_d / d of a rectified rig, of any rig the same: the standard deviation along the line of sight over its length.
+    // The standard deviation along the line of sight over its length; σ_d / d for a rectified rig.
     let square = |point: &Observation| {
         let (at, covariance) = (&point.measured.at.coords, &point.measured.covariance);
         let length = at.norm_squared();
@@ -117,7 +118,7 @@ fn near(data: &Observations<'_>) -> Result<(), Degenerate> {
     Err(Degenerate::Far { fraction: best.sqrt(), max: FAR })
 }
 
-/// Refuses points measured behind the left camera: where a rig is given, they were seen.
+/// Rejects points measured behind the left camera; a rig cannot have seen them.
 fn in_front(data: &Observations<'_>) -> Result<(), Degenerate> {
     let behind = data.points.iter().position(|point| !(point.measured.at.coords.z > 0.0));
     behind.map_or(Ok(()), |index| Err(Degenerate::Behind { index, depth: data.points[index].measured.at.coords.z }))

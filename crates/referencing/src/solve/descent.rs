@@ -1,4 +1,4 @@
-//! Least squares over SE(3) where every point speaks by an information matrix.
+//! Least squares over SE(3) with an information matrix per point.
 
 use nalgebra::{Matrix3, Matrix6, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
@@ -9,25 +9,25 @@ use super::{
 };
 use crate::Observation;
 
-/// What one point says of the place where a pose puts it, camera axes.
+/// The term of one point at the position where a pose puts it, camera axes.
 pub(crate) struct Term {
-    /// W: the information on that place (1/m²), symmetric.
+    /// W: the information on that position (1/m²), symmetric.
     pub(crate) information: Matrix3<f64>,
-    /// W times the step (m) by which the measurement would have it moved.
+    /// W times the residual (m), the step that the measurement demands.
     pub(crate) pull: Vector3<f64>,
-    /// The point's share of χ².
+    /// The point's contribution to χ².
     pub(crate) cost: f64,
 }
 
 impl Term {
-    /// What a residual (m) of this information says.
+    /// The term of a residual (m) with this information.
     pub(super) fn of(information: Matrix3<f64>, residual: &Vector3<f64>) -> Self {
         let pull = information * residual;
         Self { information, pull, cost: residual.dot(&pull) }
     }
 }
 
-/// All terms at one pose: normal equations of the step ξ in `pose · Exp(ξ)`.
+/// The sum of all terms at one pose: normal equations of the step ξ in `pose · Exp(ξ)`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Linearized {
     /// Σ Jᵀ W J: the information on ξ.
@@ -40,11 +40,12 @@ pub(super) struct Linearized {
 
 /// The normal equations at `pose`.
 ///
-/// `term` is given the number of a point and the place p = T⁻¹ P where the pose puts it. Under T · Exp(ξ) that place
-/// moves by J ξ, J = \[ \[p\]×, −I \].
+/// `term` receives the index of a point and its position p = T⁻¹ P under the pose. Under T · Exp(ξ) that position moves
+/// by J ξ, J = \[ \[p\]×, −I \].
 ///
 /// # Errors
-/// [`Degenerate::Hidden`]: the first point whose term has no value.
+///
+/// [`Degenerate::Hidden`]: the first point without a term.
 #[inline]
 pub(super) fn linearize(
     points: &[Observation],
@@ -66,8 +67,10 @@ pub(super) fn linearize(
     Ok(Linearized { normal, gradient, cost })
 }
 
-/// What each model point's error makes of the minimum: with n of the pixels and e of the model the terms ask
-/// Σ Jᵀ W (J ξ + Rᵀ e + n) = 0, R that of the pose, so that ξ = −(Σ JᵀWJ)⁻¹ Σ Jᵀ W Rᵀ e + …, a standard deviation of e each.
+/// The effect of each model point's error on the minimum, for one standard deviation.
+///
+/// With n the pixel errors and e the model errors the minimum satisfies Σ Jᵀ W (J ξ + Rᵀ e + n) = 0, R of the pose, so
+/// that ξ = −(Σ JᵀWJ)⁻¹ Σ Jᵀ W Rᵀ e + ….
 pub(super) fn model_errors(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
@@ -89,7 +92,7 @@ pub(super) fn model_errors(
 }
 
 impl Linearized {
-    /// With the terms of `other` besides.
+    /// The sum with the terms of `other`.
     pub(super) fn plus(mut self, other: &Self) -> Self {
         self.normal.join(&other.normal);
         self.gradient += other.gradient;
@@ -97,7 +100,7 @@ impl Linearized {
         self
     }
 
-    /// What is left when the terms of `other`, which are among them, are left out.
+    /// The sum without the terms of `other`, which it contains.
     pub(super) fn less(mut self, other: &Self) -> Self {
         self.normal.remove(&other.normal);
         self.gradient -= other.gradient;
@@ -108,12 +111,13 @@ impl Linearized {
     /// The covariance of ξ.
     ///
     /// # Errors
-    /// Some motion changes nothing that was measured.
+    ///
+    /// A motion that changes no measurement.
     pub(super) fn covariance(&self) -> Result<Matrix6<f64>, Degenerate> {
         inverse(&self.normal.matrix())
     }
 
-    /// The square of the length of a step in standard deviations: ξᵀ Σ⁻¹ ξ.
+    /// The squared length of a step in standard deviations: ξᵀ Σ⁻¹ ξ.
     pub(super) fn away(&self, step: &Vector6<f64>) -> f64 {
         step.dot(&(self.normal.matrix() * step))
     }
@@ -127,7 +131,7 @@ impl Linearized {
         Some(schur.cholesky()?.inverse().trace())
     }
 
-    /// The step and its decrement gᵀ ξ: the square of its length in standard deviations.
+    /// The step and its decrement gᵀ ξ, the squared length in standard deviations.
     pub(super) fn step(&self, damping: f64) -> Option<(Vector6<f64>, f64)> {
         let step = self.normal.solve(damping, &self.gradient)?;
         let decrement = self.gradient.dot(&step);
@@ -139,22 +143,23 @@ impl Linearized {
     }
 }
 
-/// Below this decrement a step is a ten-thousandth of a millionth of a standard deviation: nothing is left to gain.
+/// Decrement below which no improvement is left: a step of 1e-10 standard deviations.
 const NOTHING: f64 = 1e-20;
-/// Below this decrement the cost has no digits left that could tell better from worse; the steps themselves
-/// must shrink then.
+/// Decrement below which the cost is dominated by rounding; the steps themselves must shrink from there.
 pub(super) const NEAR: f64 = 1e-4;
-/// Steps of one descent. Half a dozen are enough of nearly all; few weak points lie in a long curved valley, where Gauss's and
-/// Newton's steps are too short or too long by nearly all of themselves.
+/// Maximum number of steps of one descent. Six suffice for nearly all problems; a few weak points have a long curved
+/// valley, in which Gauss–Newton steps are far too short or too long.
 const MAX_STEPS: u64 = 500;
 
-/// The least cost reached from `start` by Levenberg's and Marquardt's damped steps, to where a step is shorter than
-/// √`near` standard deviations. The weights of `term` must not depend on the pose: every step must lower the cost.
-/// (Marquardt, *An algorithm for least-squares estimation of nonlinear parameters*, 1963.) The pose and the normal
-/// equations there.
+/// The minimum of the cost near `start`, by the Levenberg–Marquardt method.
+///
+/// It ends at a step shorter than √`near` standard deviations, and returns the pose and its normal equations. The
+/// weights of `term` must not depend on the pose, as every step must lower the cost (Marquardt, *An algorithm for
+/// least-squares estimation of nonlinear parameters*, 1963).
 ///
 /// # Errors
-/// The start puts a point behind a camera, or a motion is undetermined.
+///
+/// A start that puts a point behind a camera, or an undetermined motion.
 pub(super) fn descend(
     points: &[Observation],
     start: &Transform<Object, Camera>,
@@ -181,13 +186,16 @@ pub(super) fn descend(
     Ok((pose, here))
 }
 
-/// The pose at which the steps vanish, from one near it: Gauss's and Newton's steps, of which each must be
-/// shorter than the last, or from there on only half as much of them is taken. Where the weights of `term` depend on the pose it solves the likelihood's equation
-/// Σ Jᵀ W r = 0 with the weights of its own answer, which no cost measures. `here` is `term` at `start`. The pose, and
-/// the normal equations at it or one vanishing step before.
+/// The pose at which Gauss–Newton steps vanish, from one near it.
+///
+/// Returns the pose, and the normal equations at it or one vanishing step before; `here` is `term` at `start`. Each
+/// step must be shorter than the last; otherwise steps are halved from there on. If the weights of `term` depend on the
+/// pose, the result solves the likelihood equation Σ Jᵀ W r = 0 with the weights of its own answer, which no cost
+/// measures.
 ///
 /// # Errors
-/// As [`descend`], and steps that do not shrink to nothing.
+///
+/// As [`descend`], and steps that do not vanish.
 pub(super) fn settle(
     points: &[Observation],
     start: Transform<Object, Camera>,
@@ -198,7 +206,7 @@ pub(super) fn settle(
     for taken in 0..MAX_STEPS {
         let (step, decrement) = here.determined(0.0)?;
         if !(decrement < last) {
-            // Rounding is all that is left, or the steps lead beyond the minimum.
+            // Only rounding is left, or the steps overshoot the minimum.
             let done = converged(taken, last.sqrt());
             if done.is_ok() || fraction < MIN_FRACTION {
                 return done.map(|()| (pose, here));
@@ -206,7 +214,7 @@ pub(super) fn settle(
             fraction *= 0.5;
         }
         pose = moved(&pose, &(step * fraction));
-        // Steps shrink by a constant factor at least: that the next is nothing is known before it is taken.
+        // Steps shrink at least by a constant factor, so a vanishing next step is predictable.
         let rate = if last.is_finite() { decrement / last } else { SHRINK };
         if decrement * rate <= NOTHING {
             return Ok((pose, here));
@@ -217,14 +225,14 @@ pub(super) fn settle(
     converged(MAX_STEPS, last.sqrt()).map(|()| (pose, here))
 }
 
-/// With so small a share of the steps nothing is to be hoped for.
+/// Fraction of a step below which no progress is expected.
 const MIN_FRACTION: f64 = 0.01;
-/// By how much the first decrement is taken to fall.
+/// Assumed reduction of the first decrement.
 const SHRINK: f64 = 1e-2;
 
-/// `pose · Exp(step)` to second order, a rotation to the last digit.
+/// `pose · Exp(step)` to second order, with an exact rotation.
 fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Object, Camera> {
-    // A turn of more than half a radian leaves what the normal equations know.
+    // A rotation of more than half a radian exceeds the validity of the normal equations.
     let turn = step.fixed_rows::<3>(0).norm();
     let step = if turn > 0.5 { step * (0.5 / turn) } else { *step };
     let half = step.fixed_rows::<3>(0) * 0.5;
@@ -234,9 +242,10 @@ fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Obj
     (*pose * step).renormalized()
 }
 
-/// [`descend`] to where the cost can no longer tell, then [`settle`].
+/// The minimum by [`descend`], to the precision of the cost, and then by [`settle`].
 ///
 /// # Errors
+///
 /// As these.
 pub(super) fn minimize(
     points: &[Observation],

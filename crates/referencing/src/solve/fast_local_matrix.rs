@@ -1,4 +1,4 @@
-//! Fast local matrix: the rotation linearised, a closed 6×6 solve, repeated.
+//! Fast local matrix: a linearised rotation and a closed 6×6 solve, repeated.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::Component;
@@ -14,16 +14,17 @@ use super::{
 };
 use crate::Observations;
 
-/// The motion of least Σ ‖P_k − C_k H‖², for motions that are small after the auxiliary frames of three widely
-/// spread points have been laid on each other: R ≈ I + \[φ\]× makes the sum a quadratic form of (φ, ρ), one 6×6 system
-/// gives its minimum, the exponential makes the answer a rotation again; repeated until nothing moves.
+/// Least squares by a linearised rotation: min Σ ‖P_k − C_k H‖².
 ///
-/// Where the points fit no motion (a mirror image) steps shrink slowly, and it may end short of the minimum: it does
-/// not claim it. This is our own reading of the phrase "fast computation of the local matrix", whose source was not available.
+/// The method serves motions that are small after an initial alignment by the auxiliary frames of three widely spread
+/// points. R ≈ I + \[φ\]× makes the sum a quadratic form of (φ, ρ), one 6×6 system gives its minimum, and the
+/// exponential restores a rotation; this repeats until the steps vanish. If the points fit no motion (a mirror image),
+/// steps shrink slowly and the iteration may end short of the minimum, so the solver does not claim least squares. It
+/// is the project's own reading of the phrase "fast computation of the local matrix", whose source was not available.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct FastLocalMatrix {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
@@ -65,5 +66,5 @@ impl Solver for FastLocalMatrix {
     }
 }
 
-/// Every point has the same weight; its size (m) only says when a step is small.
+/// Common standard deviation (m) of all points; it only defines the length of a small step.
 const UNIT: f64 = 1e-4;

@@ -1,4 +1,4 @@
-//! Graduated non-convexity with truncated least squares: outliers count no more than the threshold.
+//! Graduated non-convexity with truncated least squares: the threshold limits the effect of outliers.
 
 use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
@@ -14,23 +14,25 @@ use super::{
 };
 use crate::Observations;
 
-/// The motion of least Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, σ_k² = tr(Σ_k + σ_model² I)/3, c the threshold: least
-/// squares over the points it keeps, which it chooses itself.
+/// Truncated least squares: min Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, by graduated non-convexity.
 ///
-/// The sum has many minima. A convex one is solved first and bent step by step into it: with μ growing by
-/// `growth`, a point weighs 1 below c²μ/(μ+1), 0 above c²(μ+1)/μ, and (c/d)√(μ(μ+1)) − μ between. Where that leaves points
-/// out it may have left the wrong ones: up to `triples` sets of three points, all of few, are starts besides, and the
-/// least sum stands.
+/// σ_k² = tr(Σ_k + σ_model² I)/3 and c is the threshold. The result is the least-squares motion of the inliers, which
+/// the method selects itself. The sum has many minima: a convex approximation is solved first and gradually changed
+/// into it. With μ growing by `growth`, a point has weight 1 below c²μ/(μ+1), 0 above c²(μ+1)/μ, and (c/d)√(μ(μ+1)) − μ
+/// between. If points are excluded, they may be the wrong ones: up to `triples` sets of three points then serve as
+/// further starts (all sets, for few points), and the smallest sum is the answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct GncTls {
-    /// c (standard deviations of a point): 4.5 keeps 99 % of true points even where all noise is along one axis.
+    /// Threshold c (standard deviations of a point), positive; 4.5 keeps 99 % of the inliers even if all noise is along
+    /// one axis.
     pub(crate) threshold: f64,
-    /// By how much μ grows a step.
+    /// Factor by which μ grows per step, above 1 and at most 10.
     pub(crate) growth: f64,
-    /// How many sets of three points are tried where points are left out: 1000 are all of nineteen points.
+    /// Maximum number of sets of three points that serve as starts, 0 to 100000; 1000 covers all sets of nineteen
+    /// points.
     pub(crate) triples: usize,
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
@@ -42,12 +44,12 @@ impl Default for GncTls {
 
 impl Component for GncTls {
     const NAME: &'static str = "gnc-tls";
-    const SUMMARY: &'static str = "truncated least squares by graduated non-convexity: leaves outliers out";
+    const SUMMARY: &'static str = "truncated least squares by graduated non-convexity: excludes outliers";
     const SOURCE: &'static str = "Yang, Antonante, Tzoumas, Carlone, Graduated non-convexity for robust spatial \
                                   perception, 2020";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         let positive = self.threshold > 0.0 && self.threshold.is_finite();
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
         let grows = self.growth > 1.0 && self.growth <= 10.0;
@@ -57,9 +59,9 @@ impl Component for GncTls {
     }
 }
 
-/// How often a start may change what it keeps.
+/// Maximum number of changes of the inliers per start.
 const MAX_TURNS: usize = 10;
-/// Steps of the iteration: μ passes through twenty decades.
+/// Maximum number of steps; μ passes through twenty decades.
 const MAX_STEPS: usize = 200;
 
 impl Solver for GncTls {
@@ -68,14 +70,14 @@ impl Solver for GncTls {
         Ok(self.keep(data)?.0)
     }
 
-    /// The points it keeps.
+    /// The inliers.
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {
         let kept = check(data, self.minimum(), self.min_ratio).and_then(|()| self.keep(data));
         let kept = kept.map(|(_, kept)| kept).unwrap_or_default();
         (0..kept.len()).filter(|&k| kept[k]).collect()
     }
 
-    /// That of least squares over the points it keeps.
+    /// The covariance of least squares over the inliers.
     fn covariance(
         &self,
         data: &Observations<'_>,
@@ -87,7 +89,7 @@ impl Solver for GncTls {
     }
 }
 
-/// The `m`-th set of three of `n` points in the order of the dictionary: 0 is {0, 1, 2}.
+/// The `m`-th set of three of `n` points in lexicographic order: 0 is {0, 1, 2}.
 fn triple(mut m: usize, n: usize) -> [usize; 3] {
     let pairs = |i: usize| (n - i - 1) * (n - i - 2) / 2;
     let mut i = 0;
@@ -104,7 +106,7 @@ fn triple(mut m: usize, n: usize) -> [usize; 3] {
 }
 
 impl GncTls {
-    /// The pose and which points it rests on.
+    /// The pose and its inliers.
     fn keep(&self, data: &Observations<'_>) -> Result<(Transform<Object, Camera>, Vec<bool>), Degenerate> {
         let (mut pose, mut kept) = self.graduated(data)?;
         if kept.iter().all(|&kept| kept) {
@@ -118,7 +120,7 @@ impl GncTls {
         let mut min = sum(&pose);
         let n = points.len();
         let all = n * (n - 1) * (n - 2) / 6;
-        // Of more than are tried every so-manieth.
+        // An even sample of the sets if there are more than `triples`.
         let stride = all.div_ceil(self.triples.max(1));
         for three in (0..all).step_by(stride).take(self.triples).map(|m| triple(m, n)) {
             let mut chosen: Vec<bool> = (0..n).map(|k| three.contains(&k)).collect();
@@ -142,7 +144,7 @@ impl GncTls {
         Ok((pose, kept))
     }
 
-    /// What graduation leads to.
+    /// The result of graduated non-convexity from the unweighted fit.
     fn graduated(&self, data: &Observations<'_>) -> Result<(Transform<Object, Camera>, Vec<bool>), Degenerate> {
         let points = &data.points;
         let c2 = self.threshold * self.threshold;
@@ -181,7 +183,7 @@ impl GncTls {
         Ok((pose, weights.iter().map(|&w| w > 0.5).collect()))
     }
 
-    /// Whether the points that these weights keep are three and no line.
+    /// Whether the points with a positive weight are three or more and not collinear.
     fn determined(&self, data: &Observations<'_>, weights: &[f64]) -> bool {
         let kept = data.points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(point, _)| *point).collect();
         check(&Observations { points: kept, rig: data.rig }, self.minimum(), self.min_ratio).is_ok()

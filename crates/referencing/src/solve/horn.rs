@@ -12,12 +12,14 @@ use super::{
 };
 use crate::Observations;
 
-/// The motion of least Σ ‖P_k − C_k H‖²: its quaternion is the eigenvector of the greatest eigenvalue of the symmetric
-/// 4×4 matrix N of the sums S_ij = Σ c_i p_j, and qᵀ N q = tr(Rᵀ M) is what is maximised.
+/// Horn's least squares min Σ ‖P_k − C_k H‖² by unit quaternions.
+///
+/// The quaternion is the eigenvector to the largest eigenvalue of the symmetric 4×4 matrix N of the sums S_ij = Σ c_i
+/// p_j; it maximises qᵀ N q = tr(Rᵀ M).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Horn {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Several starts, one answer: the likeliest, and what is hardly less likely.
+//! Several initial poses: the maximum-likelihood pose and its alternatives.
 
 use std::cell::RefCell;
 
@@ -14,17 +14,18 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// An attitude less certain than this (rad, three axes together) may lie in the wrong valley.
+/// Standard deviation of the attitude (rad, three axes together) above which the minimum may be a wrong one.
 const WEAK: f64 = 0.01;
 
-/// The pose of least cost that is reached from the unweighted fit and, where that leaves a doubt, from the poses
-/// that three points allow one camera alone and from its own mirror image; `starts` and one in all.
+/// The pose of smallest cost over several initial poses.
 ///
-/// The first answer is doubted when its attitude is weak or its χ² unlikely: other valleys are then looked into. A valley
-/// whose minimum was not reached is no reason to believe in one that is higher.
+/// The first initial pose is the unweighted fit. If its answer has a weak attitude or an improbable χ², the P3P poses
+/// of one camera and the mirror image of the answer serve as further initial poses, `starts` and one in total. A
+/// minimum that was not reached is no evidence for a higher one.
 ///
 /// # Errors
-/// That of the first start, where none leads to a minimum, and that of a start that did not reach its own where that is below
+///
+/// The error of the first initial pose if none leads to a minimum, and that of an unreached minimum with a cost below
 /// all others.
 pub(super) fn maximum_likelihood(
     data: &Observations<'_>,
@@ -33,7 +34,7 @@ pub(super) fn maximum_likelihood(
     pixel_terms: &PixelTerms<'_>,
 ) -> Result<Transform<Object, Camera>, Degenerate> {
     let points = &data.points;
-    // The lowest valley whose minimum was not reached, and why.
+    // The smallest cost of an unreached minimum, with its error.
     let unfinished: RefCell<Option<(f64, Degenerate)>> = RefCell::default();
     let from = |start: &Transform<Object, Camera>| {
         minimum(points, start, pixel_terms, |cost, why| {
@@ -52,7 +53,7 @@ pub(super) fn maximum_likelihood(
     let others = roots(data, rig);
     for start in others.as_slice().iter().take(starts - 1).chain(&turned) {
         let Ok((pose, all)) = from(start) else { continue };
-        // Two starts in one valley give one cost: of equals the first stands.
+        // Two initial poses near one minimum give equal costs: the first is kept.
         if best.as_ref().is_ok_and(|(min, _)| all.cost >= min * (1.0 - 1e-6)) {
             continue;
         }
@@ -65,9 +66,10 @@ pub(super) fn maximum_likelihood(
     }
 }
 
-/// The minima in other valleys than that of `at` whose χ² is larger than that of `at` by no more than `max`, and that the
-/// covariance of `at` does not contain: sought where [`maximum_likelihood`] doubts, from the poses that three points allow either camera
-/// alone and from the mirror image; not by a solver of one start.
+/// Other minima whose χ² exceeds that of `at` by at most `max`, outside its covariance.
+///
+/// They are sought if [`maximum_likelihood`] doubts its first answer, from the P3P poses of either camera and from the
+/// mirror image; a solver with one initial pose returns none.
 pub(super) fn alternatives(
     data: &Observations<'_>,
     rig: &StereoRig,
@@ -76,7 +78,7 @@ pub(super) fn alternatives(
     at: &Transform<Object, Camera>,
     max: f64,
 ) -> Vec<AlternativePose> {
-    /// χ²₆ at 95 %: as far as the covariance of a valley speaks.
+    /// χ²₆ at 95 %: the limit of a minimum's covariance.
     const CONTAINED: f64 = 12.591_587_243_743_977;
     let points = &data.points;
     let live = |k: usize, place: &_| pixel_terms.live(k, place);
@@ -98,8 +100,8 @@ pub(super) fn alternatives(
     found
 }
 
-/// The minimum of the valley of `start` and the normal equations there; `unfinished` is told of one that is not reached, with
-/// the lowest cost seen.
+/// The minimum near `start` and its normal equations; `unfinished` receives the lowest cost and the error of an
+/// unreached one.
 fn minimum(
     points: &[Observation],
     start: &Transform<Object, Camera>,
@@ -113,9 +115,11 @@ fn minimum(
     settle(points, near, here, &live).inspect_err(|why| unfinished(cost, why))
 }
 
-/// The pose that tilts the points the other way: their plane of best fit mirrored in the one across the line of sight to their
-/// centroid. From far away a flat object looks the same tilted either way, and depth alone decides.
-/// (Oberkampf, DeMenthon and Davis, *Iterative pose estimation using coplanar feature points*, 1996.)
+/// The pose with the opposite tilt: the points' best-fit plane is mirrored in the plane across the line of sight to
+/// their centroid.
+///
+/// A distant flat object looks alike at opposite tilts, and depth alone decides (Oberkampf, DeMenthon and Davis,
+/// *Iterative pose estimation using coplanar feature points*, 1996).
 fn mirrored(points: &[Observation], pose: &Transform<Object, Camera>) -> Option<Transform<Object, Camera>> {
     let camera_from_object = pose.inverse();
     let place = |point: &Observation| (camera_from_object * point.model).coords;
@@ -143,7 +147,7 @@ mod tests {
     use super::*;
     use seafix_geometry::{Point, UncertainPoint};
 
-    /// A square tilted by 20° about the camera's x axis: its mirror image is tilted by −20° in the same place.
+    /// A square tilted by 20° about the camera's x axis: its mirror image is tilted by −20° at the same position.
     #[test]
     fn the_mirror_image_tilts_the_other_path_about_the_same_centre() {
         let corners = [(0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)];

@@ -1,4 +1,4 @@
-//! Iteratively reweighted least squares: losses that grow more slowly than the square.
+//! Iteratively reweighted least squares: robust losses that grow more slowly than the square.
 
 use nalgebra::Vector6;
 use seafix_component::{Component, in_range};
@@ -16,30 +16,31 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// What a residual costs.
+/// The loss of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Loss {
     /// d² up to the threshold, linear beyond (Huber, 1964).
     #[default]
     Huber,
-    /// c² ln(1 + d²/c²): far residuals hardly count.
+    /// c² ln(1 + d²/c²): the loss suppresses large residuals.
     Cauchy,
-    /// ‖C·H − P‖ itself, the paper's sum as printed: the threshold plays no part.
+    /// ‖C·H − P‖, the paper's sum as printed; the threshold is unused.
     UnSquared,
 }
 
-/// The motion of least Σ ρ(d_k), by weighted least squares with the weights of the last residuals,
-/// w = ρ'(d)/2d. For Huber and Cauchy d_k = ‖C·H − P‖ / σ_k, σ_k² = tr(Σ_k + σ_model² I)/3, and the sum is
-/// Σ σ_k² ρ(d_k), so that with every residual within Huber's threshold the answer is that of `kabsch`.
+/// Robust least squares: min Σ ρ(d_k), by iterated weighted fits with the weights w = ρ'(d)/2d of the last residuals.
+///
+/// For Huber and Cauchy d_k = ‖C·H − P‖ / σ_k with σ_k² = tr(Σ_k + σ_model² I)/3, and the sum is Σ σ_k² ρ(d_k). If
+/// every residual is within Huber's threshold, the answer is that of `kabsch`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Irls {
-    /// What a residual costs.
+    /// The loss.
     pub(crate) loss: Loss,
-    /// Where Huber's loss turns linear, and Cauchy's c (standard deviations of a point).
+    /// Threshold (standard deviations of a point), positive: the start of Huber's linear part, or Cauchy's c.
     pub(crate) threshold: f64,
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
@@ -55,19 +56,19 @@ impl Component for Irls {
     const SOURCE: &'static str = "Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977";
 
     fn check(&self) -> Result<(), String> {
-        // Written so that a NaN is refused too.
+        // A NaN is rejected as well.
         let positive = self.threshold > 0.0 && self.threshold.is_finite();
         in_range(positive, "threshold", self.threshold, "a positive number of standard deviations")?;
         fraction("min-ratio", self.min_ratio)
     }
 }
 
-/// Steps of the iteration.
+/// Maximum number of steps.
 const MAX_STEPS: u64 = 200;
-/// A step (standard deviations of the pose) after which an answer that only serves a covariance is at its minimum: what is
-/// left, a few times as much, adds a ten-thousandth to the variance.
+/// Step (standard deviations of the pose) at which an iteration for a covariance ends; the remaining error adds 1e-4 to
+/// the variance.
 const STILL: f64 = 1e-3;
-/// Residuals count as no smaller than this (standard deviations of the point): the un-squared sum has a corner at zero.
+/// Lower bound of a residual (standard deviations of the point); the un-squared sum is not differentiable at zero.
 const CORNER: f64 = 1e-4;
 
 impl Solver for Irls {
@@ -75,7 +76,8 @@ impl Solver for Irls {
         self.follow(data, |step| step.amax() <= 1e-14)
     }
 
-    /// That of many draws: with residuals of the size where a loss bends, its derivative at one draw says little.
+    /// The covariance by resampling: for residuals near a bend of the loss, the derivative at one draw is not
+    /// representative.
     fn covariance(
         &self,
         data: &Observations<'_>,
@@ -89,7 +91,7 @@ impl Solver for Irls {
 }
 
 impl Irls {
-    /// The iteration from Kabsch's pose on, until a step is `still`.
+    /// The iteration from Kabsch's pose, until a step is `still`.
     fn follow(
         &self,
         data: &Observations<'_>,
@@ -105,7 +107,7 @@ impl Irls {
                 return Ok(next);
             }
             if taken == MAX_STEPS {
-                // Steps shrink by a constant factor or ever more slowly: what all that would follow add up to.
+                // Steps shrink by a constant factor or more slowly: the sum of the remaining steps.
                 let known = sandwich::covariance(data, &next, |k| self.weight(&data.points[k], &next))?;
                 let length = known.matrix.cholesky().map_or(f64::INFINITY, |c| step.dot(&c.solve(&step)).sqrt());
                 let shrink = step.norm() / last;
@@ -117,7 +119,7 @@ impl Irls {
         Ok(pose)
     }
 
-    /// Noise hardly reaches where Huber's loss turns; the others bend everywhere.
+    /// Noise rarely reaches the bend of Huber's loss; the other losses are nonlinear everywhere.
     fn bends(&self) -> Answer {
         match self.loss {
             Loss::Huber => Answer::Straight,
@@ -134,8 +136,10 @@ impl Irls {
     }
 }
 
-/// The residual in standard deviations of its point, one number for all axes: with the whole covariance the weights
-/// would belong to another sum than the one that is solved, and the iteration need not end.
+/// The residual in standard deviations of its point, one number for all axes.
+///
+/// With the full covariance the weights would belong to another sum than the minimised one, and the iteration might not
+/// converge.
 pub(super) fn distance(point: &Observation, pose: &Transform<Object, Camera>) -> f64 {
     point.residual(pose).norm() / variance(point).sqrt()
 }

@@ -1,4 +1,4 @@
-//! Kabsch: unweighted least squares over the rigid motions.
+//! Kabsch: unweighted least squares over rigid motions.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::Component;
@@ -12,15 +12,14 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// The rigid motion of least squared residuals, min Σ ‖P_k − C_k H‖² over SE(3): the paper's
-/// "standard method", every identified point with the same weight.
+/// Kabsch's least squares over rigid motions: min Σ ‖P_k − C_k H‖², with equal weights.
 ///
-/// With a_k = P_k − P̄, b_k = C_k − C̄ and M = Σ a_k b_kᵀ = U S Vᵀ, the rotation is
-/// R = U diag(1, 1, det(U Vᵀ)) Vᵀ, the translation P̄ − R C̄; the determinant keeps reflections out.
+/// It is the paper's "standard method". With a_k = P_k − P̄, b_k = C_k − C̄ and M = Σ a_k b_kᵀ = U S Vᵀ, the rotation
+/// is R = U diag(1, 1, det(U Vᵀ)) Vᵀ and the translation P̄ − R C̄. The determinant excludes reflections.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Kabsch {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub min_ratio: f64,
 }
 
@@ -60,12 +59,12 @@ impl Solver for Kabsch {
     }
 }
 
-/// The least-squares motion of three or more points that do not lie on a line.
+/// The least-squares motion of three or more points that are not collinear.
 pub(crate) fn fit(points: &[Observation]) -> Transform<Object, Camera> {
     fit_weighted(points, |_| 1.0)
 }
 
-/// The motion of least Σ w_k ‖P_k − C_k H‖², w_k = `weight(k)`, not all zero.
+/// The motion that minimises Σ w_k ‖P_k − C_k H‖², w_k = `weight(k)`; some weight must be positive.
 pub(super) fn fit_weighted(points: &[Observation], weight: impl Fn(usize) -> f64) -> Transform<Object, Camera> {
     let (mut model, mut measured, mut all) = (Vector3::zeros(), Vector3::zeros(), 0.0);
     for (k, point) in points.iter().enumerate() {
@@ -85,9 +84,9 @@ pub(super) fn fit_weighted(points: &[Observation], weight: impl Fn(usize) -> f64
 
 /// The rotation R that maximises tr(Rᵀ M).
 ///
-/// One-sided Jacobi (Hestenes, 1958): rotations from the right make the columns of M orthogonal, M V = U S, which
-/// costs no digits of the weaker directions as MᵀM would. Of U and V the two stronger columns are taken and the
-/// third is their cross product, so that det R = +1 by construction.
+/// One-sided Jacobi (Hestenes, 1958): rotations from the right make the columns of M orthogonal, M V = U S, without the
+/// loss of precision of MᵀM in the weaker directions. The two stronger columns of U and V are kept and the third is
+/// their cross product, so that det R = +1 by construction.
 fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
     let mut a = [0, 1, 2].map(|k| m.column(k).into_owned());
     let mut v = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -118,9 +117,9 @@ fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
     u1 * v[i].transpose() + u2 * v[j].transpose() + u1.cross(&u2) * v[i].cross(&v[j]).transpose()
 }
 
-/// Cosine of two columns that count as orthogonal.
+/// Cosine below which two columns count as orthogonal.
 const ORTHOGONAL: f64 = 1e-15;
-/// Three or four sweeps are enough; convergence is quadratic.
+/// Maximum number of sweeps; three or four suffice, as convergence is quadratic.
 const MAX_SWEEPS: usize = 30;
 
 #[cfg(test)]
@@ -138,8 +137,8 @@ mod tests {
         }
     }
 
-    /// Two points on the x axis that turned by α and two on the y axis that turned by −β, with weights 1 and 2: the best turn is
-    /// atan((2 sin α − 4 sin β) / (2 cos α + 4 cos β)).
+    /// Two points on the x axis rotated by α and two on the y axis rotated by −β, with weights 1 and 2: the best angle
+    /// is atan((2 sin α − 4 sin β) / (2 cos α + 4 cos β)).
     #[test]
     fn weights_are_those_of_the_sum() {
         let (alpha, beta) = (0.3_f64, 0.1_f64);
@@ -165,8 +164,8 @@ mod tests {
         assert!(expected.error_to(&found).amax() < 1e-14, "{}", expected.error_to(&found));
     }
 
-    /// tr(Rᵀ M) of the best rotation is s₁ + s₂ ± s₃: for a diagonal M that is its trace, or with a negative determinant the two
-    /// greater less the least.
+    /// tr(Rᵀ M) of the best rotation is s₁ + s₂ ± s₃: the trace of a diagonal M, or with a negative determinant the two
+    /// largest values minus the smallest.
     #[test]
     fn the_rotation_maximises_the_trace() {
         let turn = |angles: [f64; 3]| seafix_geometry::so3::exp(&angles.into()).to_rotation_matrix().into_inner();

@@ -1,4 +1,4 @@
-//! L-BFGS: the likelihood of the pixels, maximised by a library that knows nothing of poses.
+//! L-BFGS: maximum likelihood of the pixels by a general-purpose library.
 
 use argmin::core::{Executor, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
@@ -12,15 +12,17 @@ use super::{
 };
 use crate::Observations;
 
-/// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by limited-memory
-/// BFGS with Moré's and Thuente's line search on six numbers and a numerical gradient: an independent judge of our own
-/// minimiser, not a rival in speed. It ends where the cost has no digits left.
+/// Limited-memory BFGS: min Σ rᵀ S⁻¹ r over the pixels of both images.
+///
+/// The cost is that of `stereo-reprojection`, as a function of six numbers; the method uses the line search of Moré and
+/// Thuente and a numerical gradient. It is an independent check of the project's own minimiser and does not compete in
+/// speed. It ends at the limit of precision of the cost.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct LBfgs {
-    /// Iterations at most.
+    /// Maximum number of iterations, 1 to 1000000.
     pub(crate) iterations: u64,
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
@@ -56,9 +58,9 @@ impl Optimiser for LBfgs {
         let cost = || PixelCost::of(data, rig, *start, &best);
         let search = MoreThuenteLineSearch::new().with_c(1e-4, 0.9).expect("0 < 1e-4 < 0.9 < 1");
         let method = LBFGS::new(search, 7).with_tolerance_grad(1e-8).and_then(|m| m.with_tolerance_cost(0.0));
-        let method = method.expect("no tolerance is negative");
-        // An error means that the line search found no lower place: mostly where the digits end. The best seen is the answer,
-        // if nothing pulls there.
+        let method = method.expect("tolerances are not negative");
+        // An error means that the line search found no lower cost, mostly at the limit of precision. The best
+        // evaluation is the answer if the gradient vanishes there.
         let run = Executor::new(cost()?, method)
             .configure(|state| state.param(vec![0.0; 6]).max_iters(self.iterations))
             .timer(false)

@@ -1,4 +1,4 @@
-//! The likeliest pose without some of the points, from the likeliest with all of them.
+//! Leave-out poses: the maximum-likelihood pose without some of the points.
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
@@ -10,25 +10,25 @@ use super::{
 };
 use crate::Observations;
 
-/// What each point contributes to the likeliest pose of all, so that leaving some out costs six equations.
+/// The contribution of each point to the normal equations; an exclusion costs one 6×6 solve.
 pub(crate) struct Deletions<'a> {
     data: &'a Observations<'a>,
     pose: Transform<Object, Camera>,
     all: Linearized,
     each: Vec<Linearized>,
-    /// Of all points, had the fit a scale besides; `None` where they fix none.
+    /// The scale error of all points; `None` if they determine none.
     pub(crate) scale_error: Option<ScaleError>,
 }
 
-/// With fewer points left another valley may be the likeliest.
+/// Minimum number of remaining points for a single step; with fewer another minimum may be the best.
 const ENOUGH: usize = 5;
-/// A step of more than a standard deviation, squared, is not trusted to be straight.
+/// Largest squared step (standard deviations) that counts as linear.
 const NEAR: f64 = 1.0;
-/// Nor is an attitude less certain than this (rad, three axes together).
+/// Largest standard deviation of the attitude (rad, three axes together) at which a step counts as linear.
 const SURE: f64 = 0.01;
 
 impl<'a> Deletions<'a> {
-    /// `None` where all points together determine no pose.
+    /// `None` if all points together determine no pose.
     pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
         let solved = Mahalanobis::default().solved(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
@@ -41,8 +41,10 @@ impl<'a> Deletions<'a> {
         Some(Self { data, pose, all, each, scale_error })
     }
 
-    /// The likeliest pose without the points `out`, and its covariance: one step from that of all points where it is
-    /// short and enough points are left, else from the beginning. `None` where the others determine no pose.
+    /// The maximum-likelihood pose without the points `out`, and its covariance.
+    ///
+    /// It is one step from the pose of all points if the step is short and enough points remain; otherwise the
+    /// remaining points are solved anew. `None` if they determine no pose.
     pub(crate) fn without(&self, out: &[usize]) -> Option<(Transform<Object, Camera>, Covariance6<Object, Camera>)> {
         if self.each.len() >= out.len() + ENOUGH {
             let left = out.iter().fold(self.all, |left, &k| left.less(&self.each[k]));
@@ -68,7 +70,7 @@ mod tests {
     use nalgebra::Vector3;
     use seafix_geometry::{Point, UncertainPoint};
 
-    /// Seven points, bare, one of them a little off.
+    /// Seven points without pixels, one of them with a small error.
     fn seen() -> Observations<'static> {
         let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -3.0].into());
         let points = (0..7).map(|k| {

@@ -1,4 +1,4 @@
-//! How likely the residuals are: the measure by which sets are believed and rivals ranked.
+//! The likelihood of the residuals, by which sets are accepted and alternatives ranked.
 
 use seafix_geometry::{Camera, Object, Transform};
 
@@ -8,20 +8,19 @@ use super::{
 };
 use crate::Observations;
 
-/// The most likely pose of a set of pairs and how well it explains them.
+/// The maximum-likelihood pose of a set of pairs, with its cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Likelihood {
-    /// Where the likelihood is greatest.
+    /// The maximum-likelihood pose.
     pub(crate) pose: Transform<Object, Camera>,
-    /// Σ rᵀ S⁻¹ r there: χ² with 3k − 6 degrees of freedom for true pairs.
+    /// Σ rᵀ S⁻¹ r at the pose: χ² with 3k − 6 degrees of freedom for correct pairs.
     pub(crate) cost: f64,
 }
 
-/// The maximum of the likelihood of the residuals, from a pose near it.
+/// The maximum of the likelihood of the residuals near a pose.
 ///
-/// With r_k = Rᵀ(P_k − t) − C_k in camera axes and S_k = Σ_measured + σ_model² I, the least
-/// Σ r_kᵀ S_k⁻¹ r_k. Whatever the weights of the solver that gave `start`, the cost at the maximum is
-/// χ² with 3k − 6 degrees of freedom, so that it can be tested.
+/// With r_k = Rᵀ(P_k − t) − C_k in camera axes and S_k = Σ_measured + σ_model² I, it minimises Σ r_kᵀ S_k⁻¹ r_k. The
+/// cost at the maximum is χ² with 3k − 6 degrees of freedom for every solver that gave `start`, so it can be tested.
 pub(crate) fn maximum(data: &Observations<'_>, start: &Transform<Object, Camera>) -> Likelihood {
     let measured = Measured::of(&data.points);
     let term = |k: usize, at: &_| Some(measured.term(k, at));

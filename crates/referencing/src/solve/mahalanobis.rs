@@ -1,4 +1,4 @@
-//! Mahalanobis: 3D–3D least squares, every point weighed by its whole covariance.
+//! Mahalanobis: 3D–3D least squares with the full covariance of every point.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use seafix_component::{Component, in_range};
@@ -17,22 +17,22 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// The pose of least Σ rᵀ (Σ_measured + σ_model² I)⁻¹ r, r = C − H⁻¹P in camera axes.
+/// Weighted 3D–3D least squares: min Σ rᵀ (Σ_measured + σ_model² I)⁻¹ r, r = C − H⁻¹P in camera axes.
 ///
-/// A triangulated point's covariance grows with the fourth power of its depth, so that points which noise
-/// brought nearer are believed too much; and noise of the disparity moves the mean depth outwards,
-/// E z ≈ z (1 + σ_d²/d²). Where pixels and rig are known, both are therefore seen from the *fitted* point p: its
-/// covariance Σ(p) = (Jᵀ Σ_px⁻¹ J)⁻¹, J = ∂pixels/∂p, and the displacement C − p as the step that moves p's pixels to
-/// those of C to first order, r = Σ(p) Jᵀ Σ_px⁻¹ (π(C) − π(p)). Pixels have no bias, so r has none to second
-/// order. The answer then solves Σ ∂pᵀ (Σ(p) + σ² I)⁻¹ r = 0: it is that of the pixels of the triangulated point.
+/// The covariance of a triangulated point grows with the fourth power of its depth, so points moved nearer by noise
+/// have too much weight; and disparity noise biases the depth outwards, E z ≈ z (1 + σ_d²/d²). With pixels and a rig,
+/// both are therefore evaluated at the *fitted* point p: its covariance Σ(p) = (Jᵀ Σ_px⁻¹ J)⁻¹, J = ∂pixels/∂p, and the
+/// displacement C − p as the first-order step between the pixels of p and of C, r = Σ(p) Jᵀ Σ_px⁻¹ (π(C) − π(p)).
+/// Pixels are unbiased, so r is unbiased to second order. The answer then solves Σ ∂pᵀ (Σ(p) + σ² I)⁻¹ r = 0, as does
+/// reprojection of the triangulated point's pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mahalanobis {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub min_ratio: f64,
-    /// Whether covariances and displacements are seen from the fitted points, where pixels and rig are known.
+    /// Whether to evaluate covariances and displacements at the fitted points; it requires pixels and a rig.
     pub refit: bool,
-    /// How many starts at most, where pixels and rig are known: one is the unweighted fit alone.
+    /// Maximum number of initial poses, 1 to 5, with pixels and a rig; 1 uses the unweighted fit alone.
     pub starts: usize,
 }
 
@@ -99,7 +99,7 @@ impl Solver for Mahalanobis {
     }
 }
 
-/// What a point, by its number, says of the place where a pose puts it.
+/// The term of a point, by index, at the position where a pose puts it.
 pub(super) type Terms<'a> = &'a dyn Fn(usize, &Vector3<f64>) -> Option<Term>;
 
 /// The inverse of the points' information at a pose.
@@ -112,7 +112,7 @@ pub(super) fn covariance(
 }
 
 impl Mahalanobis {
-    /// What `work` makes of the answer and of the terms that led to it.
+    /// Applies `work` to the answer and to the terms at it.
     pub(super) fn solved<R>(
         &self,
         data: &Observations<'_>,
@@ -134,7 +134,7 @@ impl Mahalanobis {
     }
 }
 
-/// Points with the covariance they were measured with.
+/// The points with the inverse of their measured covariance.
 pub(super) struct Measured<'a> {
     points: &'a [Observation],
     information: SmallVec<[Matrix3<f64>; FEW]>,
@@ -145,7 +145,7 @@ impl<'a> Measured<'a> {
         Self { points, information: points.iter().map(information).collect() }
     }
 
-    /// What the k-th says of the place where a pose puts it.
+    /// The term of the k-th point at the position where a pose puts it.
     #[inline]
     pub(super) fn term(&self, k: usize, at: &Vector3<f64>) -> Term {
         Term::of(self.information[k], &(self.points[k].measured.at.coords - at))
@@ -155,7 +155,7 @@ impl<'a> Measured<'a> {
 /// (Σ_measured + σ_model² I)⁻¹.
 pub(super) fn information(point: &Observation) -> Matrix3<f64> {
     let noise = point.noise();
-    // In units of its own size, so that no determinant leaves the range of numbers.
+    // Scaled to unit size, so that the determinant neither overflows nor underflows.
     let size = noise.trace() / 3.0;
     (noise / size).try_inverse().unwrap_or_else(Matrix3::identity) / size
 }
@@ -176,7 +176,7 @@ mod tests {
         StereoRig::new(camera, camera, Transform::exp(&Vector6::new(0.02, -0.05, 0.01, -0.25, 0.01, 0.02))).unwrap()
     }
 
-    /// The points as the rig sees them from 4 m, each pixel coordinate with an error of up to `max` (px).
+    /// The points as the rig sees them from 4 m, with an error of up to `max` (px) in each pixel coordinate.
     fn seen(rig: &StereoRig, max: f64) -> Observations<'_> {
         let pose = Transform::<Object, Camera>::exp(&Vector6::new(0.4, -0.3, 0.7, 0.2, 0.3, -4.0));
         let points = PLACES.iter().enumerate().map(|(k, at)| {
@@ -219,7 +219,7 @@ mod tests {
         let point = Observation { measured, pixels: None, model: Point::origin(), model_sigma: 2e-3 };
         let expected = Matrix3::from_diagonal(&Vector3::new(1.0 / 5e-6, 1.0 / 8e-6, 1.0 / 13e-6));
         assert!((information(&point) - expected).amax() < 1e-6 * expected.amax());
-        // Too large or too small for a determinant within the range of numbers.
+        // Determinants out of the range of numbers.
         for sigma in [1e-60, 1e60] {
             let point =
                 Observation { measured: UncertainPoint::isotropic(Point::origin(), sigma), model_sigma: 0.0, ..point };
@@ -228,7 +228,7 @@ mod tests {
         }
     }
 
-    /// A shift along x of the two points on the x axis, known to 1 mm there, against two points known to 2 mm.
+    /// A displacement along x of the two points on the x axis, with 1 mm of noise there, against two points with 2 mm.
     #[test]
     fn every_axis_has_its_own_weight() {
         let point = |at: [f64; 3], x: f64, off: [f64; 3]| Observation {
@@ -251,11 +251,12 @@ mod tests {
             .collect();
         let data = Observations { points, rig: None };
         let found = Mahalanobis::default().solve(&data).unwrap();
-        // Weights 4 to 1: the x of the fit is off by 4/5 of 0.3 mm.
+        // Weights 4 to 1: the x of the fit has an error of 4/5 of 0.3 mm.
         assert!((found.translation() + Vector3::new(2.4e-4, 0.0, 0.0)).amax() < 1e-9, "{}", found.translation());
     }
 
-    /// The refitted answer is that of the pixels to second order in the noise; the measured covariances lead elsewhere.
+    /// The refitted answer equals that of the pixels to second order in the noise; the measured covariances lead
+    /// elsewhere.
     #[test]
     fn with_pixels_and_a_rig_the_answer_is_that_of_the_pixels() {
         let rig = rig();
@@ -265,14 +266,14 @@ mod tests {
         let fixed = Mahalanobis { refit: false, ..Mahalanobis::default() }.solve(&data).unwrap();
         let (near, far) = (pixels.error_to(&refit).norm(), pixels.error_to(&fixed).norm());
         assert!(far > 5e-4 && near < 0.01 * far, "{near} {far}");
-        // Without a rig, or without pixels, there is nothing to refit.
+        // Refitting requires a rig and pixels.
         let bare = Mahalanobis::default().solve(&Observations { rig: None, ..data.clone() }).unwrap();
         assert!(fixed.error_to(&bare).amax() < 1e-12);
         let mut points = data.points.clone();
         points.iter_mut().for_each(|point| point.pixels = None);
         let without = Mahalanobis::default().solve(&Observations { points, rig: Some(&rig) }).unwrap();
         assert!(fixed.error_to(&without).amax() < 1e-12);
-        // One point with pixels is enough.
+        // One point with pixels suffices.
         let mut some = data.clone();
         some.points[1..].iter_mut().for_each(|point| point.pixels = None);
         let solver = Mahalanobis::default();
@@ -280,7 +281,7 @@ mod tests {
         assert!(Mahalanobis { refit: false, ..solver }.rig(&data).is_none());
     }
 
-    /// What an error of the model makes of the pose, with and without pixels, is what moving the model's points makes of it.
+    /// The pose errors by model errors, with and without pixels, equal the effect of moved model points.
     #[test]
     fn model_errors_are_the_derivatives_of_the_answer() {
         let rig = rig();
@@ -296,7 +297,7 @@ mod tests {
         }
     }
 
-    /// Points and no rig have one valley.
+    /// Points without a rig have one minimum.
     #[test]
     fn bare_points_have_no_alternatives() {
         let rig = rig();
@@ -306,7 +307,8 @@ mod tests {
         assert!(solver.alternatives(&data, &at, 1e9).is_empty());
     }
 
-    /// A plate of 0.2 m at 4 m, tilted by 20°: the depths are known to some 5 cm, which does not tell the side to which it is tilted.
+    /// A plate of 0.2 m at 4 m, tilted by 20°: depths have an error of about 5 cm, so the side of the tilt is
+    /// undetermined.
     #[test]
     fn a_small_tilted_plate_may_be_tilted_the_other_path() {
         let rig = rig();

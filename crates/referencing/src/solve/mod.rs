@@ -1,4 +1,4 @@
-//! Solvers: the rigid motion that carries the measured points onto the model.
+//! Solvers: the rigid motion that maps measured points onto model points.
 
 use nalgebra::SMatrix;
 use seafix_component::{Registry, entry};
@@ -56,146 +56,190 @@ pub use triad::{Choose, Triad};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Degenerate {
     /// Fewer points than the solver needs.
-    #[error("{found} points; the solver needs {needed}")]
+    #[error("too few points: {found} found, the solver needs {needed}")]
     TooFew {
-        /// How many there are.
+        /// The number of points.
         found: usize,
-        /// How many it needs.
+        /// The number that the solver needs.
         needed: usize,
     },
-    /// The points lie (nearly) on a line: the rotation about it is unknown.
-    #[error(
-        "the points are nearly collinear: their second extent is {ratio:.2e} of the first, at least {min:.2e} is needed"
-    )]
+    /// The points are (nearly) collinear, so the rotation about their line is undetermined.
+    #[error("nearly collinear points: their second extent is {ratio:.2e} of the first, at least {min:.2e} is needed")]
     Collinear {
-        /// Second singular value over the first.
+        /// The ratio of second to first singular value.
         ratio: f64,
-        /// The least accepted.
+        /// The smallest accepted ratio.
         min: f64,
     },
     /// A measured point lies behind the left camera.
-    #[error("point {index} was measured {depth:.3} m before the left camera; a camera sees what is in front of it")]
+    #[error("point behind the camera: point {index} has a depth of {depth:.3} m; check the triangulation")]
     Behind {
-        /// Its place among the points.
+        /// The index of the point.
         index: usize,
-        /// Its depth (m), zero or less.
+        /// The depth (m), zero or less.
         depth: f64,
     },
-    /// All points are so far away that the two cameras see them from one place.
+    /// All points are too far away for the baseline.
     #[error(
-        "even the best measured distance is uncertain by {fraction:.2} of itself, at most {max:.2} is accepted: the \
-         points are too far away for the baseline"
+        "points too far away for the baseline: the best distance has a relative error of {fraction:.2}, \
+         at most {max:.2} is accepted"
     )]
     Far {
-        /// Least standard deviation of a distance over the distance.
+        /// The smallest relative standard deviation of a distance.
         fraction: f64,
-        /// The most accepted.
+        /// The largest accepted value.
         max: f64,
     },
-    /// The solver looks at pixels, and there are none, or no rig.
-    #[error("the points have no pixels or there is no rig; `mahalanobis` takes points alone")]
+    /// The solver needs pixels and a rig, and at least one is missing.
+    #[error("no pixels or no rig: the solver needs both; use `mahalanobis` for points alone")]
     NoPixels,
-    /// The measured points have not the size of the model's.
-    #[error("the model is {scale:.4} times as large as what was measured; {max} off one is accepted")]
+    /// Measured points and model differ in scale.
+    #[error(
+        "wrong scale: the model is {scale:.4} times as large as the measured points, a deviation of {max} is \
+        accepted"
+    )]
     Scale {
         /// The scale of the best similarity.
         scale: f64,
-        /// Largest accepted distance from one.
+        /// The largest accepted deviation from one.
         max: f64,
     },
-    /// The normal equations have no solution: some motion changes nothing that was measured.
+    /// The normal equations are singular: a motion changes no measurement.
     #[error(
-        "the points leave a motion undetermined: their information, scaled to ones on its diagonal, has the least \
-         eigenvalue {fraction:.1e}; more than rounding, {min:.1e}, is needed"
+        "undetermined motion: the smallest eigenvalue of the information, scaled to a unit diagonal, is \
+         {fraction:.1e}, \
+         more than the rounding error of {min:.1e} is needed"
     )]
     Singular {
-        /// The least eigenvalue of the scaled information.
+        /// The smallest eigenvalue of the scaled information.
         fraction: f64,
-        /// The least that is told from none.
+        /// The smallest eigenvalue above rounding.
         min: f64,
     },
-    /// A number is not finite.
-    #[error("a coordinate is not finite")]
+    /// A coordinate is not finite.
+    #[error("invalid point: a coordinate is not finite")]
     NotFinite,
-    /// The stated noise of a point is none: not finite, or without an inverse.
-    #[error("the noise of point {index} is no covariance: it must be finite and positive definite")]
+    /// The covariance of a point is not finite or not invertible.
+    #[error("invalid noise of point {index}: its covariance must be finite and positive definite")]
     Noise {
-        /// Its place among the points.
+        /// The index of the point.
         index: usize,
     },
-    /// A pose on the way to the answer puts a point where a camera that saw it cannot.
-    #[error("a pose that was tried puts point {index} at a depth of {depth:.3} m, where a camera that saw it cannot")]
+    /// A pose of the iteration puts a point out of a camera's view.
+    #[error(
+        "hidden point: a pose of the iteration puts point {index} at a depth of {depth:.3} m, out of a camera's \
+        view"
+    )]
     Hidden {
-        /// Its place among the points.
+        /// The index of the point.
         index: usize,
-        /// Its depth before the left camera (m).
+        /// The depth in the left camera (m).
         depth: f64,
     },
-    /// Other noise of the same size leaves too few answers to tell how they scatter.
-    #[error(
-        "of {sampled} draws of other noise only {answered} have an answer; nine of ten are needed for a covariance"
-    )]
+    /// Too few resampled problems have a solution to estimate a covariance.
+    #[error("no covariance: only {answered} of {sampled} resampled problems have a solution, nine of ten are needed")]
     Scattered {
-        /// Draws with an answer.
+        /// The number of resampled problems with a solution.
         answered: usize,
-        /// All draws.
+        /// The number of resampled problems.
         sampled: usize,
     },
-    /// An iteration ended before it was at its minimum.
-    #[error("after {steps} steps the minimum is still {off:.2e} standard deviations away; at most {max} is accepted")]
+    /// An iteration ended before its minimum.
+    #[error("no convergence: after {steps} steps the minimum is {off:.2e} standard deviations away, {max} is accepted")]
     Unconverged {
-        /// Steps that were taken.
+        /// The number of steps.
         steps: u64,
-        /// How far the minimum still is (standard deviations of the pose).
+        /// The distance of the minimum (standard deviations of the pose).
         off: f64,
-        /// The most accepted.
+        /// The largest accepted distance.
         max: f64,
     },
 }
 
-/// The farthest from its minimum (standard deviations of the pose) that an iteration may end: an error that is added
-/// to the noise's own makes it one in twenty thousand larger.
+/// Largest distance (standard deviations of the pose) from the minimum at the end of an iteration.
+///
+/// It adds at most 1 in 20 000 to the error.
 const CONVERGED: f64 = 0.01;
 
-/// Refuses a pose that is farther from its minimum than [`CONVERGED`], and a distance that is no number.
+/// Rejects a pose farther from its minimum than [`CONVERGED`]; a NaN is rejected as well.
 pub(crate) fn converged(steps: u64, off: f64) -> Result<(), Degenerate> {
     if off <= CONVERGED { Ok(()) } else { Err(Degenerate::Unconverged { steps, off, max: CONVERGED }) }
 }
 
-/// Refuses what determines no pose: fewer than three points, numbers that are not finite, points on a line and, seen by a
-/// rig, behind the camera or too far away.
+/// Rejects geometry without a pose: fewer than three points, numbers that are not finite, collinear points and, with a
+/// rig, points behind the camera or too far away.
 pub(crate) fn wide_enough(data: &Observations<'_>) -> Result<(), Degenerate> {
     degeneracy::check(data, 3, 1e-3)
 }
 
-/// Another pose that explains the same points nearly as well.
+/// An alternative pose that explains the same points nearly as well.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlternativePose {
     /// The pose.
     pub pose: Transform<Object, Camera>,
-    /// By how much its χ² is larger; less than nought where it is smaller.
+    /// The excess of its χ² over the answer's; negative if its χ² is smaller.
     pub worse: f64,
 }
 
-/// Computes the rigid motion that carries observed points onto model points.
+/// A solver: the rigid motion that maps measured points onto model points.
+///
+/// [`covariance`](Self::covariance) and [`model_errors`](Self::model_errors) have default implementations by numerical
+/// derivatives, so [`solve`](Self::solve) suffices.
+///
+/// ```
+/// use nalgebra::{UnitQuaternion, Vector3};
+/// use seafix_geometry::{Camera, Object, Point, Transform, UncertainPoint};
+/// use seafix_referencing::{Degenerate, Observation, Observations, Solver};
+///
+/// /// The mean translation, for a camera with the object's attitude.
+/// #[derive(Debug)]
+/// struct MeanTranslation;
+///
+/// impl Solver for MeanTranslation {
+///     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+///         if data.points.len() < self.minimum() {
+///             return Err(Degenerate::TooFew { found: data.points.len(), needed: self.minimum() });
+///         }
+///         let sum: Vector3<f64> = data.points.iter().map(|point| point.model.coords - point.measured.at.coords).sum();
+///         Ok(Transform::new(UnitQuaternion::identity(), sum / data.points.len() as f64))
+///     }
+/// }
+///
+/// // Four points, measured 3 m in front of the camera with a standard deviation of 10 mm.
+/// let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|at: [f64; 3]| Observation {
+///     measured: UncertainPoint::isotropic(Point::new(at[0], at[1], at[2] + 3.0), 0.01),
+///     pixels: None,
+///     model: Point::from(at),
+///     model_sigma: 0.0,
+/// });
+/// let data = Observations { points: points.to_vec(), rig: None };
+/// let pose = MeanTranslation.solve(&data)?;
+/// assert!((pose.translation() - Vector3::new(0.0, 0.0, -3.0)).norm() < 1e-12);
+///
+/// // The mean of four points has half of their standard deviation along each of the three axes.
+/// let sigma = MeanTranslation.covariance(&data, &pose)?.position_sigma();
+/// assert!((sigma - 0.005 * 3f64.sqrt()).abs() < 1e-6);
+/// # Ok::<(), Degenerate>(())
+/// ```
 pub trait Solver: Send + Sync + std::fmt::Debug {
-    /// The least number of points it works with.
+    /// The minimum number of points.
     fn minimum(&self) -> usize {
         3
     }
 
-    /// Whether it looks at the pixels of both images, and refuses points without them.
+    /// Whether the solver needs the pixels of both images; it rejects points without them.
     fn needs_pixels(&self) -> bool {
         false
     }
 
-    /// Whether its pose claims the least sum of squared, unweighted residuals of all rigid motions.
+    /// Whether the pose minimises the sum of squared, unweighted residuals over all rigid motions.
     fn least_squares(&self) -> bool {
         false
     }
 
-    /// Whether it answers to rounding error, so that the same problem written otherwise has the same answer. A
-    /// general-purpose optimiser that looks at costs alone ends a ten-thousandth of a standard deviation off.
+    /// Whether the answer is exact to rounding, so that equivalent inputs give equal answers.
+    ///
+    /// A general-purpose optimiser that evaluates costs only ends 1e-4 standard deviations from the minimum.
     fn to_rounding(&self) -> bool {
         true
     }
@@ -203,39 +247,46 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// The pose `object_from_camera`.
     ///
     /// # Errors
-    /// [`Degenerate`]: the geometry determines no pose, with the number that failed.
+    ///
+    /// [`Degenerate`]: the geometry determines no pose; the failed test is stated with its number.
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>;
 
-    /// The scale s of the model against the measured points, of least Σ ‖P_k − s C_k H‖²: a diagnostic of a solver that finds
-    /// it. A fix is rigid and does not use it. `None` of other solvers, and where `solve` refuses the geometry.
+    /// The scale s of the model relative to the measured points: min Σ ‖P_k − s C_k H‖².
+    ///
+    /// It is a diagnostic; a fix is rigid and does not use it. `None` for solvers that do not estimate it, and for
+    /// geometry that `solve` rejects.
     fn scale(&self, data: &Observations<'_>) -> Option<f64> {
         let _ = data;
         None
     }
 
-    /// Which of the points the pose rests on, as ascending indices: all of them, unless the solver
-    /// says otherwise. Empty where `solve` would refuse.
+    /// The indices of the points that determine the pose, ascending; all points by default.
+    ///
+    /// Empty if `solve` rejects the geometry.
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {
         (0..data.points.len()).collect()
     }
 
-    /// Other poses that are as likely as [`solve`](Self::solve)'s answer `at`, but for no more than `max` of χ², and that its
-    /// covariance does not contain: minima in other valleys of the likelihood, as few points that are small for their distance
-    /// have them. None of a solver whose cost has one minimum.
+    /// Other local minima with a χ² of at most `max` above that of the answer `at`.
     ///
-    /// With `max` the quantile of χ²₁ at a confidence, that of two valleys the wrong one is answered alone has no more than
-    /// half the probability that the confidence leaves, whatever the distance d of the valleys: the difference of their χ² is
-    /// normal with mean d² and variance 4d², and Q((d² + most) / 2d) is greatest where d² is `max`.
+    /// Minima within the covariance of the answer are excluded. Others occur with few points whose extent is small
+    /// relative to their distance. A solver with a single minimum returns none.
+    ///
+    /// With `max` the quantile of χ²₁ at a confidence, the probability of answering with the wrong one of two minima
+    /// alone is at most half of one minus the confidence, for every distance d of the minima: the difference of their
+    /// χ² is normal with mean d² and variance 4d², and Q((d² + max) / 2d) is largest at d² = `max`.
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let _ = (data, at, max);
         Vec::new()
     }
 
-    /// First-order covariance of [`solve`](Self::solve) at its answer: Σ = Σ_i J_i Σ_i J_iᵀ over all
-    /// measured and model points, J by central differences through the solver itself. Honest for
-    /// any solver, whatever its weights.
+    /// The first-order covariance of [`solve`](Self::solve) at its answer `at`.
+    ///
+    /// Σ = Σ_i J_i Σ_i J_iᵀ over all measured and model points, with J by central differences through the solver
+    /// itself. It is consistent for any solver, whatever its weights.
     ///
     /// # Errors
+    ///
     /// As `solve`.
     fn covariance(
         &self,
@@ -245,11 +296,14 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         numerical::covariance(|moved| self.solve(moved), data, at)
     }
 
-    /// What the model's errors have in [`covariance`](Self::covariance): for each point H = σ_model ∂ξ/∂P, the error of the
-    /// pose a standard deviation of that point's three coordinates, by central differences through the solver itself.
-    /// Σ H Hᵀ is common to every pose from this model; the rest is drawn anew with each image.
+    /// The contribution of model errors to the [`covariance`](Self::covariance): H = σ_model ∂ξ/∂P for each point.
+    ///
+    /// H is the pose error for one standard deviation of each of the point's coordinates, by central differences
+    /// through the solver. Σ H Hᵀ is common to every pose from this model; the rest of the covariance is independent
+    /// between images.
     ///
     /// # Errors
+    ///
     /// As `solve`.
     fn model_errors(
         &self,
@@ -260,7 +314,7 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All solvers.
+/// The registry of solvers.
 pub static SOLVERS: Registry<dyn Solver> = Registry::new(
     "solver",
     &[

@@ -1,4 +1,4 @@
-//! Nelder–Mead: the likelihood of the pixels, maximised without any derivative.
+//! Nelder–Mead: maximum likelihood of the pixels without derivatives.
 
 use argmin::core::{Executor, State};
 use argmin::solver::neldermead;
@@ -13,16 +13,17 @@ use super::{
 };
 use crate::Observations;
 
-/// The pose of least Σ rᵀ S⁻¹ r over the pixels of both images, the cost of `stereo-reprojection`, by a simplex of seven
-/// poses, begun anew about its own answer until that moves it by nothing: an independent judge that no error of a
-/// derivative can mislead. Each simplex measures in standard deviations of the pose that it begins at, so that the cost
-/// falls alike in all directions.
+/// Nelder–Mead simplex of seven poses: min Σ rᵀ S⁻¹ r over the pixels of both images.
+///
+/// The cost is that of `stereo-reprojection`. The simplex is restarted about its own answer until the answer no longer
+/// moves: an independent check that no wrong derivative can mislead. Each simplex is scaled by the standard deviations
+/// of the pose at its start, so that the cost is equally steep in all directions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct NelderMead {
-    /// Iterations of one simplex at most.
+    /// Maximum number of iterations of one simplex, 1 to 1000000.
     pub(crate) iterations: u64,
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
@@ -42,16 +43,15 @@ impl Component for NelderMead {
     }
 }
 
-/// Simplices begun at most.
+/// Maximum number of simplices.
 const MAX_ROUNDS: usize = 20;
-/// Edges of the first simplex, and of the smallest that is begun (standard deviations of the pose).
+/// Edges of the first simplex and of the smallest (standard deviations of the pose).
 const EDGES: [f64; 2] = [5.0, 0.1];
-/// The standard deviation of the costs of the seven poses at which the first simplex ends, near the minimum, and every later
-/// one, at it: χ² is the square of the distance.
+/// Standard deviation of the seven costs at which a simplex ends: the first near the minimum, every later one at it.
 const LEVEL: [f64; 2] = [1e-1, 1e-15];
-/// The same as a share of the cost: below it are no digits.
+/// The same relative to the cost; it is the limit of precision.
 const DIGITS: f64 = 1e-15;
-/// Two simplices, one on each side, that move their pose by less (standard deviations) are the last.
+/// Movement (standard deviations) below which two simplices, one on each side, end the search.
 const STILL: f64 = 1e-4;
 
 impl Optimiser for NelderMead {
@@ -73,7 +73,7 @@ impl Optimiser for NelderMead {
             let cost = || PixelCost::of(data, rig, pose, &best);
             let corner = |i: usize| (1..7).map(|k| if k == i { edge } else { 0.0 }).collect();
             let method = neldermead::NelderMead::new((0..7).map(corner).collect()).with_sd_tolerance(level);
-            let method = method.expect("no tolerance is negative");
+            let method = method.expect("tolerances are not negative");
             let run =
                 Executor::new(cost()?, method).configure(|state| state.max_iters(self.iterations)).timer(false).run();
             taken += run.map_or(self.iterations, |result| result.state().get_iter());

@@ -13,7 +13,7 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    /// Adds a point and its information, which is symmetric.
+    /// Adds a point with its symmetric information matrix.
     #[inline]
     pub(super) fn add(&mut self, at: &Vector3<f64>, information: &Matrix3<f64>) {
         let w = information;
@@ -32,14 +32,14 @@ impl Normal {
         self.shift += w;
     }
 
-    /// Adds what others have added.
+    /// Adds the sums of `other`.
     pub(super) fn join(&mut self, other: &Self) {
         self.turn += other.turn;
         self.mixed += other.mixed;
         self.shift += other.shift;
     }
 
-    /// Takes away what was added.
+    /// Subtracts the sums of `other`.
     pub(super) fn remove(&mut self, other: &Self) {
         self.turn -= other.turn;
         self.mixed -= other.mixed;
@@ -55,7 +55,7 @@ impl Normal {
         all
     }
 
-    /// The ξ of (N + damping · diag N) ξ = `gradient`; `None` where that is not positive definite.
+    /// The solution ξ of (N + damping · diag N) ξ = `gradient`; `None` if the matrix is not positive definite.
     pub(super) fn solve(&self, damping: f64, gradient: &Vector6<f64>) -> Option<Vector6<f64>> {
         let n = self.matrix();
         let mut l = Matrix6::zeros();
@@ -97,22 +97,25 @@ impl Normal {
 /// The inverse of an information matrix.
 ///
 /// # Errors
-/// [`Degenerate::Singular`] where it is not positive definite.
+///
+/// [`Degenerate::Singular`] if it is not positive definite.
 pub(crate) fn inverse(information: &Matrix6<f64>) -> Result<Matrix6<f64>, Degenerate> {
     information.cholesky().map(|root| root.inverse()).ok_or_else(|| singular(information))
 }
 
-/// That a matrix without a Cholesky factor has none, with its least eigenvalue once rows and columns are scaled to ones on
-/// the diagonal.
+/// The error for a matrix without a Cholesky factor.
+///
+/// It states the smallest eigenvalue after scaling the diagonal to ones.
 pub(super) fn singular(information: &Matrix6<f64>) -> Degenerate {
     let root = information.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
     let scaled = information.component_mul(&(root * root.transpose()));
-    // Eigenvalues of what is not finite are sought without end.
+    // The eigenvalue iteration of a matrix that is not finite would not end.
     let fraction = if scaled.iter().all(|x| x.is_finite()) { scaled.symmetric_eigenvalues().min() } else { f64::NAN };
     Degenerate::Singular { fraction, min: rounding(6) }
 }
 
-/// The least eigenvalue at which the factor of a matrix with so many rows and ones on its diagonal is sure to be found.
+/// The smallest eigenvalue of a unit-diagonal matrix that guarantees a Cholesky factor.
+///
 /// (Demmel, *On floating point errors in Cholesky*, 1989.)
 pub(crate) fn rounding(rows: usize) -> f64 {
     (rows * (rows + 1)) as f64 * f64::EPSILON
@@ -146,7 +149,7 @@ mod tests {
         assert!((inverse(&expected).unwrap() * expected - Matrix6::identity()).amax() < 1e-10);
     }
 
-    /// Points on a line say nothing of the turn about it.
+    /// Collinear points leave the rotation about their line undetermined.
     #[test]
     fn what_has_no_inverse_is_refused_with_its_smallest_eigenvalue() {
         let mut line = Normal::default();

@@ -6,15 +6,14 @@ use seafix_geometry::{Camera, Covariance6, Object, Pixel, StereoPixels, StereoRi
 use super::{Degenerate, pixel_terms::PIXEL_FLOOR};
 use crate::{Observation, Observations};
 
-/// The longest step (m) of the differences: rounding (1e-15 of the coordinates over the step) and the
-/// third derivative (the step squared) are then both below 1e-9 of the result.
+/// Longest step (m) of the differences; rounding (1e-15 of the coordinates over the step) and the third derivative
+/// (squared step) are then below 1e-9 of the result.
 const STEP: f64 = 1e-5;
-/// The same of pixel coordinates (px).
+/// Longest step of pixel coordinates (px).
 const PIXEL_STEP: f64 = 1e-3;
-/// Where noise is less, a step is this share of it: what a solver does beyond its noise is no derivative of what it does
-/// within.
+/// Largest step as a fraction of the noise; beyond its noise a solver's derivative differs from that within.
 const FRACTION: f64 = 0.1;
-/// The shortest step, over the coordinates that it is added to: rounding then spoils no more than the fifth digit.
+/// Shortest step relative to the coordinates; rounding then affects no more than the fifth digit.
 const SHORTEST: f64 = 1e-10;
 
 /// The step for coordinates of this size and noise, at most `longest`.
@@ -22,16 +21,16 @@ fn step(longest: f64, sigma: f64, coordinates: f64) -> f64 {
     (FRACTION * sigma).min(longest).max(SHORTEST * coordinates)
 }
 
-/// The least standard deviation of a coordinate.
+/// The smallest standard deviation of a coordinate.
 fn min<const N: usize>(covariance: &SMatrix<f64, N, N>) -> f64 {
     (0..N).map(|i| covariance[(i, i)]).fold(f64::INFINITY, f64::min).max(0.0).sqrt()
 }
 
-/// Σ = Σ_i J_i Σ_i J_iᵀ over every measured point (its covariance) and every model point (σ² I), where
-/// J_i = ∂ξ/∂point_i and ξ is the change of the answer, `solve(moved) = at · Exp(ξ)`.
+/// The covariance Σ = Σ_i J_i Σ_i J_iᵀ over every measured point and every model point.
 ///
-/// Where pixels and rig are known, the four pixel coordinates are what is measured: they are moved one by one, and
-/// the triangulated point with them, so that solvers of pixels and of points are differentiated alike.
+/// A model point has the covariance σ² I. J_i = ∂ξ/∂point_i, with ξ the change of the answer, `solve(moved) = at ·
+/// Exp(ξ)`. With pixels and a rig, the four pixel coordinates are the measurement: they are moved one by one, and the
+/// triangulated point with them, so that solvers of pixels and of points are differentiated alike.
 pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
@@ -125,7 +124,7 @@ fn jacobian<const N: usize>(
     Ok(j)
 }
 
-/// How the triangulated point moves with its pixels, (Jᵀ W J)⁻¹ Jᵀ W.
+/// The derivative of the triangulated point by its pixels, (Jᵀ W J)⁻¹ Jᵀ W.
 fn by_pixels(rig: &StereoRig, point: &Observation) -> Option<SMatrix<f64, 3, 4>> {
     let weight = point.pixels?.covariance.try_inverse()?;
     let (_, j): (_, Matrix4x3<f64>) = rig.project_with_jacobian(&point.measured.at)?;

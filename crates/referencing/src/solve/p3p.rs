@@ -1,21 +1,21 @@
-//! The perspective three-point problem.
+//! The perspective three-point problem (P3P).
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Distances of three points from a camera that sees them along unit directions `rays`, given the points' own
-/// distances from each other: up to four triples, all positive.
+/// The distances of three points from a camera that sees them along unit directions `rays`: up to four positive
+/// triples.
 ///
-/// λ_i² + λ_j² − 2 λ_i λ_j (y_i·y_j) = |x_i − x_j|² are three quadrics. Of the pencil of the two cones that the right
-/// sides leave, D1 + γ D2, a degenerate member is a pair of planes through the origin; each plane meets the
-/// cones in two lines, each line a sphere-like quadric once. (Persson, Nordberg, *Lambda Twist: an accurate fast
-/// robust perspective three point solver*, 2018.) Every root is polished by Newton's steps on the quadrics.
+/// The equations λ_i² + λ_j² − 2 λ_i λ_j (y_i·y_j) = |x_i − x_j|² are three quadrics. Elimination of the right sides
+/// leaves two cones; a degenerate member of their pencil D1 + γ D2 is a pair of planes through the origin. Each plane
+/// meets the cones in two lines, and each line meets a quadric once. (Persson, Nordberg, *Lambda Twist: an accurate
+/// fast robust perspective three point solver*, 2018.) Newton steps on the quadrics refine every root.
 pub(super) fn distances(rays: &[Vector3<f64>; 3], points: &[Vector3<f64>; 3]) -> Roots {
     let square = |i: usize, j: usize| (points[i] - points[j]).norm_squared();
     let a = [square(0, 1), square(0, 2), square(1, 2)];
     let cosine = [rays[0].dot(&rays[1]), rays[0].dot(&rays[2]), rays[1].dot(&rays[2])];
     let quadrics: [Matrix3<f64>; 3] = std::array::from_fn(|k| quadric(PAIRS[k], cosine[k]));
     let (d1, d2) = (quadrics[0] * a[2] - quadrics[2] * a[0], quadrics[1] * a[2] - quadrics[2] * a[1]);
-    // Symmetric triangles make a cone singular itself. A mixture of both spans the same pencil and is not.
+    // Symmetric triangles make one cone singular. A mixture of both spans the same pencil and avoids it.
     let (d1, d2) = (d1 + d2 * MIXTURE, d2 - d1 * MIXTURE);
     let mut roots = Roots::default();
     let members = pencil(&d1, &d2).map(|gamma| split(&(d1 + d2 * gamma)));
@@ -30,10 +30,10 @@ pub(super) fn distances(rays: &[Vector3<f64>; 3], points: &[Vector3<f64>; 3]) ->
     roots
 }
 
-/// Any number that no symmetry knows.
+/// A mixing factor without relation to any symmetry.
 const MIXTURE: f64 = 0.618_034;
 
-/// Up to four triples.
+/// Up to four triples of distances.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Roots {
     found: [Vector3<f64>; 4],
@@ -87,7 +87,7 @@ fn cubic(k: &[f64; 4]) -> ([f64; 3], usize) {
     let discriminant = q * q / 4.0 + p * p * p / 27.0;
     let (mut roots, count) = if discriminant > 0.0 {
         let s = discriminant.sqrt();
-        // The sum of like signs loses no digits; the other part follows from the product.
+        // Terms of equal sign add without cancellation; the other part follows from the product.
         let u = libm::cbrt(-0.5 * q - s.copysign(q));
         ([if u == 0.0 { 0.0 } else { u - p / (3.0 * u) }, 0.0, 0.0], 1)
     } else {
@@ -110,8 +110,10 @@ fn cubic(k: &[f64; 4]) -> ([f64; 3], usize) {
     (roots, count)
 }
 
-/// The two planes (their normals) of a singular quadric, and how clearly it is a pair of planes: its least
-/// eigenvalue, negative, over the greatest. A definite one, which no real point but the origin lies on, has none.
+/// The normals of the two planes of a singular quadric, and the quality of the decomposition.
+///
+/// The quality is the negated smallest eigenvalue over the largest; it is zero for a definite quadric, which contains
+/// no real point but the origin.
 fn split(m: &Matrix3<f64>) -> (f64, [Vector3<f64>; 2]) {
     let eigen = m.symmetric_eigen();
     let (value, vector) = (eigen.eigenvalues, eigen.eigenvectors);
@@ -121,7 +123,7 @@ fn split(m: &Matrix3<f64>) -> (f64, [Vector3<f64>; 2]) {
     (negative.min(positive) / value.amax(), [a + b, a - b])
 }
 
-/// The lines in which the plane of this normal meets the cone λᵀ D λ = 0.
+/// The lines in which the plane with this normal meets the cone λᵀ D λ = 0.
 fn lines(normal: &Vector3<f64>, cone: &Matrix3<f64>) -> impl Iterator<Item = Vector3<f64>> + use<> {
     let u = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
     let v = normal.cross(&u).normalize();
@@ -129,7 +131,7 @@ fn lines(normal: &Vector3<f64>, cone: &Matrix3<f64>) -> impl Iterator<Item = Vec
     // cos²·A + 2 sin cos·B + sin²·C = 0 over the directions u cos + v sin.
     let (a, b, c) = (form(&u, &u), form(&u, &v), form(&v, &v));
     let root = (b * b - a * c).max(0.0).sqrt();
-    // Noise may part two lines that touch: they are then taken as one twice.
+    // Noise may separate two touching lines: they then count as one double line.
     let open = b * b - a * c > -1e-6 * (a * a + b * b + c * c);
     let q = -(b + root.copysign(b));
     // Directions (cos, sin) with sin/cos = q/c and a/q.
@@ -137,7 +139,7 @@ fn lines(normal: &Vector3<f64>, cone: &Matrix3<f64>) -> impl Iterator<Item = Vec
     both.into_iter().filter(move |line| open && line.norm() > 0.0).map(|line| line.normalize())
 }
 
-/// Newton's steps on the three quadrics.
+/// Newton steps on the three quadrics.
 fn polish(mut lambda: Vector3<f64>, a: &[f64; 3], cosine: &[f64; 3]) -> Vector3<f64> {
     for _ in 0..5 {
         let mut residual = Vector3::zeros();
@@ -181,7 +183,7 @@ mod tests {
             several += usize::from(roots.as_slice().len() > 1);
         }
         assert!(missed <= 2, "{missed} of 5000 missed");
-        assert!(several > 2000, "{several} had rivals");
+        assert!(several > 2000, "{several} had several roots");
     }
 
     #[test]

@@ -16,20 +16,20 @@ use super::{
 };
 use crate::Observations;
 
-/// The pose from three widely spread points and their twelve pixel coordinates.
+/// The pose from the twelve pixel coordinates of three widely spread points.
 ///
-/// Each camera alone allows three points up to four poses (P3P), and their triangulated places allow one. Near a double
-/// root noise moves the roots of one camera far, or off the real numbers, so none of them is an answer: each is a start,
-/// led to the least Σ rᵀ S⁻¹ r of the three in both images. Of the minima the one that explains the pixels of *all*
-/// points best stands.
+/// Each camera alone admits up to four poses of three points (P3P), and their triangulated positions admit one. Near a
+/// double root noise moves the roots of one camera far, or off the real numbers. The roots therefore serve as starts:
+/// each is refined to a minimum of Σ rᵀ S⁻¹ r over the three points in both images. The answer is the minimum that best
+/// explains the pixels of *all* points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct P3pStereo {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
-/// The roots of both cameras and the triangulated places.
+/// The roots of both cameras and the triangulated positions.
 const MAX_STARTS: usize = 9;
 
 impl Default for P3pStereo {
@@ -71,7 +71,7 @@ impl Solver for P3pStereo {
             let pose = refined(&three, &start, &pixel_terms)?;
             Ok((squares(data, rig, &pose)?, pose))
         });
-        // Where none leads anywhere, the first says why.
+        // If every start fails, the first states the reason.
         let min = found.reduce(|best, other| match (&best, &other) {
             (Ok((min, _)), Ok((cost, _))) if cost < min => other,
             (Err(_), Ok(_)) => other,
@@ -80,7 +80,7 @@ impl Solver for P3pStereo {
         min.expect("the fit of the three is a start").map(|(_, pose)| pose)
     }
 
-    /// The three.
+    /// The three points.
     fn used(&self, data: &Observations<'_>) -> Vec<usize> {
         if self.solve(data).is_err() {
             return Vec::new();
@@ -104,7 +104,7 @@ impl Solver for P3pStereo {
         Ok(Covariance6::new(inflated(&three, at, first, &live)))
     }
 
-    /// Those of the three that the pixels of all points leave as likely.
+    /// The alternatives of the three points that the pixels of all points admit.
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let Ok(rig) = pixels_and_rig(data) else { return Vec::new() };
         let three = Observations { points: widest(data).map(|i| data.points[i]).to_vec(), rig: data.rig };
@@ -123,7 +123,7 @@ impl Solver for P3pStereo {
     }
 }
 
-/// The least cost of the three near a start.
+/// The minimum of the cost of the three points near a start.
 fn refined(
     three: &Observations<'_>,
     start: &Transform<Object, Camera>,

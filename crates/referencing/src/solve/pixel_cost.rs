@@ -1,4 +1,4 @@
-//! χ² of the pixels as a plain function of six numbers: what general-purpose optimisers are given.
+//! χ² of the pixels as a function of six numbers, for general-purpose optimisers.
 
 use std::cell::RefCell;
 
@@ -16,12 +16,12 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// A general-purpose optimiser: it lowers a [`PixelCost`] and is a [`Solver`] by that.
+/// A general-purpose optimiser that minimises a [`PixelCost`]; every implementor is a [`Solver`].
 pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
-    /// Iterations at most, and the second extent of the points over the first below which they count as a line.
+    /// The maximum number of iterations, and the minimum ratio of second to first extent of the points.
     fn limits(&self) -> (u64, f64);
 
-    /// The lowest pose that it finds from `start` on, and the iterations that it took.
+    /// The pose of lowest cost from `start`, and the number of iterations.
     fn lower(
         &self,
         data: &Observations<'_>,
@@ -29,7 +29,7 @@ pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
         start: &Transform<Object, Camera>,
     ) -> Result<(Transform<Object, Camera>, u64), Degenerate>;
 
-    /// What is wrong with the limits.
+    /// Checks the range of the limits.
     fn check_limits(&self) -> Result<(), String> {
         let (iterations, min_ratio) = self.limits();
         in_range((1..=1_000_000).contains(&iterations), "iterations", iterations, "1 to 1000000")?;
@@ -50,12 +50,12 @@ impl<T: Optimiser> Solver for T {
         check(data, self.minimum(), self.limits().1)?;
         let rig = pixels_and_rig(data)?;
         let (pose, iterations) = self.lower(data, rig, &kabsch::fit(&data.points))?;
-        // Whatever the library says of how it ended: at a minimum nothing pulls.
+        // Independent of the library's termination status: the gradient vanishes at a minimum.
         let off = PixelCost::of(data, rig, pose, &Best::default())?.distance();
         converged(iterations, off).map(|()| pose)
     }
 
-    /// That of the likelihood whose maximum this is.
+    /// The covariance of the likelihood that the optimiser maximises.
     fn covariance(
         &self,
         data: &Observations<'_>,
@@ -65,7 +65,7 @@ impl<T: Optimiser> Solver for T {
     }
 }
 
-/// The best place seen: its cost and its six numbers.
+/// The best evaluated argument: its cost and its six numbers.
 #[derive(Debug)]
 pub(super) struct Best(RefCell<(f64, [f64; 6])>);
 
@@ -76,17 +76,17 @@ impl Default for Best {
 }
 
 impl Best {
-    /// Its cost and its six numbers: infinite and none where nothing was seen.
+    /// The cost and the six numbers; infinite cost and zeros before any evaluation.
     pub(super) fn seen(&self) -> (f64, [f64; 6]) {
         *self.0.borrow()
     }
 }
 
-/// Σ rᵀ S⁻¹ r at `start · Exp(L x)`, r the pixel residuals and S = Σ_px + σ_model² J Jᵀ with J at the measured point.
+/// The cost Σ rᵀ S⁻¹ r at `start · Exp(L x)` over the pixel residuals r.
 ///
-/// L Lᵀ is the covariance that the start has by its own small steps, so that x is in standard deviations and no direction
-/// is steeper than another. Nothing is shared with the solvers that it judges: projections are the rig's, the gradient
-/// is by central differences.
+/// S = Σ_px + σ_model² J Jᵀ, with J at the measured point. L Lᵀ is the covariance at the start from small steps of its
+/// own, so that x is in standard deviations and the cost is equally steep in all directions. The function shares
+/// nothing with the solvers that it verifies: projections are the rig's, and the gradient is by central differences.
 pub(super) struct PixelCost<'a> {
     rig: &'a StereoRig,
     points: &'a [Observation],
@@ -96,13 +96,13 @@ pub(super) struct PixelCost<'a> {
     best: &'a Best,
 }
 
-/// What a pose costs that leaves a point behind a camera.
+/// Cost of a pose that puts a point behind a camera.
 const UNSEEN: f64 = 1e30;
-/// The step (standard deviations) of the gradient's differences, and of the scale's (rad, m).
+/// Step (standard deviations) of the gradient's differences, and of the scale's (rad, m).
 const STEP: f64 = 1e-4;
 
 impl<'a> PixelCost<'a> {
-    /// About `start`.
+    /// The cost function about `start`.
     pub(super) fn of(
         data: &'a Observations<'_>,
         rig: &'a StereoRig,
@@ -142,8 +142,8 @@ impl<'a> PixelCost<'a> {
         Ok(covariance.cholesky().ok_or_else(|| singular(&information))?.l())
     }
 
-    /// How far the minimum is from the start (standard deviations of the pose): half of the gradient, χ² being the square of
-    /// that distance.
+    /// The distance of the minimum from the start (standard deviations of the pose): half of the gradient, as χ² is the
+    /// square of that distance.
     fn distance(&self) -> f64 {
         0.5 * Vector6::from(self.slope(&[0.0; 6])).norm()
     }

@@ -1,4 +1,4 @@
-//! What the images say of each point, weights made ready.
+//! The pixel terms of the normal equations, with prepared weights.
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use seafix_geometry::StereoRig;
@@ -7,45 +7,46 @@ use smallvec::SmallVec;
 use super::{Degenerate, descent::Term, mahalanobis::information, stereo_cameras::StereoCameras, whitened::Whitener};
 use crate::Observation;
 
-/// Up to so many points are kept without allocating.
+/// Number of points that are kept without heap allocation.
 pub(super) const FEW: usize = 32;
 
-/// What of each point is compared with its projection.
+/// The observed quantity that is compared with a point's projection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TermTarget {
-    /// The pixels where it was seen.
+    /// The observed pixels.
     Pixels,
-    /// The pixels of the point as triangulated: what 3D–3D sees, with the covariance seen from the fitted point.
+    /// The pixels of the triangulated point, as in 3D–3D fits with covariances at the fitted point.
     Triangulated,
 }
 
-/// The points of one problem, as the cameras saw them.
+/// The observed points of one problem.
 pub(crate) struct PixelTerms<'a> {
     cameras: StereoCameras<'a>,
     all: SmallVec<[PixelTerm; FEW]>,
-    /// Whether a point of the model is uncertain, so that weights depend on the pose.
+    /// Whether a model point is uncertain, so that weights depend on the pose.
     pub(super) weights_move: bool,
 }
 
 enum PixelTerm {
-    /// Pixels with their weights, and those with the model's error besides as the measured point shows it.
+    /// Pixels with their weights; `frozen` includes the model's error as projected at the measured point.
     Seen { at: Vector4<f64>, weight: Whitener, frozen: Whitener, model_variance: f64 },
-    /// A point without pixels, with the information on it.
+    /// A point without pixels, with its information matrix.
     Bare { at: Vector3<f64>, information: Matrix3<f64> },
 }
 
-/// Pixels are never better known than this (px): exact ones would otherwise have infinite weight.
+/// Lower bound of pixel noise (px); exact pixels would have infinite weight.
 pub(super) const PIXEL_FLOOR: f64 = 1e-6;
 
 impl<'a> PixelTerms<'a> {
-    /// Those of no point yet: [`see`](Self::see) fills them where they stand, for they are large.
+    /// An empty set of terms; [`see`](Self::see) fills it in place, as it is large.
     #[inline]
     pub(crate) fn new(rig: &'a StereoRig) -> Self {
         Self { cameras: StereoCameras::of(rig), all: SmallVec::new(), weights_move: false }
     }
 
     /// # Errors
-    /// The first point whose covariance has no inverse, or that a camera cannot see where it was measured.
+    ///
+    /// The first point whose covariance is not invertible, or whose measured position a camera cannot see.
     pub(crate) fn see(&mut self, points: &[Observation], target: TermTarget) -> Result<(), Degenerate> {
         for (index, point) in points.iter().enumerate() {
             let pixel_term = self.pixel_term(point, index, target)?;
@@ -77,10 +78,10 @@ impl<'a> PixelTerms<'a> {
         Ok(PixelTerm::Seen { at, weight, frozen, model_variance })
     }
 
-    /// What the k-th point says, S = Σ_px + σ_model² J Jᵀ with J at the place where the pose puts it.
+    /// The term of the k-th point, with weights at the position where the pose puts it.
     ///
-    /// With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, the model's error marginalised leaves (I + σ² A)⁻¹ A and
-    /// (I + σ² A)⁻¹ g (Woodbury).
+    /// S = Σ_px + σ_model² J Jᵀ, with J at that position. With A = Jᵀ Σ_px⁻¹ J and g = Jᵀ Σ_px⁻¹ r, marginalisation of
+    /// the model's error gives (I + σ² A)⁻¹ A and (I + σ² A)⁻¹ g (Woodbury).
     #[inline]
     pub(crate) fn live(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
         match &self.all[k] {
@@ -98,8 +99,9 @@ impl<'a> PixelTerms<'a> {
         }
     }
 
-    /// The same with J of the model's error at the measured point: the weights do not depend on the pose, so that
-    /// costs can be compared.
+    /// The term of the k-th point, with weights at the measured point.
+    ///
+    /// The weights do not depend on the pose, so that costs are comparable.
     #[inline]
     pub(crate) fn frozen(&self, k: usize, place: &Vector3<f64>) -> Option<Term> {
         match &self.all[k] {

@@ -1,4 +1,4 @@
-//! How uncertain a weak attitude is where the likelihood is bent.
+//! The covariance of a weak attitude under a nonlinear likelihood.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
@@ -6,33 +6,32 @@ use seafix_geometry::{Camera, Object, Transform};
 use super::descent::{Linearized, Term, linearize};
 use crate::Observation;
 
-/// Attitudes that are known to this (rad, three axes together) have a likelihood as straight as their noise: first order
-/// stands.
+/// Standard deviation of the attitude (rad, three axes together) up to which first order holds.
 const STRAIGHT: f64 = 0.02;
-/// Turns that are known to this (rad) are straight by themselves.
+/// Standard deviation about one axis (rad) up to which a rotation is linear by itself.
 const STIFF: f64 = 0.006;
-/// Between two nodes of the quadrature (standard deviations by first order).
+/// Distance between quadrature nodes (first-order standard deviations).
 const STEP: f64 = 0.5;
-/// Nodes to either side: twelve standard deviations.
+/// Number of nodes to each side: twelve standard deviations.
 const NODES: i32 = 24;
-/// No turn goes further (rad).
+/// Largest rotation (rad).
 const FARTHEST: f64 = 1.0;
-/// A pose whose χ² is larger by this weighs nothing, and what lies beyond it is another valley.
+/// Excess of χ² at which a pose has no weight; beyond it lies another minimum.
 const NOTHING: f64 = 25.0;
-/// Nodes that are looked at to either side whatever lies between.
+/// Minimum number of nodes to each side.
 const MIN: i32 = 12;
-/// Steps in which the other five coordinates follow a turn.
+/// Number of steps in which the other five coordinates follow a rotation.
 const FOLLOWS: usize = 3;
 
-/// The covariance `first` with the part that belongs to the most uncertain turn taken from the likelihood itself.
+/// The covariance `first`, with the part of its most uncertain rotation from the profile likelihood.
 ///
-/// With e an axis of the attitude's covariance, σ² = eᵀ Σ_φφ e and d = Σ (e, 0) / σ, first order says that χ² is larger by t² at
-/// `at · Exp(t d)`. A small object far away is known by how much it is foreshortened, which changes with the square of its
-/// tilt: its χ² is no parabola but a bent trough with a shoulder or another minimum on the side to which noise did not lead,
-/// and what the likeliest pose says of the slope where it lies is not what the truth, farther along the trough, would say. The
-/// profile likelihood L(t) is the greatest of all poses turned from `at` by t σ about e, ξ(t) the step to its pose. Of the three
-/// axes that with the largest ∫ t² L / ∫ L replaces d dᵀ, what first order says of it, by ∫ ξ ξᵀ L / ∫ L: the second moment about
-/// the answer, so that its bias is in it.
+/// With e an axis of the attitude's covariance, σ² = eᵀ Σ_φφ e and d = Σ (e, 0) / σ, first order states that χ² grows
+/// by t² at `at · Exp(t d)`. The attitude of a small distant object follows from its foreshortening, which changes with
+/// the square of its tilt. Its χ² is then no parabola but a curved trough, with a shoulder or a second minimum on the
+/// other side, and the slope at the maximum-likelihood pose differs from that at the truth farther along the trough.
+/// The profile likelihood L(t) is the maximum over all poses rotated from `at` by t σ about e; ξ(t) is the step to its
+/// pose. For the axis with the largest ∫ t² L / ∫ L, the first-order term d dᵀ is replaced by ∫ ξ ξᵀ L / ∫ L: the
+/// second moment about the answer, which includes its bias.
 ///
 /// (Bates and Watts, *Nonlinear regression analysis and its applications*, 1988, chapter 6.)
 pub(super) fn inflated(
@@ -65,7 +64,7 @@ pub(super) fn inflated(
 
 /// The moments of the profile likelihood about one axis.
 struct Trough {
-    /// ∫ t² L / ∫ L: one by first order.
+    /// ∫ t² L / ∫ L: one to first order.
     spread: f64,
     /// ∫ ξ ξᵀ L / ∫ L.
     second: Matrix6<f64>,
@@ -103,8 +102,7 @@ impl Trough {
     }
 }
 
-/// The least cost that the coordinates reach which do not turn the pose about the axis, and their pose; `None` where a point
-/// is behind a camera.
+/// The minimum of the cost without further rotation about the axis, and its pose; `None` if a point is behind a camera.
 fn follow(
     points: &[Observation],
     pose: &mut Transform<Object, Camera>,

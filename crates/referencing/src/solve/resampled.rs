@@ -1,4 +1,4 @@
-//! The covariance of an answer that derivatives do not describe, from what other noise would have shown.
+//! The covariance by resampling, for answers that derivatives do not describe.
 
 use nalgebra::{Matrix2, Matrix3, Matrix4, Matrix6, Matrix6x2, Vector3, Vector4, Vector6};
 use seafix_geometry::{
@@ -14,16 +14,17 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// The mean of ξξᵀ over answers `at · Exp(ξ)` to the same points with other noise (parametric bootstrap; Efron, Tibshirani,
-/// *An introduction to the bootstrap*, 1993): bias included, and whatever a loss with corners does with noise of its size,
-/// which no derivative at one draw of it tells.
+/// The parametric bootstrap covariance: the mean of ξξᵀ over answers `at · Exp(ξ)` to resampled noise.
 ///
-/// The draws are the rows of [`SigmaDirections`], as many as `answer` takes and the negative of each: of an answer that is linear in the noise they give the
-/// covariance to the last digit. A point that the noise does not explain is taken
-/// where it was measured, so that it is left out, or pulls, as it did; all others where the pose puts them.
+/// It follows Efron and Tibshirani, *An introduction to the bootstrap*, 1993. It includes bias, and the effect of
+/// losses with corners on noise of their size, which no derivative at one draw describes. The draws are rows of
+/// [`SigmaDirections`], as many as `answer` requires, and their negatives: for an answer linear in the noise they give
+/// the exact covariance. A point that the noise does not explain is kept at its measured position, so that it stays
+/// excluded, or pulls, as before; all others are placed by the pose.
 ///
 /// # Errors
-/// [`Degenerate::Scattered`] where one of ten draws has no answer.
+///
+/// [`Degenerate::Scattered`] if more than one of ten draws has no answer.
 pub(super) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
@@ -61,18 +62,20 @@ pub(super) fn covariance(
     Ok(Covariance6::new(sum * (scale / answered as f64)))
 }
 
-/// How the answer bends with the noise, and so how many draws it takes.
+/// The linearity of the answer in the noise, which determines the number of draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// It is nearly linear: the draws tell its covariance all but exactly.
+    /// Nearly linear: the draws give the covariance almost exactly.
     Straight,
-    /// It is nowhere linear: the covariance is that of a sample, and its inverse the larger the smaller the sample is and
-    /// the longer its tails are, which is made good by what the draws say of one of them that was left out.
+    /// Nonlinear everywhere: the covariance is that of a sample.
+    ///
+    /// The inverse of a sample covariance is too large, more so for small samples and long tails; a leave-one-out
+    /// factor corrects it.
     Bent,
 }
 
 impl Answer {
-    /// Draws, each with its negative.
+    /// The number of draws, each with its negative.
     fn pairs(self) -> usize {
         match self {
             Self::Straight => 128,
@@ -81,8 +84,10 @@ impl Answer {
     }
 }
 
-/// The mean of ξᵀ Σ⁻¹ ξ / 6 over all answers, Σ being that of all draws but that of ξ and its negative; `sum` is Σ ξξᵀ of all.
-/// With U the two answers of a pair, S their sum without them is known by G = Uᵀ S⁻¹ U of all: G (1 − G)⁻¹.
+/// The leave-one-out mean of ξᵀ Σ⁻¹ ξ / 6 over all answers.
+///
+/// Σ is the covariance of all draws except ξ and its negative, and `sum` is Σ ξξᵀ of all. With U the two answers of a
+/// pair and S their sum without them, Uᵀ S⁻¹ U follows from G, the same form for all: G (1 − G)⁻¹.
 fn left_out(answers: &[[Option<Vector6<f64>>; 2]], sum: &Matrix6<f64>) -> Option<f64> {
     let of_all = sum.cholesky()?;
     let count = answers.iter().flatten().flatten().count() as f64;
@@ -96,8 +101,9 @@ fn left_out(answers: &[[Option<Vector6<f64>>; 2]], sum: &Matrix6<f64>) -> Option
     Some(squares / (6.0 * count))
 }
 
-/// A residual (standard deviations of its point) that noise exceeds once in a million where all of it is along one axis; a
-/// pose that weighs all axes alike leaves across the others residuals that no χ² would forgive.
+/// Residual (standard deviations of its point) with a probability of 1e-6 for noise along one axis.
+///
+/// A pose that weights all axes alike leaves residuals across the others that a χ² test would reject.
 const UNLIKELY: f64 = 8.5;
 
 /// A point without its noise, and the noise.
@@ -137,13 +143,13 @@ impl Source {
         }
     }
 
-    /// How many numbers its noise takes.
+    /// The number of random numbers of its noise.
     fn numbers(&self) -> usize {
         let measured = if matches!(self, Self::Seen { .. }) { 4 } else { 3 };
         measured + if self.point().model_sigma > 0.0 { 3 } else { 0 }
     }
 
-    /// The point as other noise would have shown it; `None` where no point can be triangulated.
+    /// The point with other noise; `None` if it cannot be triangulated.
     fn draw(&self, rig: Option<&StereoRig>, noise: &mut impl Iterator<Item = f64>) -> Option<Observation> {
         let mut next = || noise.next().unwrap_or(0.0);
         let mut sampled = *self.point();

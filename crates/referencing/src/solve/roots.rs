@@ -1,4 +1,4 @@
-//! The poses that three of the points allow one camera alone.
+//! The poses that three points admit for one camera alone (P3P).
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
 use super::{Degenerate, kabsch, p3p};
 use crate::{Observation, Observations};
 
-/// Up to eight poses, the one that explains the pixels of all points best first.
+/// Up to eight poses, in order of their cost over the pixels of all points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Roots {
     poses: [Transform<Object, Camera>; 8],
@@ -25,7 +25,7 @@ impl Roots {
         &self.poses[..self.count]
     }
 
-    /// Keeps the poses in the order of their costs.
+    /// Inserts a pose in the order of costs.
     fn insert(&mut self, pose: Transform<Object, Camera>, cost: f64) {
         let place = self.costs[..self.count].partition_point(|&known| known <= cost);
         if place < 8 {
@@ -37,7 +37,7 @@ impl Roots {
     }
 }
 
-/// The poses from which the left camera would see three widely spread points where it does see them.
+/// The P3P poses of the left camera for three widely spread points.
 pub(super) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
     let mut roots = Roots::default();
     roots.of_camera(data, rig, widest(data), false);
@@ -45,7 +45,7 @@ pub(super) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
 }
 
 impl Roots {
-    /// Those of these three points and the left or the right camera besides.
+    /// Adds the P3P poses of these three points for the left or the right camera.
     pub(super) fn of_camera(&mut self, data: &Observations<'_>, rig: &StereoRig, three: [usize; 3], right: bool) {
         let mut three = three.map(|i| data.points[i]);
         let ray = |point: &Observation| -> Option<Vector3<f64>> {
@@ -69,10 +69,11 @@ impl Roots {
     }
 }
 
-/// Σ of the squared pixel residuals, unweighted (px²).
+/// The unweighted sum of squared pixel residuals (px²).
 ///
 /// # Errors
-/// The first point that a camera could not see.
+///
+/// The first point out of a camera's view.
 pub(super) fn squares(
     data: &Observations<'_>,
     rig: &StereoRig,
@@ -88,8 +89,8 @@ pub(super) fn squares(
     data.points.iter().enumerate().map(of).sum()
 }
 
-/// Three points of the model far from each other: the farthest from the centroid, the farthest from that, and the
-/// farthest from the line through both.
+/// Three distant model points: the farthest from the centroid, the farthest from that, and the farthest from the line
+/// through both.
 pub(super) fn widest(data: &Observations<'_>) -> [usize; 3] {
     let at = |i: usize| data.points[i].model.coords;
     let centre = data.points.iter().map(|point| point.model.coords).sum::<Vector3<f64>>() / data.points.len() as f64;

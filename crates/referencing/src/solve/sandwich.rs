@@ -11,13 +11,12 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// A⁻¹ B A⁻¹ with A = Σ w JᵀJ and B = Σ w² Jᵀ S J, J = \[ \[p\]×, −I \] and S the noise of a point: what the noise makes
-/// of the minimum of Σ w_k ‖C_k − p_k‖². (Huber, *The behavior of maximum likelihood estimates under nonstandard
-/// conditions*, 1967.)
+/// The sandwich covariance A⁻¹ B A⁻¹ of the minimum of Σ w_k ‖C_k − p_k‖².
 ///
-/// Everything is seen from the fitted points p: the measured ones are scattered by their noise, which in depth may be
-/// as large as the object, and would pass for a better lever than the points have; and where pixels and rig are known,
-/// a point that noise brought nearer would pass for a better measured one.
+/// A = Σ w JᵀJ and B = Σ w² Jᵀ S J, with J = \[ \[p\]×, −I \] and S the noise of a point (Huber, *The behavior of
+/// maximum likelihood estimates under nonstandard conditions*, 1967). Levers and noise are evaluated at the fitted
+/// points p. The measured points are scattered by their noise, which in depth may be as large as the object: they would
+/// overstate the levers, and a point moved nearer by noise would appear more precise.
 pub(super) fn covariance(
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
@@ -36,11 +35,11 @@ pub(super) fn covariance(
     Ok(Covariance6::new(bread * b.matrix() * bread))
 }
 
-/// The greatest standard deviation of the attitude (rad) at which errors are straight enough in the noise.
+/// Largest standard deviation of the attitude (rad) at which errors are linear in the noise.
 const STRAIGHT: f64 = 0.15;
 
-/// [`covariance`] where errors are straight in the noise; where the attitude is known to [`STRAIGHT`] at best, that of
-/// many draws, which `solve` answers.
+/// The sandwich [`covariance`] if errors are linear in the noise; otherwise, beyond [`STRAIGHT`], the covariance by
+/// resampling with `solve`.
 pub(super) fn or_resampled(
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
@@ -55,7 +54,7 @@ pub(super) fn or_resampled(
     }
 }
 
-/// The covariance (m²) of a point's residual, seen from `place`.
+/// The covariance (m²) of a point's residual, evaluated at `place`.
 fn noise(cameras: Option<&StereoCameras<'_>>, point: &Observation, place: &Vector3<f64>) -> Matrix3<f64> {
     let refitted = || {
         let (_, j) = cameras?.project(place)?;

@@ -1,4 +1,4 @@
-//! Whether what was measured is as large as the model says.
+//! The scale error between measurement and model.
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
@@ -9,23 +9,25 @@ use super::{
 };
 use crate::Observation;
 
-/// By how much measured distances are longer than the model's, as a share of them, had the fit a scale besides the motion.
+/// The relative excess of measured distances over the model's, from a fit with a scale.
 ///
-/// A wrong baseline or focal length stretches all that is measured, a wrong survey the model. No three points tell: any
-/// triangle is nearly rigid to its noise. Of many it shows in every distance, long before a single residual is out of bounds.
+/// A wrong baseline or focal length scales every measurement, a wrong survey the model. Three points do not show it,
+/// since any triangle fits nearly within its noise. With many points it shows in every distance, long before a single
+/// residual exceeds its limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScaleError {
     /// The estimate: measured distances are 1 + `value` times the model's.
     pub value: f64,
-    /// Its standard deviation by the noise of the points.
+    /// The standard deviation that follows from the noise of the points.
     pub sigma: f64,
 }
 
-/// The stretch of the points at their likeliest pose, one step of the fit with seven parameters.
+/// The scale error of the points at their maximum-likelihood pose: one step of the fit with seven parameters.
 ///
-/// A stretch ε moves the place p of a point by ε d, d = p − p̄ its lever from the mean of all. With J of the motion as in
-/// [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, N = Σ JᵀWJ, c = Σ JᵀWd,
-/// s = Σ dᵀWd − cᵀ N⁻¹ c. `None` where the points determine no motion, or no scale beside it; see [`isotropic`].
+/// A scale error ε moves the position p of a point by ε d, with d = p − p̄ its lever from the mean. With J of the
+/// motion as in [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, where N = Σ
+/// JᵀWJ, c = Σ JᵀWd, s = Σ dᵀWd − cᵀ N⁻¹ c. `None` if the points determine no motion, or no scale beside it; see
+/// [`isotropic`].
 pub(super) fn scale_error(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
@@ -47,13 +49,14 @@ pub(super) fn scale_error(
     }
     let by_motion = covariance * c;
     let left = own - c.dot(&by_motion);
-    // What rounding leaves of points that are one place, or beside a coordinate that is as good as exact, is no information.
+    // The rounding residue of coincident points, or beside a nearly exact coordinate, is no information.
     (left > ROUNDING * own)
         .then(|| ScaleError { value: (pull - by_motion.dot(&all.gradient)) / left, sigma: (1.0 / left).sqrt() })
 }
 
-/// The same with every point as good in all directions as it is on average: where one coordinate is as good as exact, rounding leaves
-/// nothing of what the others say of the scale.
+/// The scale error with the mean variance of every point in all directions.
+///
+/// If one coordinate is nearly exact, rounding removes the information of the others on the scale; this form keeps it.
 pub(crate) fn isotropic(points: &[Observation], pose: &Transform<Object, Camera>) -> Option<ScaleError> {
     let term = |k: usize, at: &Vector3<f64>| {
         let Observation { measured, model_sigma, .. } = &points[k];
@@ -63,8 +66,8 @@ pub(crate) fn isotropic(points: &[Observation], pose: &Transform<Object, Camera>
     scale_error(points, pose, &term)
 }
 
-/// Less than this share of the information on the scale is what rounding leaves: where one weight is 10¹⁰ times the others', the
-/// inverse of N has five digits.
+/// Fraction of the information on the scale that counts as rounding; with one weight 10¹⁰ times the others, the inverse
+/// of N has five digits.
 const ROUNDING: f64 = 1e-4;
 
 #[cfg(test)]
@@ -76,7 +79,7 @@ mod tests {
 
     const SIGMA: f64 = 0.002;
 
-    /// Points at the corners of a box of sides 2, 2 and 1 m, measured `by` times as far from the camera.
+    /// The corners of a box of 2 × 2 × 1 m, measured at `by` times their distance from the camera.
     fn stretched(by: f64) -> Option<ScaleError> {
         let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());
         let corner = |k: usize| Point::new((k & 1) as f64 * 2.0, (k >> 1 & 1) as f64 * 2.0, (k >> 2 & 1) as f64);
@@ -90,7 +93,7 @@ mod tests {
         Mahalanobis::default().solved(&data, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
     }
 
-    /// Of eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion does what a stretch does: σ = 2 mm/√18 m.
+    /// For eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion equals a scaling: σ = 2 mm/√18 m.
     #[test]
     fn a_box_that_is_larger_is_reported() {
         let of_box = SIGMA / 18.0_f64.sqrt();
@@ -104,7 +107,7 @@ mod tests {
         }
     }
 
-    /// One coordinate that is known to a tenth of a micrometre takes all weight from the others.
+    /// One coordinate with a noise of a tenth of a micrometre takes all weight from the others.
     #[test]
     fn an_exact_coordinate_does_not_hide_it() {
         let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());

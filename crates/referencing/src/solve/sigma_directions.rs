@@ -1,17 +1,17 @@
-//! Numbers that stand for noise: as many directions as there are numbers, all of the length that noise has.
+//! Orthogonal directions in the space of the noise, for resampling.
 
-/// A square of `size` rows (a power of two), each of which looks like a draw of so many independent standard normal numbers,
-/// and which together have exactly their covariance: orthogonal, and every row of length √`size`.
+/// A square of `size` rows (a power of two) that resemble draws of standard normal vectors.
 ///
-/// H S H of Hadamard's matrix H and signs S. (Genz, Monahan, *Stochastic integration rules for infinite regions*, 1998,
-/// with the fast rotations of Ailon and Chazelle, *The fast Johnson–Lindenstrauss transform*, 2009.) The
-/// signs are those of a fixed sequence: the same rows on every machine.
+/// The rows are orthogonal and of length √`size`, so that together they have exactly the unit covariance. The square is
+/// H S H of Hadamard's matrix H and signs S (Genz, Monahan, *Stochastic integration rules for infinite regions*, 1998,
+/// with the fast rotations of Ailon and Chazelle, *The fast Johnson–Lindenstrauss transform*, 2009). The signs come
+/// from a fixed sequence, so that the rows are the same on every machine.
 pub(super) struct SigmaDirections {
     size: usize,
     signs: Vec<f64>,
 }
 
-/// The size of the square and how many of them give at least `pairs` rows of `numbers` numbers.
+/// The size of a square, and the number of squares for at least `pairs` rows of `numbers` numbers.
 pub(super) fn rows(numbers: usize, pairs: usize) -> (usize, usize) {
     let size = numbers.max(16).next_power_of_two();
     (size, pairs.div_ceil(size))
@@ -28,7 +28,7 @@ impl SigmaDirections {
         (0..self.size).map(|k| self.row(k))
     }
 
-    /// The k-th row: Hadamard's k-th, twice turned.
+    /// The k-th row: Hadamard's k-th, rotated twice.
     fn row(&self, k: usize) -> Vec<f64> {
         let mut row: Vec<f64> =
             (0..self.size).map(|j| if (j & k).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }).collect();
@@ -56,7 +56,7 @@ fn turn(x: &mut [f64]) {
     x.iter_mut().for_each(|x| *x /= root);
 }
 
-/// Steele and others, *Fast splittable pseudorandom number generators*, 2014.
+/// The mixing function of Steele and others, *Fast splittable pseudorandom number generators*, 2014.
 fn mixed(counter: u64) -> u64 {
     let mut z = counter.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,14 +1,15 @@
-//! The two cameras of a rig, made ready to look at many points.
+//! The cameras of a rig, prepared for many projections.
 
 use nalgebra::{Matrix3, Matrix4x3, Vector3, Vector4};
 use seafix_geometry::{Camera, Frame, Pinhole, Point, RightCamera, StereoRig};
 
-/// A rig whose rotation is a matrix already and whose lenses need no distortion where they have none: as
-/// [`StereoRig::project_with_jacobian`], at a third of its cost.
+/// A stereo rig with precomputed rotation matrix and without needless distortion.
+///
+/// It computes [`StereoRig::project_with_jacobian`] at a third of the cost.
 pub(super) struct StereoCameras<'a> {
     left: CameraModel<'a>,
     right: CameraModel<'a>,
-    /// The right camera's rotation; `None` of a rectified rig, which has none.
+    /// The right camera's rotation; `None` for a rectified rig.
     turn: Option<Matrix3<f64>>,
     step: Vector3<f64>,
 }
@@ -32,8 +33,8 @@ impl<'a> StereoCameras<'a> {
         }
     }
 
-    /// Where both cameras see the point (u left, v left, u right, v right), and the derivative by the point (px/m);
-    /// `None` where one of them cannot.
+    /// The pixels of a point (u left, v left, u right, v right) and their derivative (px/m); `None` if a camera cannot
+    /// see it.
     #[inline]
     pub(super) fn project(&self, at: &Vector3<f64>) -> Option<(Vector4<f64>, Matrix4x3<f64>)> {
         let ([ul, vl], [jul, jvl]) = self.left.project::<Camera>(at)?;

@@ -1,4 +1,4 @@
-//! Stereo reprojection: maximum likelihood on the four pixel coordinates of every point.
+//! Stereo reprojection: maximum likelihood of the four pixel coordinates of every point.
 
 use nalgebra::SMatrix;
 use seafix_component::{Component, in_range};
@@ -15,21 +15,23 @@ use super::{
 };
 use crate::Observations;
 
-/// The most likely pose given where both images show the points: least Σ rᵀ S⁻¹ r over SE(3), r the four pixel
-/// residuals of a point and S = Σ_px + σ_model² J Jᵀ, J = ∂pixels/∂p at the fitted point (the error of the model's
-/// point marginalised). It reaches the Cramér–Rao bound; its covariance (Σ Jᵀ S⁻¹ J)⁻¹ is that bound at the answer, and
-/// where the attitude is weak what the bent likelihood makes of it.
+/// The maximum-likelihood pose given the pixels of both images: min Σ rᵀ S⁻¹ r over SE(3).
 ///
-/// Three or four points, or a small object far away, leave several minima. Where the answer from the unweighted
-/// fit of the triangulated points is in doubt, the poses that three points allow the left camera alone (P3P) and the mirror
-/// image of the answer are tried as well, and the least cost stands. What is hardly less likely is told by
-/// [`alternatives`](Solver::alternatives).
+/// r holds the four pixel residuals of a point and S = Σ_px + σ_model² J Jᵀ, with J = ∂pixels/∂p at the fitted point
+/// (the model point's error marginalised). The solver reaches the Cramér–Rao bound. Its covariance (Σ Jᵀ S⁻¹ J)⁻¹ is
+/// that bound at the answer; for a weak attitude it follows from the profile likelihood.
+///
+/// Three or four points, or a small distant object, have several minima. If the answer from the unweighted fit of the
+/// triangulated points is in doubt, the P3P poses of the left camera and the mirror image of the answer serve as
+/// further starts, and the lowest cost is the answer. [`alternatives`](Solver::alternatives) returns the other minima
+/// of similar cost.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StereoReprojection {
-    /// How many starts at most, besides the first answer's mirror image: one is the unweighted fit alone.
+    /// Maximum number of initial poses, 1 to 5, without the first answer's mirror image; 1 uses the unweighted fit
+    /// alone.
     pub starts: usize,
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub min_ratio: f64,
 }
 
@@ -97,7 +99,7 @@ impl Solver for StereoReprojection {
     }
 }
 
-/// The rig, if it and every point's pixels are known.
+/// The rig, if it and the pixels of every point are given.
 pub(super) fn pixels_and_rig<'a>(data: &Observations<'a>) -> Result<&'a StereoRig, Degenerate> {
     data.rig.filter(|_| data.points.iter().all(|point| point.pixels.is_some())).ok_or(Degenerate::NoPixels)
 }

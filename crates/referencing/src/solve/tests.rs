@@ -1,4 +1,4 @@
-//! What both solvers owe, and what each does in its own way.
+//! Common requirements of the solvers, and the particular ones of each.
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
@@ -24,7 +24,7 @@ fn seen(model: &[[f64; 3]], sigma: f64) -> Observations<'static> {
 
 const SPREAD: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];
 
-/// The solvers that take bare points.
+/// The solvers that accept points without pixels.
 fn solvers() -> Vec<Box<dyn Solver>> {
     let all = SOLVERS.names().map(|name| SOLVERS.build(&seafix_component::Choice::named(name)).unwrap());
     all.filter(|solver| !solver.needs_pixels()).collect()
@@ -60,7 +60,7 @@ fn a_reflection_is_never_the_answer() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     for _ in 0..1000 {
         let xi = Vector6::from_fn(|_, _| rng.random_range(-0.5..0.5));
-        assert!(data.residual_rms(&found) <= data.residual_rms(&found.perturbed(&xi)), "the best of the rotations");
+        assert!(data.residual_rms(&found) <= data.residual_rms(&found.perturbed(&xi)), "a rotation of lower cost");
     }
 }
 
@@ -143,18 +143,18 @@ fn the_covariance_is_what_many_draws_show() {
     }
 }
 
-/// The points of `SPREAD` as a rig sees them from 4 m, without noise, their pixels known as two aligned views know
-/// them: each view's error, and one in common.
+/// The points of `SPREAD` as a rig sees them from 4 m, without noise; the pixel covariance is that of two aligned
+/// views, an independent part per view and a common part.
 fn through_a_rig(rig: &StereoRig) -> (Observations<'_>, Transform<Object, Camera>) {
     through_a_rig_from(rig, Transform::exp(&Vector6::new(0.4, -0.3, 0.7, 0.2, 0.3, -4.0)))
 }
 
-/// The same from this pose.
+/// The points of `SPREAD` as a rig sees them from a given pose.
 fn through_a_rig_from(
     rig: &StereoRig,
     pose: Transform<Object, Camera>,
 ) -> (Observations<'_>, Transform<Object, Camera>) {
-    // Little enough that even of three points the likelihood is straight within it.
+    // Small enough that the likelihood of even three points is linear within it.
     let mut covariance = nalgebra::Matrix4::identity() * 0.05_f64.powi(2);
     for i in 0..2 {
         (covariance[(i, i + 2)], covariance[(i + 2, i)]) = (0.0014, 0.0014);
@@ -175,10 +175,10 @@ fn rig() -> StereoRig {
     StereoRig::new(camera, camera, right_from_left).unwrap()
 }
 
-/// Where a covariance is analytic it is the numerical one, on exact data from random poses, to 1e-6; to 1e-4, from one pose,
-/// of solvers that do not solve to rounding, for each of their answers takes a thousand costs.
+/// Analytic covariances equal numerical ones on exact data from random poses to 1e-6; optimisers that are not exact to
+/// rounding to 1e-4, from one pose, as each answer takes a thousand evaluations.
 ///
-/// Seen to fail when the sandwich weighs the noise by w for w².
+/// Fails if the sandwich weights the noise by w instead of w².
 #[test]
 fn analytic_covariances_are_the_numerical_ones() {
     let rig = rig();
@@ -191,7 +191,7 @@ fn analytic_covariances_are_the_numerical_ones() {
         if round > 0 && !solver.to_rounding() {
             continue;
         }
-        // Any turn about the axis that the camera looks along, and some about the others.
+        // Any rotation about the optical axis, and limited ones about the others.
         let turn = Vector3::new(rng.random_range(-0.6..0.6), rng.random_range(-0.6..0.6), rng.random_range(-3.0..3.0));
         let shift = Vector3::new(rng.random_range(-0.4..0.4), rng.random_range(-0.4..0.4), rng.random_range(3.0..5.0));
         let camera_from_object = Transform::<Camera, Object>::new(seafix_geometry::so3::exp(&turn), shift);
@@ -203,7 +203,7 @@ fn analytic_covariances_are_the_numerical_ones() {
             let analytic = solver.covariance(&data, &pose).unwrap().matrix;
             let numeric = numerical::covariance(|moved| solver.solve(moved), &data, &pose).unwrap().matrix;
             let off = (analytic - numeric).amax() / analytic.amax();
-            // Differences of minima that are found to 1e-5 only are no better.
+            // The minima have an error of 1e-5, and so do their differences.
             if !(off < if solver.to_rounding() { 1e-6 } else { 1e-4 }) {
                 differs.push((name, round, off));
             }
@@ -213,7 +213,7 @@ fn analytic_covariances_are_the_numerical_ones() {
 }
 
 /// Steps follow the noise: at a micrometre Huber's loss is least squares within its noise, and the numerical covariance
-/// says so.
+/// agrees.
 #[test]
 fn numerical_steps_stay_within_the_noise() {
     let data = seen(&SPREAD, 1e-6);
@@ -223,8 +223,8 @@ fn numerical_steps_stay_within_the_noise() {
     assert!((numeric - expected).amax() < 1e-5 * expected.amax(), "{}", (numeric - expected).amax() / expected.amax());
 }
 
-/// Nothing is known better than it is written: noise of nought leaves a covariance that can be inverted, and coordinates of a
-/// hundred thousand kilometres what rounding leaves of them.
+/// Precision is limited by the coordinates: zero noise still leaves an invertible covariance, and coordinates of a
+/// hundred thousand kilometres leave their rounding error.
 #[test]
 fn no_point_is_known_better_than_its_digits() {
     for solver in solvers() {
@@ -233,14 +233,14 @@ fn no_point_is_known_better_than_its_digits() {
         let far = Transform::<Object, Camera>::new(motion().rotation(), Vector3::new(0.0, 0.0, -1e8));
         let mut data = seen(&SPREAD, 0.0);
         data.points.iter_mut().for_each(|point| point.measured.at = far.inverse() * point.model);
-        // A lever of eight digits more than the object leaves some none: they refuse.
+        // A lever of eight digits more than the object leaves some solvers no information: they reject.
         let known = solver.solve(&data).and_then(|pose| solver.covariance(&data, &pose));
         let Ok(Covariance6 { matrix: known, .. }) = known else { continue };
         assert!(known[(0, 0)].sqrt() > 1e-8, "{solver:?}: {}", known[(0, 0)].sqrt());
     }
 }
 
-/// Absurd noise is refused as what it is, or not at all: a coordinate is not blamed for it.
+/// Absurd noise is rejected as noise, or accepted: the coordinates are not blamed.
 #[test]
 fn absurd_noise_is_not_blamed_on_coordinates() {
     for solver in solvers() {
@@ -284,7 +284,7 @@ fn truncated_squares_leave_outliers_out() {
     }
 }
 
-/// Every solver, pixels at hand: whatever the geometry lacks is refused by all, with the number that failed.
+/// All solvers, with pixels, reject the same degenerate geometry with the failed number.
 #[test]
 fn degenerate_views_are_refused_with_the_number_that_failed() {
     let rig = rig();
@@ -308,11 +308,11 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
         assert!(solver.solve(&view(&good)).is_ok(), "{name}");
         match solver.solve(&view(&line)) {
             Err(Degenerate::Collinear { ratio, min }) => assert!(ratio < min, "{name}: {ratio}"),
-            other => panic!("{name}: a line gives {other:?}"),
+            other => panic!("{name}: collinear points give {other:?}"),
         }
         match solver.solve(&view(&far)) {
             Err(Degenerate::Far { fraction, max }) => assert!(fraction > max && fraction < 10.0, "{name}: {fraction}"),
-            other => panic!("{name}: all points far give {other:?}"),
+            other => panic!("{name}: distant points give {other:?}"),
         }
         let mut behind = view(&good);
         behind.points[2].measured.at.coords.z *= -1.0;
@@ -320,16 +320,16 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
             Err(Degenerate::Behind { index: 2, depth }) => assert!(depth < 0.0),
             other => panic!("{name}: a point behind gives {other:?}"),
         }
-        // One disparity alone is no fault: a plate seen from the front determines its pose.
+        // Equal disparities are valid: a plate seen from the front determines its pose.
         let pose = solver.solve(&view(&plate)).unwrap();
         assert!(motion().error_to(&pose).amax() < 1e-4, "{name}: {pose:?}");
     }
 }
 
 /// The gradient and the normal equations of a pose, at random poses and with every kind of weight: J against central
-/// differences of the projections, the gradient against those of χ², ≤ 1e-6 of the largest.
+/// differences of the projections, the gradient against those of χ², at most 1e-6 of the largest.
 ///
-/// Seen to fail when the lever of the turn has the other sign.
+/// Fails if the lever of the rotation has the wrong sign.
 #[test]
 fn derivatives_are_those_of_the_projections_at_random_poses() {
     use super::{
@@ -365,7 +365,7 @@ fn derivatives_are_those_of_the_projections_at_random_poses() {
             let off = (here.gradient[i] - expected).abs();
             assert!(off < 1e-6 * here.gradient.amax(), "round {round}, {i}: {} for {expected}", here.gradient[i]);
         }
-        // Σ Jᵀ (Σ_px + σ² D Dᵀ)⁻¹ J with J and D by differences: what the live terms add up to.
+        // Σ Jᵀ (Σ_px + σ² D Dᵀ)⁻¹ J with J and D by differences: the sum of the live terms.
         let mut information = nalgebra::Matrix6::zeros();
         for point in &data.points {
             let project = |pose: &Transform<Object, Camera>, model: &Point<Object>| {

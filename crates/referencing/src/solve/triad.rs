@@ -12,28 +12,30 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// Which three of the identified points the pose rests on ("the three most reliable", which the
-/// paper does not define).
+/// The rule that selects the three points of the triad.
+///
+/// The paper takes "the three most reliable" and does not define them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Choose {
     /// The triangle of largest area in the model.
     #[default]
     LargestArea,
-    /// The triangle whose pose has the least predicted error over all identified points.
+    /// The triangle whose pose has the smallest predicted error over all identified points.
     SmallestCovariance,
-    /// The first triangle, in the order of the model, that is no line.
+    /// The first triangle, in the order of the model, that is not too slender.
     First,
 }
 
-/// Direct referencing by an auxiliary frame on three identified points: Eq. (3)–(5),
+/// The paper's direct referencing by auxiliary frames on three identified points, Eq. (3)–(5).
+///
 /// `object_from_camera = object_from_auxiliary · (camera_from_auxiliary)⁻¹`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Triad {
-    /// Which three points.
+    /// The rule that selects the three points.
     pub choose: Choose,
-    /// Sine of the smallest angle of a triangle below which it counts as a line.
+    /// Minimum sine of the smallest angle of a triangle, 0 to below 1; more slender triangles are excluded.
     pub min_sine: f64,
 }
 
@@ -54,7 +56,7 @@ impl Component for Triad {
     }
 }
 
-/// More points than this are thinned before all triangles are weighed: 40 points have 9880.
+/// Maximum number of points for a search over all triangles (40 points have 9880); more points are sampled evenly.
 const MAX_WEIGHTED: usize = 40;
 
 impl Solver for Triad {
@@ -67,8 +69,10 @@ impl Solver for Triad {
         self.three(data).map_or(Vec::new(), Vec::from)
     }
 
-    /// That of many draws of the three chosen points: no other averages their depths, and errors of several degrees are no
-    /// longer straight in them.
+    /// The covariance by resampling of the three points.
+    ///
+    /// First order does not suffice: no other points average their depths, and attitude errors of several degrees are
+    /// nonlinear in them.
     fn covariance(
         &self,
         data: &Observations<'_>,
@@ -80,12 +84,12 @@ impl Solver for Triad {
 }
 
 impl Triad {
-    /// The three points the pose rests on, ascending.
+    /// The three points that determine the pose, ascending.
     fn three(&self, data: &Observations<'_>) -> Result<[usize; 3], Degenerate> {
         seen(data, 3)?;
         let min = self.min_sine * self.min_sine;
         let wide = |three: [usize; 3]| min_sine_squared(&three.map(|i| &data.points[i])) >= min;
-        // What is nearly always the answer, without the walk over all triangles.
+        // The usual answer, without the search over all triangles.
         let likely = match self.choose {
             Choose::First => Some([0, 1, 2].map(|k| weighted(data.points.len(), k))),
             Choose::LargestArea => largest(&data.points),
@@ -104,7 +108,7 @@ impl Triad {
                     Err(_) => continue,
                 },
             };
-            // Ties are broken by the order of the model: strictly better replaces.
+            // Ties are resolved by the order of the model: only a strictly better triangle replaces.
             if best.is_none_or(|(_, max)| worth > max) {
                 best = Some((three, worth));
             }
@@ -112,29 +116,29 @@ impl Triad {
         best.map(|(three, _)| three).ok_or_else(|| self.line(data))
     }
 
-    /// That no triangle is wide enough, with the widest.
+    /// The error for triangles that are all too slender, with the largest sine.
     fn line(&self, data: &Observations<'_>) -> Degenerate {
         let sines = triangles(data.points.len()).map(|three| min_sine_squared(&three.map(|i| &data.points[i])));
         Degenerate::Collinear { ratio: sines.fold(0.0, f64::max).sqrt(), min: self.min_sine }
     }
 }
 
-/// The k-th of the points that are weighed, of `count`: all, or an even sample of many.
+/// The index of the k-th sampled point of `count`: every point, or an even sample of many.
 fn weighted(count: usize, k: usize) -> usize {
     if count <= MAX_WEIGHTED { k } else { k * count / MAX_WEIGHTED }
 }
 
-/// All triangles of `count` points, lexicographic; of many points, those of an even sample.
+/// All triangles of `count` points in lexicographic order; for many points, those of an even sample.
 fn triangles(count: usize) -> impl Iterator<Item = [usize; 3]> {
     let kept = count.min(MAX_WEIGHTED);
     let at = move |i: usize| weighted(count, i);
     (0..kept).flat_map(move |i| (i + 1..kept).flat_map(move |j| (j + 1..kept).map(move |k| [at(i), at(j), at(k)])))
 }
 
-/// The triangle of largest area in the model among those of [`triangles`], ascending; `None` where all points coincide.
+/// The triangle of largest area in the model among those of [`triangles`], ascending; `None` if all points coincide.
 ///
-/// Exact, though few triangles are looked at: on a longest side of length L none has more than √3/4 L², so that a
-/// side too short for the best area known needs no third point. A greedy triangle makes the first best one large.
+/// Branch and bound, exact: no triangle with a longest side of length L has an area above √3/4 L², so a side too short
+/// for the best area so far needs no third point. A greedy triangle provides a large first bound.
 fn largest(points: &[Observation]) -> Option<[usize; 3]> {
     let kept = points.len().min(MAX_WEIGHTED);
     let (mut x, mut y, mut z) = ([0.0; MAX_WEIGHTED], [0.0; MAX_WEIGHTED], [0.0; MAX_WEIGHTED]);
@@ -148,7 +152,7 @@ fn largest(points: &[Observation]) -> Option<[usize; 3]> {
         let (a, b, c) = side(i, j);
         a * a + b * b + c * c
     };
-    // Four times the square of the area, over all third points: the greatest and its place.
+    // Four times the squared area over all third points: index of the largest, and its value.
     let third = |i: usize, j: usize| {
         let (a, b, c) = side(i, j);
         let mut worth = [0.0; MAX_WEIGHTED];
@@ -171,7 +175,7 @@ fn largest(points: &[Observation]) -> Option<[usize; 3]> {
     for i in 0..kept {
         for j in i + 1..kept {
             let length = square(i, j);
-            // Strictly: what only equals the best is left.
+            // Strict comparison: a triangle that only equals the best is skipped.
             if 0.75 * length * length > max {
                 let (k, worth) = third(i, j);
                 if worth > max {
@@ -184,7 +188,7 @@ fn largest(points: &[Observation]) -> Option<[usize; 3]> {
     (max > 0.0).then(|| best.map(|k| weighted(points.len(), k)))
 }
 
-/// The greatest of some numbers and the first place where it stands.
+/// The largest of some numbers and its first index.
 fn first_greatest(values: &[f64]) -> (usize, f64) {
     let mut best = (0, f64::NEG_INFINITY);
     for (k, &value) in values.iter().enumerate() {
@@ -195,7 +199,7 @@ fn first_greatest(values: &[f64]) -> (usize, f64) {
     best
 }
 
-/// Eq. (3)–(5): the axes of both auxiliary frames laid on each other, R = M_object M_cameraᵀ, and P1 on C1.
+/// Eq. (3)–(5): alignment of the axes of both auxiliary frames, R = M_object M_cameraᵀ, and of P1 with C1.
 fn pose(points: &[&Observation; 3]) -> Result<Transform<Object, Camera>, Degenerate> {
     let [c1, c2, c3] = points.map(|point| &point.measured.at.coords);
     let [p1, p2, p3] = points.map(|point| &point.model.coords);
@@ -209,7 +213,7 @@ fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matri
     let (a, b) = (p2 - p1, p3 - p1);
     let normal = a.cross(&b);
     let (length, size, sides) = (b.norm_squared(), normal.norm_squared(), a.norm_squared() * b.norm_squared());
-    // Written so that a NaN (coincident points) is refused too.
+    // A NaN (coincident points) is rejected as well.
     if !(size >= MIN_SINE * MIN_SINE * sides && size > 0.0) {
         let ratio = (size / sides).sqrt();
         return Err(Degenerate::Collinear { ratio: if ratio.is_nan() { 0.0 } else { ratio }, min: MIN_SINE });
@@ -218,7 +222,7 @@ fn axes(p1: &Vector3<f64>, p2: &Vector3<f64>, p3: &Vector3<f64>) -> Result<Matri
     Ok(Matrix3::from_columns(&[x, z.cross(&x), z]))
 }
 
-/// By derivatives: to compare triangles it need not be better.
+/// The first-order covariance; it suffices for a comparison of triangles.
 fn covariance_of(
     points: &[Observation; 3],
     data: &Observations<'_>,
@@ -233,7 +237,7 @@ fn of_three(data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degene
     pose(&[&data.points[0], &data.points[1], &data.points[2]])
 }
 
-/// The square of the sine of the smallest angle, in the model or as measured, whichever is smaller.
+/// The squared sine of the smallest angle, the smaller of model and measurement.
 fn min_sine_squared(points: &[&Observation; 3]) -> f64 {
     let of = |p: [Vector3<f64>; 3]| {
         let sides = [(p[1] - p[0]), (p[2] - p[1]), (p[0] - p[2])];
@@ -245,12 +249,12 @@ fn min_sine_squared(points: &[&Observation; 3]) -> f64 {
     of(points.map(|point| point.model.coords)).min(of(points.map(|point| point.measured.at.coords)))
 }
 
-/// Four times the square of the area of the model's triangle (m⁴).
+/// Four times the squared area of the model's triangle (m⁴).
 fn square_area(points: &[&Observation; 3]) -> f64 {
     (points[1].model - points[0].model).cross(&(points[2].model - points[0].model)).norm_squared()
 }
 
-/// The variance (m²) that the pose from these three gives all identified points, summed.
+/// The summed variance (m²) of all identified points under the pose from these three.
 fn predicted_error(points: &[Observation; 3], data: &Observations<'_>) -> Result<f64, Degenerate> {
     let at = pose(&points.each_ref())?;
     let covariance = covariance_of(points, data, &at)?;
@@ -271,7 +275,7 @@ mod tests {
         assert!(axes(&a, &a, &c).is_err() && axes(&a, &b, &(a + (b - a) * 2.0)).is_err());
     }
 
-    /// Points in a box, by a small generator: the corners of a triangle are any of them.
+    /// Pseudo-random points in a box, so that any of them may be corners.
     fn scattered(count: usize, seed: u64) -> Vec<Observation> {
         let mut state = seed;
         let mut next = || {
@@ -286,7 +290,7 @@ mod tests {
         (0..count).map(point).collect()
     }
 
-    /// In a box, in a slender and in a flat one: in a slender box the longest side belongs to no large triangle.
+    /// A box, a slender box and a flat one; the longest side of a slender box belongs to no large triangle.
     #[test]
     fn the_bounded_search_finds_the_largest_triangle() {
         let seeds = (3..30).flat_map(|count| (0..20).map(move |k: u64| (count, k.wrapping_mul(0x9E37_79B9_7F4A_7C15))));
@@ -313,7 +317,7 @@ mod tests {
         }
     }
 
-    /// Points of the model, seen from `pose` with noise of 1 mm.
+    /// Points of the model, seen from `pose` with a noise of 1 mm.
     fn seen(places: &[[f64; 3]], pose: &Transform<Object, Camera>) -> Vec<Observation> {
         let point = |at: &[f64; 3]| {
             let model = Point::from(*at);
@@ -327,7 +331,7 @@ mod tests {
         solver.three(&Observations { points: points.to_vec(), rig: None })
     }
 
-    /// Sides 3, 4, 5 have the area 6 and the sines 3/5, 4/5 and 1; sides 5, 12, 13 the least sine 5/13.
+    /// Sides 3, 4, 5 have the area 6 and the sines 3/5, 4/5 and 1; sides 5, 12, 13 have the smallest sine 5/13.
     #[test]
     fn areas_and_angles_of_right_triangles() {
         let corners = |a: f64, b: f64| [[0.0, 0.0, 1.0], [a, 0.0, 1.0], [0.0, b, 1.0]];
@@ -352,7 +356,7 @@ mod tests {
         }
     }
 
-    /// R = M_object M_cameraᵀ and P1 on C1: a quarter turn about z, and the first points on each other though the others are not.
+    /// R = M_object M_cameraᵀ and P1 on C1: a quarter turn about z aligns the first points although the others differ.
     #[test]
     fn the_pose_maps_the_first_points_on_each_other() {
         let mut points = seen(&[[1.0, 2.0, 3.0], [1.0, 4.0, 3.0], [0.0, 2.0, 3.0]], &Transform::identity());
@@ -378,7 +382,7 @@ mod tests {
         assert_eq!(axes(&a, &a, &a), Err(Degenerate::Collinear { ratio: 0.0, min: 1e-9 }));
     }
 
-    /// The setting is the sine of the smallest angle of the triangle; what is refused is told by the widest of the triangles.
+    /// The setting is the sine of the triangle's smallest angle; the error states that of the widest triangle.
     #[test]
     fn slender_triangles_are_passed_over() {
         let solver = |choose, min_sine| Triad { choose, min_sine };
@@ -397,7 +401,7 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         }
-        // The largest triangle is a slender one, of 10 m by 0.6 m: the next is taken.
+        // The largest triangle, 10 m by 0.6 m, is too slender: the next is taken.
         let places = [[0.0, 0.0, 3.0], [5.0, 0.6, 3.0], [10.0, 0.0, 3.0], [0.0, 1.0, 3.0], [1.0, 0.0, 3.0]];
         let points = seen(&places, &Transform::identity());
         let area = |three: [usize; 3]| square_area(&three.map(|k| &points[k]));
@@ -405,15 +409,15 @@ mod tests {
         let widest = triangles(5).filter(|&three| sine(three) >= 0.15).max_by(|&a, &b| area(a).total_cmp(&area(b)));
         assert!(sine(largest(&points).unwrap()) < 0.15);
         assert_eq!(three(&solver(Choose::LargestArea, 0.15), &points).ok(), widest);
-        // Of equal triangles, the four halves of a square, the first.
+        // Four equal triangles, the halves of a square: the first is taken.
         let square =
             seen(&[[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [1.0, 1.0, 3.0], [0.0, 1.0, 3.0]], &Transform::identity());
         assert_eq!(three(&solver(Choose::SmallestCovariance, 0.05), &square[..3]), Ok([0, 1, 2]));
         assert_eq!(largest(&square).map(|three| square_area(&three.map(|k| &square[k]))), Some(1.0));
     }
 
-    /// A right angle with the legs W = 0.5 to the second point and L = 2 to the third, each point with isotropic noise δ of variance σ²:
-    /// the first and the third place have the variance 3 σ², the second (3 + 2 W²/L²) σ².
+    /// A right angle with the legs W = 0.5 to the second point and L = 2 to the third, each point with isotropic noise
+    /// δ of variance σ²: the first and the third position have the variance 3 σ², the second (3 + 2 W²/L²) σ².
     #[test]
     fn the_predicted_error_is_that_of_three_points() {
         let places = [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [2.0, 0.0, 0.0], [2.0, 0.5, 0.0]];
@@ -424,12 +428,12 @@ mod tests {
         };
         let ratio = 0.5 * 0.5 / 4.0;
         assert!((of(&data.points[..3]) - (9.0 + 2.0 * ratio)).abs() < 1e-5, "{}", of(&data.points[..3]));
-        // The error of the place (L, W, 0) is (δ₁x − (δ₃ − δ₁)y W/L, δ₃y, δ₂z + δ₃z − δ₁z).
+        // The error of the position (L, W, 0) is (δ₁x − (δ₃ − δ₁)y W/L, δ₃y, δ₂z + δ₃z − δ₁z).
         let fourth = (1.0 + 2.0 * ratio) + 1.0 + 3.0;
         assert!((of(&data.points) - (9.0 + 2.0 * ratio + fourth)).abs() < 1e-5, "{}", of(&data.points));
     }
 
-    /// Of four points the one that is known ten times worse is left out, wherever it stands.
+    /// The point with ten times the noise is excluded, at every index.
     #[test]
     fn the_smallest_covariance_leaves_the_worst_point_out() {
         let solver = Triad { choose: Choose::SmallestCovariance, ..Triad::default() };
@@ -444,7 +448,7 @@ mod tests {
         }
     }
 
-    /// More than forty points are thinned to forty, evenly.
+    /// More than forty points are sampled evenly down to forty.
     #[test]
     fn many_points_are_thinned_evenly() {
         assert_eq!(triangles(4).collect::<Vec<_>>(), [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]);
@@ -456,7 +460,7 @@ mod tests {
         assert_eq!(three(&Triad { choose: Choose::First, ..Triad::default() }, &points), Ok([0, 2, 4]));
     }
 
-    /// Every corner of the largest triangle in every place of the order.
+    /// Every assignment of the corners of the largest triangle to indices.
     #[test]
     fn the_largest_triangle_is_found_wherever_its_corners_stand() {
         let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 1.0], [1.0, 3.0, -1.0]];

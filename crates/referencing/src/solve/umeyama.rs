@@ -12,17 +12,17 @@ use super::{
 };
 use crate::Observations;
 
-/// The motion of least Σ ‖P_k − C_k H‖² as Umeyama writes it: M = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ, and the
-/// scale s = tr(S diag(…)) / Σ‖c_k‖² that a similarity would have.
+/// Umeyama's least squares min Σ ‖P_k − C_k H‖², with the scale as a diagnostic.
 ///
-/// A fix is rigid, so the scale is not applied: the measured points' scale differs from one by noise, a wrong
-/// focal length, a wrong baseline or a model in other units, and beyond `max_scale_error` it is refused.
+/// M = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ, and the scale of the best similarity is s = tr(S diag(…)) / Σ‖c_k‖². A
+/// fix is rigid, so the scale is not applied. It differs from one by noise, a wrong focal length, a wrong baseline or a
+/// model in other units; a deviation beyond `max_scale_error` is rejected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Umeyama {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
-    /// Largest |s − 1| that is accepted; any where infinite.
+    /// Largest accepted |s − 1|; infinite accepts every scale.
     pub(crate) max_scale_error: f64,
 }
 
@@ -72,7 +72,7 @@ impl Solver for Umeyama {
     }
 }
 
-/// The rigid motion and the scale that a similarity would have besides.
+/// The rigid motion, and the scale of the best similarity.
 fn similarity(data: &Observations<'_>) -> (Transform<Object, Camera>, f64) {
     let model = centroid(data.points.iter().map(|point| point.model.coords));
     let measured = centroid(data.points.iter().map(|point| point.measured.at.coords));
@@ -83,7 +83,7 @@ fn similarity(data: &Observations<'_>) -> (Transform<Object, Camera>, f64) {
         size += c.norm_squared();
     }
     let svd = m.svd(true, true);
-    let (u, v_t) = (svd.u.expect("u was asked for"), svd.v_t.expect("v_t was asked for"));
+    let (u, v_t) = (svd.u.expect("u is requested"), svd.v_t.expect("v_t is requested"));
     let sign = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
     let guard = Vector3::new(1.0, 1.0, sign);
     let rotation = polish(u * Matrix3::from_diagonal(&guard) * v_t, &m);
@@ -92,8 +92,8 @@ fn similarity(data: &Observations<'_>) -> (Transform<Object, Camera>, f64) {
     (Transform::new(rotation, model - rotation * measured), scale)
 }
 
-/// Newton's steps on tr(Rᵀ M). The library's 3×3 decomposition goes by way of MᵀM, which costs half the digits of the
-/// weaker directions; a step or two give them back.
+/// Newton steps on tr(Rᵀ M); they restore the precision of the weaker directions that the library's 3×3 decomposition
+/// loses through MᵀM.
 fn polish(mut rotation: Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
     for _ in 0..4 {
         // At R Exp(φ): tr((R Exp φ)ᵀ M) has gradient g = vex(N − Nᵀ), N = Rᵀ M, and Hessian −(tr(N) I − sym N).
@@ -103,7 +103,7 @@ fn polish(mut rotation: Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
         let Some(cholesky) = hessian.cholesky() else { break };
         let step = cholesky.solve(&gradient);
         if !(step.norm() < 1e-3) {
-            break; // far from a maximum: what the singular values said stands
+            break; // far from a maximum: keep the rotation of the singular values
         }
         rotation *= seafix_geometry::so3::exp(&step).to_rotation_matrix().into_inner();
         if step.norm() < 1e-15 {

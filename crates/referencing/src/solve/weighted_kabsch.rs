@@ -1,4 +1,4 @@
-//! Weighted Kabsch: one number a point says how well it is known.
+//! Weighted Kabsch: least squares with one scalar weight per point.
 
 use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
@@ -12,12 +12,14 @@ use super::{
 };
 use crate::{Observation, Observations};
 
-/// The motion of least Σ w_k ‖P_k − C_k H‖² with w_k = 3 / tr(Σ_k + σ_model² I): near points count more than far ones.
-/// That a far point is well known across the line of sight, one number cannot say: see `mahalanobis`.
+/// Kabsch's least squares with weights: min Σ w_k ‖P_k − C_k H‖², w_k = 3 / tr(Σ_k + σ_model² I).
+///
+/// Near points have more weight than far ones. A scalar weight cannot express that a far point is precise across the
+/// line of sight; `mahalanobis` uses the full covariance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct WeightedKabsch {
-    /// Second extent of the points over the first below which they count as a line.
+    /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
 }
 
@@ -29,7 +31,7 @@ impl Default for WeightedKabsch {
 
 impl Component for WeightedKabsch {
     const NAME: &'static str = "weighted-kabsch";
-    const SUMMARY: &'static str = "least squares over rigid motions, one weight a point from its variance";
+    const SUMMARY: &'static str = "least squares over rigid motions, one weight per point from its variance";
     const SOURCE: &'static str = "Kabsch, A solution for the best rotation to relate two sets of vectors, 1976; \
                                   Sorkine-Hornung, Rabinovich, Least-squares rigid motion using SVD, 2017";
 
@@ -54,7 +56,7 @@ impl Solver for WeightedKabsch {
     }
 }
 
-/// Mean variance of a residual along an axis (m²).
+/// The mean variance of a residual along an axis (m²).
 pub(super) fn variance(point: &Observation) -> f64 {
     point.noise().trace() / 3.0
 }

@@ -1,21 +1,22 @@
-//! Residuals of four pixels in units of their own noise.
+//! Whitened residuals of four pixel coordinates.
 
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
 use super::descent::Term;
 
-/// The inverse of Cholesky's factor of a covariance of pixels, S = L Lᵀ: L⁻¹ r has the unit matrix for covariance, so
-/// that rᵀ S⁻¹ r = ‖L⁻¹ r‖².
+/// The inverse of the Cholesky factor of a pixel covariance, S = L Lᵀ.
+///
+/// L⁻¹ r has the unit covariance, so that rᵀ S⁻¹ r = ‖L⁻¹ r‖².
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Whitener {
     /// The diagonal of L⁻¹.
     scale: [f64; 4],
-    /// Below it, row after row; `None` where pixels err independently, as they mostly do.
+    /// The part of L⁻¹ below the diagonal, row by row; `None` for independent pixel errors, the usual case.
     below: Option<[f64; 6]>,
 }
 
 impl Whitener {
-    /// `None` where the covariance is not positive definite.
+    /// `None` if the covariance is not positive definite.
     pub(super) fn of(noise: &Matrix4<f64>) -> Option<Self> {
         let s = |i: usize, j: usize| noise[(i, j)];
         let root = |pivot: f64| (pivot > 0.0 && pivot.is_finite()).then(|| 1.0 / pivot.sqrt());

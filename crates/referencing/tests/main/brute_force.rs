@@ -1,6 +1,6 @@
 //! Exact searches against brute force over every admissible set, for n ≤ 7 and lists ≤ 4.
 //!
-//! The definition of admissible is written here a second time, from the words alone.
+//! The definition of admissible sets is implemented here independently, from its description.
 
 use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -12,7 +12,7 @@ use seafix_referencing::{
     Search, StructuralCoherence, Tolerance,
 };
 
-/// A random problem and what was planted in it.
+/// A random problem.
 struct Case {
     model: Vec<ModelPoint>,
     cloud: Vec<MeasuredPoint>,
@@ -36,8 +36,8 @@ fn place(rng: &mut impl Rng, half: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| rng.random_range(-half..half))
 }
 
-/// A model of 3 to 7 points (sometimes a lattice, sometimes flat), a true or a mirrored image of some of
-/// them with noise, clutter, and lists that overlap.
+/// A model of 3 to 7 points (sometimes a lattice, sometimes flat), a true or mirrored image of some of them with noise,
+/// clutter, and overlapping lists.
 fn case(rng: &mut impl Rng) -> Case {
     let n = rng.random_range(3..=7);
     let lattice = rng.random_bool(0.3);
@@ -98,7 +98,7 @@ fn six_volumes(p: [Vector3<f64>; 4]) -> f64 {
     Matrix3::from_columns(&[p[1] - p[0], p[2] - p[0], p[3] - p[0]]).determinant()
 }
 
-/// Whether a set keeps every law: distances, one-to-one, orientation.
+/// Whether a set is admissible: distances, one-to-one, orientation.
 fn admissible(problem: &Problem<'_>, set: &[Correspondence], orientation: bool) -> bool {
     for (i, a) in set.iter().enumerate() {
         for b in &set[..i] {
@@ -134,8 +134,8 @@ fn quadruples(set: &[Correspondence]) -> Vec<[Correspondence; 4]> {
     all
 }
 
-/// The model's volume exceeds 3 σ of the measured one and that has not its sign, none when it is zero but for rounding;
-/// σ by differences.
+/// Opposite orientation: the model's volume exceeds 3 σ of the measured one, whose sign is opposite or zero within
+/// rounding; σ by differences.
 fn opposed(problem: &Problem<'_>, four: &[Correspondence; 4]) -> bool {
     let known = six_volumes(four.map(|pair| problem.model[pair.model].at.coords));
     let cloud = four.map(|pair| problem.cloud[pair.cloud].position.at.coords);
@@ -184,7 +184,7 @@ fn brute_force(problem: &Problem<'_>, orientation: bool) -> (usize, Vec<Vec<Corr
     best
 }
 
-/// What exact searches must say, given what brute force says.
+/// Compares exact searches with brute force.
 fn check_clique(case: &Case, orientation: bool, seed: u64) {
     let problem = case.problem();
     let (size, mut sets) = brute_force(&problem, orientation);
@@ -221,7 +221,7 @@ fn check_exact(
             assert!(with_candidates < 3, "case {seed}");
         }
         Err(Rejected::NoConsensus { best, .. }) => assert!(best < 3 && best == size, "case {seed}"),
-        // Three points have no orientation; what was refused is a larger set of opposite sign.
+        // Three points have no orientation; the rejected set is a larger one of opposite sign.
         Err(Rejected::Mirrored { best, .. }) => {
             assert!(orientation && size == 3, "case {seed}");
             let (coherent, larger) = brute_force(&problem, false);

@@ -1,4 +1,4 @@
-//! When a pose is believed, and what is said when it is not.
+//! The acceptance of poses, and the reasons for rejection.
 
 mod absence;
 
@@ -70,7 +70,7 @@ fn a_model_in_view_is_fixed() {
 
 #[test]
 fn true_sets_pass_the_residual_gate_at_the_stated_confidence() {
-    // 0.999: of 2000 true sets 2 fail on average; 10 or more would be a chance of 5e-5.
+    // 0.999: 2 of 2000 true sets fail on average; 10 or more have a probability of 5e-5.
     let model = model_of(&MODEL);
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let candidates = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
@@ -88,13 +88,13 @@ fn true_sets_pass_the_residual_gate_at_the_stated_confidence() {
         let found = attempt(&model, &cloud, &candidates, Some(&of_prior));
         gated += usize::from(found.outcome.reason() == Some("gate"));
     }
-    assert!(gated < 14, "{gated} of 2000 true sets fell at two gates of 0.999");
+    assert!(gated < 14, "{gated} of 2000 true sets failed two gates of 0.999");
 }
 
 #[test]
 fn a_set_that_fits_no_rigid_motion_falls_at_the_residuals() {
-    // One Δ of 20 σ lets two displaced points agree with all others; the residuals do not, and of
-    // seven points only one may be left out.
+    // With Δ = 20 σ two displaced points agree with all others; their residuals do not, and of seven points only one
+    // may be excluded.
     let model = model_of(&MODEL);
     let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(3));
     for (i, side) in [(4, 12.0), (1, -12.0)] {
@@ -134,7 +134,7 @@ fn a_pose_against_the_prior_falls() {
     }
 }
 
-/// A square pyramid's base and tip: turned by a quarter it is itself.
+/// A square frustum: a quarter turn maps it onto itself.
 const PYRAMID: [[f64; 3]; 8] = [
     [1.0, 1.0, 0.0],
     [-1.0, 1.0, 0.0],
@@ -153,19 +153,19 @@ fn a_symmetric_object_is_ambiguous_until_the_prior_decides() {
     let found = attempt(&model, &cloud, &Candidates::all(8, 8), None);
     let Outcome::Ambiguous(alternatives) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert_eq!(alternatives.len(), 4, "four quarter turns");
-    assert!(alternatives.windows(2).all(|two| two[0].score >= two[1].score), "the likeliest first");
+    assert!(alternatives.windows(2).all(|two| two[0].score >= two[1].score), "the best is first");
     assert_eq!((found.outcome.reason(), found.margin().unwrap() >= 0.0), (Some("alternatives"), true));
     let bound = PriorBound::Gaussian(Covariance6::isotropic(0.1, 0.1));
     let found = attempt(&model, &cloud, &Candidates::all(8, 8), Some(&Prior { object_from_camera: motion(), bound }));
     let Outcome::Fix(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert!(fix.object_from_camera.error_to(&motion()).amax() < 0.02);
-    let runner_up = found.runner_up.as_ref().expect("the other turns were looked at");
+    let runner_up = found.runner_up.as_ref().expect("the other rotations were examined");
     assert!(runner_up.score < fix.score && found.margin().unwrap() > 10.0);
 }
 
 #[test]
 fn what_a_flat_part_of_a_mirror_image_leaves_is_refused() {
-    // Any model of enough points has nearly flat parts, which are coherent with their own image.
+    // Any model of enough points has nearly flat parts, which are coherent with their own mirror image.
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     for draw in 0..200 {
         let n = [7, 8, 12][draw % 3];
@@ -261,12 +261,12 @@ fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
     assert!(!matches!(found.outcome, Outcome::Fix(_)));
 }
 
-/// The model seen with one Δ of 20 σ, pairs i–i; point 4 is off in depth by 12 σ.
+/// The model seen with one Δ of 20 σ, pairs i–i; point 4 has a depth error of 12 σ.
 fn one_badly_measured(places: &[[f64; 3]]) -> (Vec<ModelPoint>, Vec<MeasuredPoint>, Candidates) {
     let model = model_of(places);
     let mut cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(3));
     cloud[4].position.at = cloud[4].position.at + Vector3::new(0.0, 0.0, 12.0 * SIGMA);
-    // Clutter that agrees with nothing, so that chance is known to be small.
+    // Clutter that agrees with nothing, so that the estimated NFA is small.
     for i in 0..8 {
         let at = Point::new(20.0 * f64::from(i), 50.0, 50.0);
         cloud.push(MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None });
@@ -297,15 +297,15 @@ fn a_badly_measured_pair_is_left_out() {
     let Outcome::Fix(fix) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert_eq!(fix.pairs.iter().map(|pair| pair.model).collect::<Vec<_>>(), [0, 1, 2, 3, 5, 6]);
     assert_eq!(found.identified.len(), 7);
-    assert!(!found.optimal, "that seven are the most says nothing of the six");
+    assert!(!found.optimal, "the proof for seven pairs does not hold for six");
     assert!(fix.object_from_camera.error_to(&motion()).amax() < 0.02);
-    assert!(fix.score < -0.5 * 16.0, "the pair left out counts: {}", fix.score);
+    assert!(fix.score < -0.5 * 16.0, "the excluded pair counts: {}", fix.score);
 }
 
-/// A search names one of two copies and no rival: that a metre aside, without noise, is the likelier, and the answer is ambiguous; a copy of
-/// five points is the runner-up, and the margin is above nought.
+/// A search returns one of two copies and no alternative: a copy one metre aside, without noise, has a better score,
+/// and the outcome is ambiguous. A copy of five points is the runner-up with a positive margin.
 ///
-/// Seen to fail where what stands elsewhere is only told.
+/// Fails if a pose elsewhere is only reported.
 #[test]
 fn what_is_more_probable_elsewhere_leaves_an_answer_ambiguous() {
     let model = model_of(&MODEL);
@@ -348,7 +348,7 @@ fn a_rescued_set_against_a_alternative_that_passes_is_ambiguous() {
     let found = judged(&(model, cloud, candidates), None, &Acceptance::default(), vec![full.clone(), bad]);
     let Outcome::Ambiguous(alternatives) = &found.outcome else { panic!("{:?}", found.outcome) };
     assert_eq!((alternatives.len(), alternatives[0].pairs == full, alternatives[1].pairs.len()), (2, true, 6));
-    assert!(found.margin().expect("two poses") > 8.0, "the whole set is the likelier");
+    assert!(found.margin().expect("two poses") > 8.0, "the complete set has the better score");
 }
 
 #[test]
@@ -360,7 +360,7 @@ fn leaving_pairs_out_helps_against_nothing_but_residuals() {
     let prior = Prior { object_from_camera: elsewhere, bound };
     let found = judged(&scene, Some(&prior), &Acceptance::default(), Vec::new());
     assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Residuals { .. })), "{:?}", found.outcome);
-    // A set whose residuals pass and whose pose does not is refused as a whole.
+    // A set whose residuals pass and whose pose fails is rejected without exclusions.
     let model = model_of(&MODEL);
     let cloud = cloud_of(&model, &mut ChaCha8Rng::seed_from_u64(4));
     let scene = (model, cloud, Candidates::from_pairs(7, (0..7).map(|i| (i, i))));
@@ -368,8 +368,8 @@ fn leaving_pairs_out_helps_against_nothing_but_residuals() {
     assert!(matches!(found.outcome, Outcome::Rejected(RejectionReason::Prior { .. })), "{:?}", found.outcome);
 }
 
-/// A pipe: points near a line leave a turn about it free. The model points stay where they are, the vehicle does not. With a
-/// wide limit the fix is believed.
+/// A pipe: collinear points leave a rotation about their line undetermined. It moves no model point, but it moves the
+/// vehicle. A wide limit accepts the fix.
 #[test]
 fn an_attitude_that_points_near_a_line_leave_free_is_refused() {
     let near_line = |i: usize| {
@@ -384,9 +384,9 @@ fn an_attitude_that_points_near_a_line_leave_free_is_refused() {
     assert!(matches!(judged(&scene, None, &wide, Vec::new()).outcome, Outcome::Fix(_)));
 }
 
-/// A baseline one percent too long makes all that is measured one percent larger and farther off. Of points that are known to
-/// 5 mm at 3 m that is 3 cm: told, and no reason to refuse. Of points at 12 m it is more than the alert limit, while the set is
-/// still coherent and its residuals may be those of noise. Seen to fail without the test.
+/// A baseline one per cent too long scales all measurements by one per cent. At 3 m, with points of 5 mm noise, the
+/// effect of 3 cm is reported and accepted. At 12 m it exceeds the alert limit, while the set is still coherent and its
+/// residuals are within their noise. Fails without the test.
 #[test]
 fn a_rig_that_stretches_what_it_measures_is_reported_and_refused_where_it_matters() {
     let model = model_of(&MODEL);
@@ -404,13 +404,13 @@ fn a_rig_that_stretches_what_it_measures_is_reported_and_refused_where_it_matter
     };
     let mut squares = 0.0;
     for _ in 0..200 {
-        let Outcome::Fix(fix) = attempt_at(12.0, 1.0) else { panic!("nothing is stretched") };
+        let Outcome::Fix(fix) = attempt_at(12.0, 1.0) else { panic!("no scale error") };
         let scale_error = fix.integrity.scale_error.expect("seven points");
         squares += (scale_error.value / scale_error.sigma).powi(2) / 200.0;
     }
     // χ²₁ on average: 1 ± .1.
     assert!((0.6..1.4).contains(&squares), "{squares}");
-    let Outcome::Fix(fix) = attempt_at(3.0, 1.015) else { panic!("4.5 cm off") };
+    let Outcome::Fix(fix) = attempt_at(3.0, 1.015) else { panic!("a displacement of 4.5 cm") };
     let scale_error = fix.integrity.scale_error.expect("seven points");
     assert!((scale_error.value - 0.015).abs() < 4.0 * scale_error.sigma, "{scale_error:?}");
     let outcome = attempt_at(12.0, 1.015);
@@ -418,8 +418,8 @@ fn a_rig_that_stretches_what_it_measures_is_reported_and_refused_where_it_matter
     assert!((0.14..0.32).contains(&off) && refusal.reason() == "gate", "{refusal}");
 }
 
-/// A panel of six points and one far from it, all exact: the panel alone has the model points 3.6 cm off, all seven 2.0 cm. A second
-/// far one bears the first out, and pairs that were not searched for are not doubted.
+/// A panel of six points and one distant point, all exact: the model points have an error of 3.6 cm with the panel
+/// alone, 2.0 cm with all seven. A second distant point confirms the first, and labelled pairs are not questioned.
 #[test]
 fn a_pose_that_hangs_on_one_point_is_refused() {
     let panel =
@@ -428,12 +428,13 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     let exact = |point: &ModelPoint| UncertainPoint::isotropic(motion().inverse() * point.at, SIGMA);
     let cloud: Vec<_> = model.iter().map(|point| MeasuredPoint { position: exact(point), pixels: None }).collect();
     let seen = |count: usize| (model.clone(), cloud.clone(), Candidates::from_pairs(9, (0..count).map(|i| (i, i))));
-    // Whether chance makes them is no matter here.
+    // The NFA is irrelevant here.
     let acceptance = Acceptance { alert_limit: 0.065, max_nfa: 1e300, ..Acceptance::default() };
     let outcome = judged(&seen(7), None, &acceptance, Vec::new()).outcome;
     let Outcome::Rejected(refusal @ RejectionReason::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
     assert!((rms - 0.036).abs() < 5e-4 && refusal.reason() == "imprecise", "{refusal}");
-    let reported = "the pose hangs on model point `6`: should that be a wrong match, the model points are 0.036 m off";
+    let reported =
+        "pose depends on one point: if model point `6` is a wrong match, the model points have an error of 0.036 m";
     assert!(refusal.to_string().starts_with(reported), "{refusal}");
     let both = judged(&seen(8), None, &acceptance, Vec::new());
     assert!(matches!(both.outcome, Outcome::Fix(_)), "{:?}", both.outcome);
@@ -445,9 +446,9 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     assert!(matches!(said.outcome, Outcome::Fix(_)), "{:?}", said.outcome);
 }
 
-/// Two like modules half a metre apart, one seen, and a box about the rough pose that excludes the other by one standard deviation of a
-/// point: that noise may have done. But pairs proposed for all seven points of the one and for none of the other decide; for five points
-/// they do not.
+/// Two equal modules half a metre apart, one visible, and a box prior that excludes the other by one standard deviation
+/// of a point: noise may explain it. Pairs proposed for all seven points of the first and for none of the second
+/// decide; those for five points do not.
 #[test]
 fn noise_at_the_edge_of_a_box_excludes_no_reading_but_enough_proposals_do() {
     let one = [
@@ -514,14 +515,14 @@ fn what_was_not_examined_is_not_believed() {
     assert_eq!((none.pair_tests, none.consensus_bound, none.optimal), (Some(9), Some(7), false));
 }
 
-/// Measured points at one depth, each with a depth noise of 30 mm and 2 mm across: one disparity for all.
+/// Measured points at one depth, each with a noise of 30 mm in depth and 2 mm across: one disparity for all.
 fn at_one_depth(places: &[[f64; 3]]) -> Vec<MeasuredPoint> {
     let covariance = Matrix3::from_diagonal(&Vector3::new(2e-3, 2e-3, 30e-3).map(|s| s * s));
     let seen = places.iter().map(|[x, y, _]| UncertainPoint { at: Point::new(*x, *y, 3.0), covariance });
     seen.map(|position| MeasuredPoint { position, pixels: None }).collect()
 }
 
-/// What comes of points at one depth that are all identified.
+/// The outcome of labelled points at one depth.
 fn named(places: &[[f64; 3]]) -> Outcome {
     let (model, cloud) = (model_of(places), at_one_depth(places));
     let candidates = Candidates::from_pairs(model.len(), (0..model.len()).map(|i| (i, i)));
@@ -531,9 +532,8 @@ fn named(places: &[[f64; 3]]) -> Outcome {
     judge_labelled(&problem, pairs, &Mahalanobis::default(), &Acceptance::default(), None).outcome
 }
 
-/// Points that say which ones they are need no search and owe chance nothing, but the residuals are tested all the same:
-/// five points that nobody would believe to be found among a thousand candidates are a fix, and five of which one says
-/// the wrong name are none, or one without it.
+/// Labelled points need no search and no NFA test, but their residuals are tested: five points that no search could
+/// accept among a thousand candidates are a fix, and five with two labels exchanged are rejected.
 #[test]
 fn named_points_are_tested_for_their_residuals_alone() {
     let (model, mut rng) = (model_of(&MODEL[..5]), ChaCha8Rng::seed_from_u64(4));
@@ -559,8 +559,8 @@ fn named_points_are_tested_for_their_residuals_alone() {
     assert_eq!(few.outcome.reason(), Some("too-few"));
 }
 
-/// One disparity for all points of a model with relief: no rigid motion lays it flat, and χ² says so. Of a plate that
-/// is small for its distance it says nothing of the attitude, and the predicted error says so.
+/// One disparity for all points of a model with relief: no rigid motion makes it flat, as χ² shows. For a plate that is
+/// small relative to its distance, the attitude is undetermined, as the predicted error shows.
 #[test]
 fn one_disparity_is_refused_with_the_number_that_failed() {
     match named(&MODEL) {
@@ -572,7 +572,7 @@ fn one_disparity_is_refused_with_the_number_that_failed() {
         Outcome::Rejected(RejectionReason::Imprecise { rms, limit }) => assert!(2.0 * rms > limit, "{rms} {limit}"),
         other => panic!("{other:?}"),
     }
-    // The same plate, ten times as large, is no worse than any object.
+    // A plate ten times as large determines its pose.
     let large = plate.map(|at| at.map(|x| x * 10.0));
     assert!(matches!(named(&large), Outcome::Fix(_)));
 }

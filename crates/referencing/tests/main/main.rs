@@ -1,4 +1,4 @@
-//! Tests through the public interface: one binary, so that a change of the crate links once.
+//! Tests through the public interface, in one binary to save link time.
 
 mod brute_force;
 mod judgement;

@@ -1,4 +1,4 @@
-//! What each setting does by itself, all others pooled.
+//! The ablation: the effect of each setting, pooled over all others.
 
 use super::{distinct, phrases};
 use crate::{
@@ -12,11 +12,10 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let axes = &summary.rows.first()?.axes;
     let mut heads = vec![Head::words("Setting"), Head::words("value"), Head::numbers("trials"), Head::numbers("n")];
     heads.extend(
-        ["found (%)", "wrong (%)", "m2 least (mm)", "m2 middle (mm)", "m2 greatest (mm)", "total (ms)"]
-            .map(Head::numbers),
+        ["fixes (%)", "wrong (%)", "TRE min (mm)", "TRE median (mm)", "TRE max (mm)", "total (ms)"].map(Head::numbers),
     );
     let caption = text![
-        "Each setting by itself, all others pooled: shares of all attempts; the least, the middle and the greatest of the trials’ medians of the TRE over all attempts, failures as infinitely far off; the middle of their median times."
+        "Effect of each setting, pooled over all others. Fixes and wrong fixes are in % of all attempts. TRE: minimum, median and maximum, over the trials, of the median TRE of all attempts, with failures counted as infinite errors. Total: median of the trials’ median times."
     ];
     let mut table = Table::new("ablation", caption, heads);
     let all = summary.rows.iter().filter_map(|row| row.tre_of_all).map(|tre| tre * 1e3);

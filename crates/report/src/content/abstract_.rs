@@ -1,4 +1,4 @@
-//! The abstract: the question's answer in numbers.
+//! The abstract: the answer to the experiment's question, in numbers.
 
 use super::{answer, phrases};
 use crate::{
@@ -18,19 +18,20 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     };
     let attempted = total(|row| row.attempted);
     let mut first = text![
-        format!("In {} trial{} with ", trials.len(), if trials.len() == 1 { "" } else { "s" }),
+        format!("{} trial{} with ", trials.len(), if trials.len() == 1 { "" } else { "s" }),
         pooled("frames", total(|row| row.frames)),
-        " frames, ",
+        " frames and ",
         pooled("attempted", attempted),
-        " targets were attempted: "
+        " attempts (one for every frame and target in view): "
     ];
     let groups =
         [("found", total(|row| row.found)), ("refused", total(|row| row.refused)), ("wrong", total(|row| row.wrong))];
     for (index, (group, n)) in groups.into_iter().enumerate() {
         let key = phrases::over(&trials, "/metrics/evaluation", format!("percent {group} of attempted"));
         let fraction = (attempted > 0).then(|| 100.0 * n as f64 / attempted as f64);
-        first.extend(text![pooled(group, n), format!(" {group} ("), Number::new(fraction, 1, key), " %"]);
-        // Trials may share their frames, and then they are no independent draws: pooled counts carry no interval.
+        let word = phrases::outcome(group);
+        first.extend(text![pooled(group, n), format!(" {word} ("), Number::new(fraction, 1, key), " %"]);
+        // Trials that share frames are not independent, so pooled counts carry no interval.
         if let [trial] = trials[..] {
             let [low, high] = phrases::interval(trial, group, n, attempted);
             first.extend(text![", 95 % interval [", low, ", ", high, "]"]);
@@ -39,32 +40,37 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     }
     if trials.len() > 1 {
         first.push(
-            "These counts pool trials that may share their frames; intervals stand with each trial below. ".into(),
+            "These counts pool trials that may share frames; the table of outcomes has the intervals of each trial. "
+                .into(),
         );
     }
     if total(|row| row.unjudged) > 0 {
-        first.extend(text!["No truth judges ", pooled("unjudged", total(|row| row.unjudged)), " of the fixes found."]);
+        first.extend(text![
+            "Ground truth is missing for ",
+            pooled("unjudged", total(|row| row.unjudged)),
+            " of the fixes; they are not checked."
+        ]);
     }
     let mut texts: Vec<Text> = changed(run).into_iter().chain([first]).collect();
     texts.extend(answer::sentences(run, summary, comparisons));
-    // Its own solver is there to be compared, on images.
+    // The paper's figure is comparable only with its own solver, on images.
     if !summary.rows.iter().any(|row| row.solver == "triad") || run.trials.iter().all(|trial| !trial.images) {
         return texts;
     }
     let [low, high] = PAPER_FIT_RMS.map(|m| number(Some(m * 1e3), 0));
     texts.push(text![format!(
-        "For orientation: of a virtual scene of its own, at 2–5 m, the paper reports m1 of {low}–{high} mm, and neither rates nor the error of the vehicle’s pose ({}).",
+        "For comparison, the paper reports a fit RMS of {low}–{high} mm for its own virtual scene at 2–5 m; it reports neither fix rates nor pose errors ({}).",
         paper::CITATION
     )]);
     texts
 }
 
-/// That the run departs from its experiment file, and in what.
+/// A sentence on the settings that differ from the experiment file; `None` without any.
 fn changed(run: &Run) -> Option<Text> {
     let mut settings =
         run.header().command.split(" --set '").skip(1).filter_map(|rest| rest.split_once('\'')).peekable();
     settings.peek()?;
-    let mut said = text![bold("Not the experiment as its file says:"), " it was run with "];
+    let mut said = text![bold("This run departs from its experiment file:"), " it was run with "];
     for (index, (setting, _)) in settings.enumerate() {
         if index > 0 {
             said.push(", ".into());

@@ -1,4 +1,4 @@
-//! The answer to the question of an experiment: what was found along its axes, one sentence a quantity or a series.
+//! The answer to an experiment's question: one sentence for every quantity or series.
 
 use super::{
     figures, inspection, navigation, objects,
@@ -13,12 +13,12 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// So many trials are told one by one.
+/// Maximum number of trials that are listed one by one; more are summed up by series.
 const REPORTED: usize = 9;
-/// So many differences are told.
+/// Maximum number of significant differences that get a sentence.
 const DIFFERENCES: usize = 3;
 
-/// The sentences.
+/// The sentences of the answer, in order.
 pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let labels = Labels::of(summary);
     let name = |index: usize| labels.of_trial(&summary.rows[index]);
@@ -41,11 +41,11 @@ pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
     said
 }
 
-/// What trials and series of them are called.
+/// The names of trials and of series of trials.
 struct Labels {
-    /// The condition with numbers, along which a series goes.
+    /// The key of the numeric axis along which a series runs.
     along: Option<String>,
-    /// The axes that tell series apart.
+    /// The keys of the axes that distinguish series.
     apart: Vec<String>,
 }
 
@@ -56,7 +56,7 @@ impl Labels {
         let varies = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
         let apart = axes.into_iter().map(|axis| axis.key).filter(|key| Some(key) != along.as_ref() && varies(key));
         let mut apart: Vec<String> = apart.collect();
-        // Methods on several kinds of problems: a series is a method.
+        // With several methods on several kinds of problems, every method is one series.
         if along.is_none() && apart.len() > 1 {
             let method = |key: &String| matches!(format::short(key), "search" | "solver" | "method");
             if apart.iter().any(method) {
@@ -66,13 +66,13 @@ impl Labels {
         Self { along, apart }
     }
 
-    /// What a series is called that `row` belongs to.
+    /// The name of the series that holds `row`.
     fn of_series(&self, row: &Row) -> String {
         let values: Vec<String> = self.apart.iter().map(|key| value(row, key)).collect();
         if values.is_empty() { row.method() } else { values.join(", ") }
     }
 
-    /// What a trial is called among all.
+    /// The name of a trial among all trials of the run.
     fn of_trial(&self, row: &Row) -> String {
         match (&self.along, self.apart.is_empty()) {
             (Some(key), true) => self.place(row, key),
@@ -88,13 +88,13 @@ impl Labels {
         format::placed(key, &value(row, key))
     }
 
-    /// Whether each trial is worth a word: few, in one series or each a series of its own.
+    /// Whether trials are listed one by one: at most [`REPORTED`], in one series or each its own series.
     fn reported_singly(&self, summary: &RunSummary) -> bool {
         let series = self.series(summary).len();
         summary.rows.len() <= REPORTED && (series == 1 || series == summary.rows.len())
     }
 
-    /// The rows of each series, in the order of the run.
+    /// The series with the indices of their rows, in the order of the run.
     fn series(&self, summary: &RunSummary) -> Vec<(String, Vec<usize>)> {
         let mut series: Vec<(String, Vec<usize>)> = Vec::new();
         for (index, row) in summary.rows.iter().enumerate() {
@@ -112,15 +112,17 @@ fn value(row: &Row, key: &str) -> String {
     row.axes.iter().find(|axis| axis.key == key).map_or_else(String::new, |axis| axis.value.clone())
 }
 
-/// A quantity whose medians are told.
+/// A quantity with its name, its key and its distribution in a row.
 type Metric = (&'static str, Field, fn(&Row) -> Option<Distribution>);
 
 const METRICS: [Metric; 2] = [
-    ("error of the model points (TRE)", Field::Tre, |row| row.tre),
-    ("error of the camera’s position", Field::Position, |row| row.position_error),
+    ("target registration error (TRE)", Field::Tre, |row| row.tre),
+    ("camera position error", Field::Position, |row| row.position_error),
 ];
 
-/// One sentence a quantity, every trial in it: along the condition, or most first.
+/// One sentence for every quantity, listing all trials.
+///
+/// They are in order of the numeric axis, or without one in order of decreasing fix rate.
 fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
     let mut order: Vec<usize> = (0..summary.rows.len()).collect();
     if labels.along.is_none() {
@@ -133,8 +135,8 @@ fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
         let n = phrases::count(trial, "attempted", row.attempted);
         (fraction.value.is_some()).then(|| text![labels.of_trial(row), ": ", fraction, " % of ", n])
     });
-    let mut said = vec![list("Found of the attempts", found)];
-    let fit: Metric = ("residual of the identified points", Field::Fit, |row| row.fit);
+    let mut said = vec![list("Fix rate (fixes in % of the attempts)", found)];
+    let fit: Metric = ("fit RMS (the paper’s measure)", Field::Fit, |row| row.fit);
     for (name, field, of) in METRICS.into_iter().chain([fit]) {
         let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
         let medians = order.iter().map(|&index| {
@@ -149,7 +151,7 @@ fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
     said
 }
 
-/// `name — a: 1; b: 2.`
+/// A sentence of the form `name — a: 1; b: 2.`
 fn list(name: &str, items: impl Iterator<Item = Option<Text>>) -> Text {
     let mut said = text![format!("{name} — ")];
     for (index, item) in items.flatten().enumerate() {
@@ -162,7 +164,7 @@ fn list(name: &str, items: impl Iterator<Item = Option<Text>>) -> Text {
     said
 }
 
-/// One sentence a series: how many it found, and how its errors go.
+/// One sentence for every series: fixes, wrong fixes, and the errors along the axis.
 fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
     let series = labels.series(summary).into_iter();
     series
@@ -178,9 +180,9 @@ fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
             let mut said = text![
                 format!("{name}: "),
                 pooled("found", found),
-                " of ",
+                " fixes in ",
                 pooled("attempted", attempted),
-                " found (",
+                " attempts (",
                 Number::new(fraction, 1, key),
                 " %), ",
                 pooled("wrong", total(|row| row.wrong)),
@@ -196,16 +198,18 @@ fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
         .collect()
 }
 
-/// `, none at 4.5 and 5.5`: where along the condition a series that finds something finds nothing.
+/// The clause on values without a fix, like `, no fix at 4.5 and 5.5`; `None` for a series without any fix.
 fn nowhere(summary: &RunSummary, labels: &Labels, members: &[usize]) -> Option<String> {
     let key = labels.along.as_ref()?;
     let found = |index: &usize| summary.rows[*index].found > 0;
     let places: Vec<String> =
         members.iter().filter(|index| !found(index)).map(|&index| labels.place(&summary.rows[index], key)).collect();
-    (members.iter().any(found) && !places.is_empty()).then(|| format!(", none at {}", places.join(" and ")))
+    (members.iter().any(found) && !places.is_empty()).then(|| format!(", no fix at {}", places.join(" and ")))
 }
 
-/// `; the median error … goes from a mm at 2 to b mm at 5`, or between the least and the greatest.
+/// The clause on the median errors of a series, like `; the median TRE is a mm at 2 and b mm at 5`.
+///
+/// A run without a numeric axis has the smallest and the largest median instead.
 fn course(run: &Run, summary: &RunSummary, labels: &Labels, members: &[usize], (name, field, of): Metric) -> Text {
     let known: Vec<(usize, f64)> =
         members.iter().filter_map(|&index| Some((index, of(&summary.rows[index])?.median))).collect();
@@ -236,20 +240,20 @@ fn course(run: &Run, summary: &RunSummary, labels: &Labels, members: &[usize], (
         Some(key) => {
             let at = |index: usize| labels.place(&summary.rows[index], key);
             text![
-                format!("; the median {name} goes from "),
+                format!("; the median {name} is "),
                 as_number(first),
-                format!(" mm at {} to ", at(first.0)),
+                format!(" mm at {} and ", at(first.0)),
                 as_number(last),
                 format!(" mm at {}", at(last.0))
             ]
         }
         None => {
-            text![format!("; the median {name} lies between "), as_number(first), " and ", as_number(last), " mm"]
+            text![format!("; the median {name} ranges from "), as_number(first), " to ", as_number(last), " mm"]
         }
     }
 }
 
-/// Root mean squares beside their bounds, the closest and the farthest.
+/// One sentence for every method: the smallest and the largest ratio of RMS error to Cramér–Rao bound.
 fn limits(run: &Run, summary: &RunSummary) -> Vec<Text> {
     let methods = super::distinct(summary.rows.iter().map(Row::method)).into_iter();
     methods
@@ -272,22 +276,22 @@ fn limits(run: &Run, summary: &RunSummary) -> Vec<Text> {
             let [position_low, position_high] = ends(Field::Position, &ratios(|limits| limits.position));
             (!own.is_empty()).then(|| {
                 text![
-                    format!("{method}: the root mean square error of the model points is "),
+                    format!("{method}: the RMS target registration error (TRE) is "),
                     tre_low,
                     " to ",
                     tre_high,
-                    " times the Cramér–Rao bound, that of the camera’s position ",
+                    " times its Cramér–Rao bound, the RMS camera position error ",
                     position_low,
                     " to ",
                     position_high,
-                    " times."
+                    " times its bound."
                 ]
             })
         })
         .collect()
 }
 
-/// The medians of the only trial.
+/// One sentence for every median of the only trial.
 fn errors(run: &Run, summary: &RunSummary) -> Vec<Text> {
     let (trial, row) = (&run.trials[0], &summary.rows[0]);
     let as_number = METRICS.into_iter().filter_map(|(name, field, of)| {
@@ -302,7 +306,9 @@ fn errors(run: &Run, summary: &RunSummary) -> Vec<Text> {
     as_number.collect()
 }
 
-/// How many fixes were wrong, and where most of them were.
+/// A sentence on the trial with the most wrong fixes.
+///
+/// The result is `None` without any, or for a single trial.
 fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
     let worst = (0..summary.rows.len()).rev().max_by_key(|&index| summary.rows[index].wrong)?;
     let (row, trial) = (&summary.rows[worst], &run.trials[worst]);
@@ -310,11 +316,11 @@ fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
         return None;
     }
     let alike = summary.rows.iter().filter(|other| other.wrong == row.wrong).count();
-    let began = if alike == 1 { "Most wrong fixes were made with" } else { "No trial has more wrong fixes than" };
+    let began = if alike == 1 { "Most wrong fixes:" } else { "No trial has more wrong fixes than" };
     Some(text![
-        format!("{began} {}: ", labels.of_trial(row)),
+        format!("{began} {} with ", labels.of_trial(row)),
         phrases::count(trial, "wrong", row.wrong),
-        " of ",
+        " in ",
         phrases::count(trial, "attempted", row.attempted),
         " attempts."
     ])

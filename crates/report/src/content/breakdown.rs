@@ -1,4 +1,4 @@
-//! Up to where a method bears what makes its task harder.
+//! Break-down points: the value of a condition up to which a method keeps its fix rate.
 
 use super::{distinct, figures, phrases};
 use crate::{
@@ -8,23 +8,25 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// A method bears a condition at which it finds so many of its attempts (%).
+/// Minimum fix rate (%) at which a method counts as not broken down; set before the experiments.
 pub(crate) const BORNE: f64 = 95.0;
 
-/// A line for every series along every axis of which a larger value makes the task harder; a sentence where nothing is borne.
+/// The table of break-down points: one line for every series along every axis whose larger values are harder.
+///
+/// A sentence replaces it where no series reaches [`BORNE`] anywhere; `None` without such an axis.
 pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     let heads = vec![
         Head::words("series"),
         Head::words("along"),
         Head::numbers("from"),
         Head::numbers("to"),
-        Head::numbers("largest borne"),
-        Head::numbers("found there (%)"),
+        Head::numbers("break-down point"),
+        Head::numbers("fix rate there (%)"),
         Head::numbers("interval"),
-        Head::numbers("surely borne"),
+        Head::numbers("conservative"),
     ];
     let caption = text![format!(
-        "Break-down points: the largest value at which at least {BORNE} % of the attempts are found, there and at every smaller value that was tried; surely borne: the same of the lower end of the 95 % interval of that share, which few attempts keep low. ≥: none larger was tried; –: not even the smallest is borne."
+        "Break-down points: the largest value up to which the fix rate is at least {BORNE} % at every tested value. Conservative: the same for the lower end of the 95 % interval of the fix rate, which is low for few attempts. ≥: no larger value was tested; –: the fix rate is lower at the smallest value already."
     )];
     let mut table = Table::new("breakdown", caption, heads);
     let mut any = false;
@@ -49,7 +51,7 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     Some(match any {
         true => Block::Table(table),
         false => Block::Paragraph(text![format!(
-            "Break-down point: at no value of {}, not even the smallest, are {BORNE} % of the attempts found.",
+            "Break-down point: the fix rate is below {BORNE} % at every value of {}, even the smallest.",
             figures::keys(summary)
                 .iter()
                 .filter(|key| harder(key))
@@ -60,7 +62,7 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     })
 }
 
-/// One series; whether it bears anything.
+/// The line of one series, and whether it has a break-down point.
 fn line(name: &str, key: &str, steps: &[(f64, &Row, &Trial)]) -> (Vec<Cell>, bool) {
     let trials: Vec<&Trial> = steps.iter().map(|step| step.2).collect();
     let fraction = |end: &str, (_, row, trial): &(f64, &Row, &Trial)| {

@@ -1,4 +1,4 @@
-//! What the methods were given.
+//! The section on data: source, targets, cameras, priors, noise, seeds and hashes.
 
 use hmac_sha256::Hash as Sha256;
 use seafix_log::{CameraRecord, TrialHeader};
@@ -17,7 +17,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     let of = |say: fn(&TrialHeader) -> String| distinct(run.trials.iter().map(|trial| say(&trial.header))).join("; ");
     let mut table = Table::new(
         "data",
-        text!["Conditions of the run. Where trials differ, all values stand side by side."],
+        text!["Conditions of the run. If trials differ, all their values are listed."],
         vec![Head::words(""), Head::words("")],
     );
     let mut line = |name: &str, value: Text| {
@@ -28,12 +28,12 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     };
     line("Source", text![of(|header| header.source.clone())]);
     let frames = distinct(run.trials.iter().map(|trial| trial.count().to_string())).join(", ");
-    line("Frames", text![format!("{frames} a trial, {} in all", counted(run.trials.len(), "trial", "trials"))]);
+    line("Frames", text![format!("{frames} per trial, {}", counted(run.trials.len(), "trial", "trials"))]);
     if let Some(trial) = run.trials.iter().find(|trial| trial.every() > 1) {
         let mut said = text!["every "];
         said.push(phrases::header(trial, "every", Some(trial.every() as f64), 0).into());
         said.push(
-            "th frame, and failures as long as there was room; medians and quantiles are over these, counts over all"
+            "th frame, and more failures up to a limit; medians and quantiles are over the former, counts over all frames"
                 .into(),
         );
         line("Frames logged", said);
@@ -42,12 +42,12 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     line("Left camera", text![of(|header| camera(&header.rig.left))]);
     line("Right camera", text![of(|header| camera(&header.rig.right))]);
     line("Rig", text![of(rig)]);
-    line("Prior, one σ", text![of(prior)]);
+    line("Prior, 1 σ", text![of(prior)]);
     line(
-        "Corner noise assumed",
+        "Assumed corner noise",
         text![of(|header| header.pixel_sigma.map_or(String::new(), |s| format!("σ = {s} px per axis and image")))],
     );
-    line("Disparity noise measured", disparity(run, summary));
+    line("Measured disparity noise", disparity(run, summary));
     line(
         "Model points",
         text![of(|header| {
@@ -57,7 +57,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
         })],
     );
     line("Seeds", text![of(|header| pairs(header.seeds.iter().map(|(name, seed)| (name, seed.to_string()))))]);
-    // A kept run serves every version with the same results: which of them ran it is left out.
+    // A kept run serves every version with the same results, so a small report omits the version.
     if !small {
         let versions =
             |header: &TrialHeader| pairs(header.versions.iter().map(|(name, version)| (name, version.clone())));
@@ -74,16 +74,16 @@ pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
-/// What identifies configuration, site and results: equal text, equal hash.
+/// The table of hashes that identify configuration, site and results.
 fn hashes(run: &Run) -> Table {
     let caption = text![
-        "SHA-256, the first 16 digits: of the resolved configuration and of the site as the log has them, and of all results of the log but its times; a run of the same configuration gives the same on every machine and any number of threads."
+        "First 16 digits of the SHA-256 of the resolved configuration, of the site, and of all results of a log except times. The same configuration gives the same results on every machine and with any number of threads."
     ];
     let heads = ["Log", "configuration", "site", "results"].map(Head::words).to_vec();
     let mut table = Table::new("hashes", caption, heads);
     for trial in &run.trials {
         let hash = |text: &str| code(hex(&Sha256::hash(text.as_bytes())));
-        // Where every frame has an object of its own there is no site.
+        // A source with another object in every frame has no site.
         let site = match trial.header.site.as_str() {
             "" => "–".into(),
             site => hash(site).into(),
@@ -114,14 +114,14 @@ fn disparity(run: &Run, summary: &RunSummary) -> Text {
     if number(Some(low), 2) != number(Some(high), 2) {
         said.extend(text!["–", end("greatest", high)]);
     }
-    said.push(" px, RMS over the identified points within 2 px of truth, which truncates it; targets of several objects left out".into());
+    said.push(" px, RMS over the identified points within 2 px of the true projection, so a lower bound; targets with several objects excluded".into());
     said
 }
 
 fn targets(header: &TrialHeader) -> String {
     const LABELLED: usize = 12;
     if header.targets.is_empty() {
-        return "an object of its own in every frame, as the log has it".to_owned();
+        return "another object in every frame, recorded in the log".to_owned();
     }
     let sizes = || header.targets.iter().map(|target| target.points.len());
     let points: usize = sizes().sum();
@@ -143,7 +143,7 @@ fn camera(camera: &CameraRecord) -> String {
     format!("{} × {} px, f = {:.1}, {:.1} px, {distortion}", camera.size[0], camera.size[1], k[0][0], k[1][1])
 }
 
-/// The distance of both cameras (m).
+/// The stereo baseline (m).
 pub(super) fn baseline(header: &TrialHeader) -> f64 {
     let t = header.rig.right_from_left.map(|row| row[3]);
     t[..3].iter().map(|x| x * x).sum::<f64>().sqrt()

@@ -1,4 +1,4 @@
-//! The ten worst frames, with their images and the place in the log where to look.
+//! The section on failures: the ten worst attempts with their images and their places in the logs.
 
 use std::collections::BTreeMap;
 
@@ -13,17 +13,17 @@ use crate::{
     run::{AttemptRow, Frame, Run, Trial},
 };
 
-/// How many are listed.
+/// The number of listed attempts.
 const LISTED: usize = 10;
-/// Of them refusals at most, so that large errors are seen as well.
+/// Maximum number of rejected attempts in the list, so that large errors are shown as well.
 const REFUSALS: usize = 5;
-/// Of more frames than this, wanted pictures are looked for in none: reading all images again takes too long.
+/// Maximum number of frames of a log whose images are read again; longer logs take too long.
 const SEARCHED: usize = 200_000;
 
 /// One attempt in its trial.
 type Case<'a> = (usize, &'a Frame, &'a AttemptRow);
 
-/// The picture of the best frame for the head of the report, and the section of the worst.
+/// The picture of the best frame, and the section with the worst attempts.
 pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section), ReportError> {
     let worst = worst(run);
     let best = best(run);
@@ -40,13 +40,13 @@ pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section)
     let first = best.and_then(|best| pictures.get(&best).map(|marked| best_picture(run, best.0, marked, small)));
     let mut section = Section::new("Failures");
     if worst.is_empty() {
-        section.say(text!["There is no attempt."]);
+        section.say(text!["The run has no attempt."]);
         return Ok((first, section));
     }
     section.add(Block::Table(table(run, &worst)));
     let mut shown: Vec<u64> = Vec::new();
     for (place, (index, frame, row)) in worst.iter().enumerate() {
-        // Trials of one source share their frames: one picture of each is enough.
+        // Trials of one source share their frames; each frame is shown once.
         let source = format!("{}{}", run.trials[*index].header.source, frame.stamp_ns);
         let hash = source.bytes().fold(7_u64, |hash, byte| hash.wrapping_mul(131).wrapping_add(u64::from(byte)));
         let Some(marked) = pictures.get(&(*index, frame.stamp_ns)).filter(|_| !shown.contains(&hash)) else { continue };
@@ -56,7 +56,7 @@ pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section)
     Ok((first, section))
 }
 
-/// Wrong fixes by their error, then refusals where points were in view, then the largest errors.
+/// Wrong fixes by error, then rejected attempts with points in view, then the fixes with the largest errors.
 fn worst(run: &Run) -> Vec<Case<'_>> {
     let all = || {
         let trials = run.trials.iter().enumerate();
@@ -80,7 +80,7 @@ fn worst(run: &Run) -> Vec<Case<'_>> {
     let found = |row: &AttemptRow| row.found();
     let mut cases = pick(&max(all().filter(|(.., row)| wrong(row)).collect(), LISTED), &wrong);
     let mut refusals: Vec<Case<'_>> = all().filter(|(.., row)| refused(row)).collect();
-    // Most points in view first: those had the least cause.
+    // Rejected attempts with many points in view are the least expected.
     let visible = |row: &AttemptRow| row.get(Field::Visible).unwrap_or(0.0);
     refusals.sort_by(|a, b| visible(b.2).total_cmp(&visible(a.2)));
     cases.extend(refusals.into_iter().take(REFUSALS.min(LISTED - cases.len())));
@@ -88,14 +88,14 @@ fn worst(run: &Run) -> Vec<Case<'_>> {
     cases
 }
 
-/// The frame with most identified points among those that have images and whose fixes are right.
+/// The frame with the most identified points, among frames with images and without a wrong fix.
 fn best(run: &Run) -> Option<(usize, u64)> {
     let mut best: Option<(u32, usize, u64)> = None;
     for (index, trial) in run.trials.iter().enumerate().filter(|(_, trial)| trial.pictures) {
         for frame in &trial.frames {
             let points: u32 = trial.attempts_of(frame).filter(|row| row.found()).map(|row| row.points).sum();
             let wrong = trial.attempts_of(frame).any(AttemptRow::wrong);
-            // The first of equals.
+            // The first frame of several equal ones.
             if !wrong && points > best.map_or(0, |best| best.0) {
                 best = Some((points, index, frame.stamp_ns));
             }
@@ -116,10 +116,10 @@ fn table(run: &Run, worst: &[Case<'_>]) -> Table {
         decimals(worst.iter().filter_map(|(.., row)| row.get(field)).map(|v| v * unit.scale()))
     });
     let mut heads = vec![Head::words("Log"), Head::numbers("frame"), Head::numbers("stamp (ns)")];
-    heads.extend([Head::words("target"), Head::words("judged"), Head::numbers("points"), Head::numbers("visible")]);
+    heads.extend([Head::words("target"), Head::words("outcome"), Head::numbers("points"), Head::numbers("visible")]);
     heads.extend(columns.map(|(name, ..)| Head::numbers(name)));
     let caption = text![
-        "The ten worst attempts: wrong fixes, then up to five refusals with most points in view, then the fixes with the largest m2. The stamp leads to the frame in its log."
+        "The ten worst attempts: wrong fixes, then up to five rejected attempts with the most points in view, then the fixes with the largest TRE. Log and stamp identify the frame."
     ];
     let mut table = Table::new("worst", caption, heads);
     for (index, frame, row) in worst {
@@ -128,9 +128,9 @@ fn table(run: &Run, worst: &[Case<'_>]) -> Table {
         let place = (object, frame.number, frame.stamp_ns);
         let judged = match (row.wrong(), row.found()) {
             (true, _) => "wrong".to_owned(),
-            (_, true) if row.wrong.is_none() => "not judged".to_owned(),
-            (_, true) => "found".to_owned(),
-            _ => format!("refused: {}", trial.reason(row)),
+            (_, true) if row.wrong.is_none() => "fix, unchecked".to_owned(),
+            (_, true) => "fix".to_owned(),
+            _ => format!("rejected: {}", trial.reason(row)),
         };
         let as_number =
             |field, unit, digits| phrases::value(trial, place, field, row.get(field), (unit, digits)).into();
@@ -144,7 +144,7 @@ fn table(run: &Run, worst: &[Case<'_>]) -> Table {
     table
 }
 
-/// Number and stamp of a frame.
+/// The number and the stamp of a frame.
 fn named(trial: &Trial, frame: &Frame) -> (Number, Number) {
     let key =
         |what: &str| crate::Key { span: [frame.stamp_ns; 2], ..crate::Key::of(trial, "/referencing/frame", what) };
@@ -153,7 +153,7 @@ fn named(trial: &Trial, frame: &Frame) -> (Number, Number) {
     (Number::count(frame.number as usize, key("frame")), stamp)
 }
 
-/// What the marks mean, and how many of each there are.
+/// The meaning of the marks of a picture and their counts.
 fn marks(trial: &Trial, marked: &Marked) -> Text {
     let count = |what: &str, n: usize| {
         let key = crate::Key {
@@ -165,11 +165,11 @@ fn marks(trial: &Trial, marked: &Marked) -> Text {
     let [corners, cloud, candidates, identified, used] = marked.counts;
     text![
         count("corners", corners),
-        " corners of the left image and ",
+        " key points of the left image and ",
         count("cloud", cloud),
         " matched points (white crosses), ",
         count("candidates", candidates),
-        " candidates (blue rings) in the shells of the rough pose (thin frames), ",
+        " candidates (blue rings) in the gates of the prior pose (thin frames), ",
         count("identified", identified),
         " identified (black discs), ",
         count("used", used),
@@ -179,13 +179,13 @@ fn marks(trial: &Trial, marked: &Marked) -> Text {
 
 fn best_picture(run: &Run, index: usize, marked: &Marked, small: bool) -> Block {
     let trial = &run.trials[index];
-    let mut caption = text!["Left and right image of one fix: "];
+    let mut caption = text!["Left and right image of a fix: "];
     caption.extend(marks(trial, marked));
     let axes = trial.header.axes.iter().map(|axis| format!("{} {}", short(&axis.key), axis.value));
     let axes = axes.collect::<Vec<_>>().join(", ");
     caption.extend(text![
         format!(
-            "Fixed: {}. It is the frame with most identified points: frame {} of ",
+            "Targets with a fix: {}. This is the frame with the most identified points, frame {} of ",
             marked.objects.join(", "),
             marked.frame
         ),
@@ -202,18 +202,18 @@ fn best_picture(run: &Run, index: usize, marked: &Marked, small: bool) -> Block 
     })
 }
 
-/// The scale at which a picture is at most so wide.
+/// The scale, at most 1, at which a picture is at most `width` pixels wide.
 fn to_width(marked: &Marked, width: f64) -> f64 {
     (width / f64::from(marked.size(1.0)[0])).min(1.0)
 }
 
 fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Marked, small: bool) -> Block {
     let trial = &run.trials[index];
-    let mut caption = text![format!("Line {place} of the table, marks as in Figure 1: ")];
+    let mut caption = text![format!("Attempt in line {place} of the table, marks as in Figure 1: ")];
     let judged = if row.wrong() {
         "wrong"
     } else if row.found() {
-        "found"
+        "fix"
     } else {
         trial.reason(row)
     };
@@ -231,7 +231,7 @@ fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Mark
     Block::Picture(Picture {
         id: format!("worst-{place}"),
         caption,
-        alternative: format!("Left and right image of the attempt in line {place} of the table of the worst"),
+        alternative: format!("Left and right image of the attempt in line {place} of the table of the worst attempts"),
         jpeg: marked.jpeg(scale, quality),
         size: marked.size(scale),
     })

@@ -1,4 +1,4 @@
-//! What is tested, as it stood before the first frame: the hypotheses that the experiment's axes and its pairs allow.
+//! The section on hypotheses: the tests that the experiment's axes and pairs allow, fixed before its first frame.
 
 use super::{distinct, sentence_case};
 use crate::{
@@ -8,16 +8,16 @@ use crate::{
     run::Run,
 };
 
-/// The hypotheses, or that there is none to test: then the question is answered by estimates and their intervals.
+/// The section: the hypotheses, or the statement that the question is answered by estimates and their intervals.
 pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     let mut section = Section::new("Hypotheses");
     let axes = varied(run);
     let Some(first) = comparisons.first() else {
         section.say(text![format!(
-            "The question is one of estimation: {} nothing is tested against anything, and rates, errors and their intervals answer it.",
+            "The question is one of estimation, answered by rates, errors and their intervals. No hypothesis is tested: {}.",
             match axes.as_slice() {
-                [] => "one trial, without a second to pair it with;".to_owned(),
-                _ => format!("{} varied, but no two trials share frames or random numbers, so that", said(&axes)),
+                [] => "the run has a single trial".to_owned(),
+                _ => format!("{} varied, but no two trials share frames or random numbers", said(&axes)),
             }
         )]);
         return section;
@@ -29,29 +29,29 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     };
     let (null, alternative, unit) = if first.over_conditions {
         (
-            "over the conditions, the ratio of the median the TRE of two methods lies symmetrically about one",
-            "one of the two has the less median m2",
+            "over the conditions, the ratio of the median TRE of two methods is distributed symmetrically about one",
+            "one of the two has the smaller median TRE",
             "the conditions, one pair each",
         )
     } else if first.between_conditions {
         (
-            "frame by frame of the same random numbers, the difference of the TRE of two conditions lies symmetrically about nothing",
-            "one of the two has the less m2",
-            "the attempts that both made, in pairs",
+            "frame by frame with the same random numbers, the TRE difference of two conditions is distributed symmetrically about zero",
+            "one of the two has the smaller TRE",
+            "the pairs of attempts that both made",
         )
     } else {
         (
-            "the difference of the TRE of two trials on the same attempts lies symmetrically about nothing",
-            "one of the two has the less m2",
-            "the attempts that both made, in pairs",
+            "the TRE difference of two trials on the same attempts is distributed symmetrically about zero",
+            "one of the two has the smaller TRE",
+            "the pairs of attempts that both made",
         )
     };
-    section.say(text![format!("{} varied; compared are {what}.", sentence_case(&said(&axes)))]);
+    section.say(text![format!("{} varied. Compared trials: {what}.", sentence_case(&said(&axes)))]);
     let items: Vec<Text> = vec![
-        text![italic("H0"), format!(": {null}. A refused attempt and a wrong one count as infinitely far off.")],
-        text![italic("H1"), format!(": {alternative}; which of them is left open (two-sided).")],
+        text![italic("H0"), format!(": {null}. Rejected attempts and wrong fixes count as infinite errors.")],
+        text![italic("H1"), format!(": {alternative} (two-sided).")],
         text![format!(
-            "Test: Wilcoxon’s signed rank over {unit}, at the level {ALPHA} for the family of {} comparison{} together (Holm). H0 is rejected only where the bootstrap interval of the difference leaves out none at all as well (Section “Significance”).",
+            "Test: Wilcoxon’s signed rank test over {unit}, with Holm’s adjustment to a family-wise level of {ALPHA} over {} comparison{}. H0 is rejected only if the bootstrap interval of the difference also excludes equality (Section “Significance”).",
             comparisons.len(),
             if comparisons.len() == 1 { "" } else { "s" },
         )],
@@ -60,7 +60,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     section
 }
 
-/// What differs between the trials, by its short names.
+/// The short names of the axes that differ between the trials.
 fn varied(run: &Run) -> Vec<String> {
     let axes = &run.header().axes;
     let differs = |place: &usize| {
@@ -71,7 +71,7 @@ fn varied(run: &Run) -> Vec<String> {
     distinct((0..axes.len()).filter(differs).map(|place| format::short(&axes[place].key).to_owned()))
 }
 
-/// `a, b and c are`.
+/// The subject and verb `a, b and c are`.
 fn said(axes: &[String]) -> String {
     match axes {
         [] => "the run is".to_owned(),

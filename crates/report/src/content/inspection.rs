@@ -1,4 +1,4 @@
-//! What the vehicle is there for: how far off it had the points of interest.
+//! The section on inspection: the error of the points of interest.
 
 use super::{
     distinct,
@@ -12,17 +12,17 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// The topic that the numbers come from.
+/// The topic of the numbers.
 const TOPIC: &str = "/metrics/inspection";
 
-/// The section, where any point of interest came into view.
+/// The section; `None` where no point of interest comes into view.
 pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let seen = |trial: &Trial| distinct(trial.views().map(|point| trial.point(point).to_owned()));
     if run.trials.iter().all(|trial| trial.views().next().is_none()) {
         return None;
     }
     let caption = text![
-        "Where the vehicle had each point of interest, in the frame of its left camera, against where it is: by the navigated pose, or without navigation by the frame’s fix; to an object that is not the pose’s own by the survey. In view: frames that have the point in both images, nothing known of what hides it. With a pose: those at which the vehicle knew one; the errors are over these. NEES: 3 for an honest covariance."
+        "Error of each point of interest in the frame of the left camera: the estimated position (by the navigated pose, or by the frame’s fix without navigation) against the true one. Points of other objects than that of the pose are placed by the survey. In view: frames with the point inside both images; occlusion is not considered. With a pose: frames at which the vehicle has a pose; the errors are over these. NEES: 3 for a consistent covariance."
     ];
     let mut above = results::blank(summary, 1);
     above.extend([
@@ -33,7 +33,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     ]);
     let mut below = results::heads(summary);
     below.push(Head::words("point"));
-    below.extend(["in view", "with a pose", "median", "median", "p95", "most", "mean"].map(Head::numbers));
+    below.extend(["in view", "with a pose", "median", "median", "p95", "max", "mean"].map(Head::numbers));
     let mut table = Table { id: "inspection".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut names = seen(trial);
@@ -60,8 +60,9 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     Some(Section::new("Inspection").with([Block::Table(table)]))
 }
 
-/// A sentence a trial that goes to the points of interest: the point it knew best and the one it knew least; `name` says
-/// what the trial at a place is called.
+/// One sentence for every inspection: the points of interest with the smallest and the largest median error.
+///
+/// `name` gives the name of the trial at an index.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let inspects = |trial: &Trial| trial.header.configuration.contains("kind = \"inspection\"");
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| inspects(trial));
@@ -84,9 +85,9 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             text![of("median"), " mm (median; ", of("q95"), " mm in 95 % of ", views, " views)"]
         };
         let [(_, best), .., (_, worst)] = known[..] else { return None };
-        let mut said = text![format!("{}: of the points of interest {best} was known to ", name(index))];
+        let mut said = text![format!("{}: errors of the points of interest are smallest at {best} with ", name(index))];
         said.extend(as_number(best));
-        said.push(format!(", {worst} to ").into());
+        said.push(format!(", and largest at {worst} with ").into());
         said.extend(as_number(worst));
         said.push(".".into());
         Some(said)
@@ -94,7 +95,7 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     trials.filter_map(sentence).collect()
 }
 
-/// A statistic of a quantity of one point.
+/// A statistic of a quantity of one point of interest.
 fn number(
     trial: &Trial,
     point: &str,

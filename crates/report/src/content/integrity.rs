@@ -1,4 +1,4 @@
-//! Whether fixes keep what their protection levels promise, and how often a level lets them be used.
+//! The section on integrity: errors against protection levels, and the availability of fixes.
 
 use seafix_log::{Outcome, Region};
 
@@ -15,12 +15,12 @@ use crate::{
     run::{AttemptRow, Frame, Run, Trial},
 };
 
-/// So many marks are drawn of fixes that keep their levels, and so many of those that do not: more hide each other.
+/// Maximum number of marks, each for fixes within their protection level and beyond; more hide each other.
 const MARKS: usize = 1200;
-/// More methods than this are drawn as one.
+/// Maximum number of series in the diagram; more methods are merged into one.
 const SERIES: usize = 7;
 
-/// Rates and the diagram; `None` where truth or levels are unknown.
+/// The section; `None` without ground truth or without protection levels.
 pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let judged = |row: &crate::Row| row.regions.is_some_and(|regions| regions.iter().any(|count| *count > 0));
     if !summary.rows.iter().any(judged) {
@@ -33,25 +33,25 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     Some(section)
 }
 
-/// What a level promises.
+/// The paragraph that defines protection level, alert limit and regions.
 fn said(run: &Run) -> Text {
     let risks = distinct(run.trials.iter().filter_map(risk).map(|risk| format!("{risk:e}").replace('-', "−")));
     let risk = match &risks[..] {
-        [risk] => format!("a risk of {risk} a fix"),
-        _ => "the risk that its configuration states".to_owned(),
+        [risk] => format!("a probability of {risk} per fix"),
+        _ => "the integrity risk of its configuration".to_owned(),
     };
     text![format!(
-        "With every fix comes a protection level p, a radius that the error e of the camera’s position exceeds with no more than {risk}, wrong matches included; where a point cannot be spared there is none. A fix may be used where its level is within the alert limit a of its target. It is available where e ≤ p ≤ a, misleading where p < e ≤ a, hazardously misleading where p ≤ a < e, and not available where a < p, whether its error is within its level or beyond."
+        "Every fix has a protection level p: a radius that the camera position error e exceeds with at most {risk}, wrong matches included. A fix has no level if it depends on a point that no other point can check. A fix may be used if its level is within the alert limit a of its target. A fix is available if e ≤ p ≤ a, misleading if p < e ≤ a, hazardously misleading if p ≤ a < e, and not available if a < p, for any error."
     )]
 }
 
-/// The risk of a trial's levels, as its configuration has it.
+/// The integrity risk in the configuration of a trial.
 fn risk(trial: &Trial) -> Option<f64> {
     let table = trial.header.configuration.parse::<toml::Table>().ok()?;
     table.get("pipeline")?.get("acceptance")?.get("risk")?.as_float()
 }
 
-/// The regions in the order of the table, their keys, and what their columns are called.
+/// The regions in the order of the table, with the heads of their columns.
 const COLUMNS: [(Region, &str); 6] = [
     (Region::Available, "Available"),
     (Region::Misleading, "Misleading"),
@@ -63,7 +63,7 @@ const COLUMNS: [(Region, &str); 6] = [
 
 fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
-        "Integrity: of n attempts, how many gave a fix that is available, that misleads and that misleads hazardously, in % with 95 % intervals; and, as counts, fixes whose level exceeds the alert limit, those of them that mislead, and fixes without a level. Attempts that were refused are the rest."
+        "Integrity: available, misleading and hazardously misleading fixes among n attempts, in % with 95 % intervals. Not available: counts of the fixes whose protection level exceeds the alert limit with an error within the level, of those with an error beyond it, and of fixes without a level. The remaining attempts were rejected."
     ];
     let mut above = results::blank(summary, 1);
     above.extend(COLUMNS[..3].iter().map(|(_, name)| Head::over(3, *name)));
@@ -94,7 +94,7 @@ fn table(run: &Run, summary: &RunSummary) -> Table {
     table
 }
 
-/// A fix with its error, its level and its limit (m).
+/// A fix with its position error, protection level and alert limit (m).
 struct Mark<'a> {
     series: usize,
     trial: &'a Trial,
@@ -133,7 +133,7 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
         names = vec!["fixes".to_owned()];
     }
     let limits = distinct(marks.iter().map(|mark| mark.values[2].to_string()));
-    // Where targets have limits of their own, errors and levels are shares of them.
+    // With several alert limits, errors and levels are divided by the limit of their target.
     let one = limits.len() == 1;
     let generated_in = |mark: &Mark<'_>| {
         let [error, level, limit] = mark.values;
@@ -152,7 +152,7 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let every_beyond = beyond.div_ceil(MARKS).max(1);
     let heads = [Head::words("series"), Head::numbers("frame"), Head::words("target"), Head::words("region")];
     let heads = heads.into_iter().chain(["error (mm)", "level (mm)", "alert limit (mm)"].map(Head::numbers));
-    let mut data = Table::new("stanford", text!["Every mark of the diagram of integrity."], heads.collect());
+    let mut data = Table::new("stanford", text!["The data of the Stanford diagram."], heads.collect());
     let mut points = vec![Vec::new(); names.len()];
     let mut seen = [0_usize; 2];
     for mark in &marks {
@@ -176,8 +176,8 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
     }
     layers.extend(points.into_iter().enumerate().map(|(series, points)| Layer::Marks { series, points, radius: 1.3 }));
     let labels = match one {
-        true => ["error of the position (mm)", "protection level (mm)"],
-        false => ["error of the position / alert limit", "protection level / alert limit"],
+        true => ["position error (mm)", "protection level (mm)"],
+        false => ["position error / alert limit", "protection level / alert limit"],
     };
     let panel = Panel {
         x: Axis::logarithmic(labels[0]).within([min[0], max]),
@@ -189,25 +189,27 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let legend = if names.len() > 1 { names.iter().enumerate().map(entry).collect() } else { Vec::new() };
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.95, legend };
     let mut said = text![format!(
-        "Stanford diagram: protection level over error of the camera’s position, with the alert limit {}. ",
-        if one { format!("of {} mm", trimmed(limit)) } else { "of each target as the unit".to_owned() }
+        "Stanford diagram: protection level over camera position error, {}. ",
+        if one {
+            format!("with an alert limit of {} mm", trimmed(limit))
+        } else {
+            "both divided by the alert limit of the target".to_owned()
+        }
     )];
     said.extend(fractions.said(run));
     let thinned = match (every, every_beyond) {
-        (1, 1) => "Every fix is a mark. ".to_owned(),
-        (_, 1) => format!("A mark is one fix in {every} of those that keep their level, and every one that does not. "),
-        _ => format!(
-            "A mark is one fix in {every} of those that keep their level, one in {every_beyond} of those that do not. "
-        ),
+        (1, 1) => "Every fix has a mark. ".to_owned(),
+        (_, 1) => format!("Marks: one in {every} fixes with an error within the level, and every fix beyond it. "),
+        _ => format!("Marks: one in {every} fixes with an error within the level, one in {every_beyond} beyond it. "),
     };
     said.extend(text![thinned]);
     said.extend(figures::caption("", run));
     figures::figure("stanford", said, &chart, data)
 }
 
-/// How many fixes of all trials are in each region.
+/// The number of fixes of all trials in each region of the Stanford diagram.
 struct Regions {
-    /// `None` where a log does not say.
+    /// The counts in the order of [`Region::ALL`]; `None` if a log lacks them.
     counts: Option<[usize; Region::ALL.len()]>,
 }
 
@@ -220,7 +222,7 @@ impl Regions {
         Self { counts: known.map(sum) }
     }
 
-    /// The share of a region among all fixes with a level, in words.
+    /// The printed fraction of a region among all fixes with a protection level.
     fn fraction(&self, region: Region) -> String {
         let Some(counts) = &self.counts else { return String::new() };
         let all: usize = counts.iter().sum::<usize>() - counts[Region::Unprotected as usize];
@@ -232,10 +234,10 @@ impl Regions {
         }
     }
 
-    /// The regions, their names and shares, and the lines between them.
+    /// The layers with the regions, their names and fractions, and the lines between them.
     fn layers(&self, [left, low]: [f64; 2], high: f64, limit: f64) -> Vec<Layer> {
         let a = limit;
-        // Where the diagonal comes in.
+        // The diagonal enters the panel at (d, d).
         let d = left.max(low);
         let areas: [(usize, Vec<[f64; 2]>); 5] = [
             (2, vec![[left, d], [d, d], [a, a], [left, a]]),
@@ -267,7 +269,7 @@ impl Regions {
         layers
     }
 
-    /// The counts in words, with their keys.
+    /// The sentences with the counts of all regions.
     fn said(&self, run: &Run) -> Text {
         let Some(counts) = &self.counts else { return Text::new() };
         let trials: Vec<&Trial> = run.trials.iter().collect();
@@ -276,19 +278,19 @@ impl Regions {
             Number::count(counts[region as usize], key)
         };
         text![
-            "Of all fixes with a level ",
+            "Counts of fixes: ",
             as_number(Region::Available),
-            " are available, ",
+            " available, ",
             as_number(Region::Misleading),
             " misleading, ",
             as_number(Region::Hazardous),
-            " hazardously misleading; the level of ",
+            " hazardously misleading, ",
             as_number(Region::Unavailable),
-            " exceeds the limit, and that of ",
+            " not available, ",
             as_number(Region::UnavailableMisleading),
-            " is beyond the limit and below the error. ",
+            " not available and misleading, ",
             as_number(Region::Unprotected),
-            " fixes have no level. The shares in the drawing are of the fixes with one. "
+            " without a level. The fractions in the diagram are of the fixes with a level. "
         ]
     }
 }

@@ -1,4 +1,4 @@
-//! Errors beside the Cramér–Rao bound, where every fix has one.
+//! RMS errors and the Cramér–Rao bound, for trials in which every fix has a bound.
 
 use super::{
     distinct,
@@ -13,7 +13,7 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// Whether the rows have bounds.
+/// Whether any row has a bound.
 pub(super) fn known(summary: &RunSummary) -> bool {
     summary.rows.iter().any(|row| row.limits.is_some())
 }
@@ -22,7 +22,7 @@ pub(super) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
     over_noise(run, summary).into_iter().map(Block::Figure).chain([Block::Table(table(run, summary))]).collect()
 }
 
-/// A number out of the totals.
+/// A number from the totals of a trial.
 fn total(trial: &Trial, what: &str, value: f64, unit: Unit, decimals: usize) -> Number {
     let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
     let key = crate::Key::of(trial, "/metrics/totals", format!("{what}{suffix}"));
@@ -33,7 +33,7 @@ fn value(row: &Row, key: &str) -> Option<String> {
     row.axes.iter().find(|axis| axis.key == key).map(|axis| axis.value.clone())
 }
 
-/// Root mean square m2 over the noise, a panel for each of all other conditions.
+/// The figure of RMS TRE over pixel noise, with one panel for every combination of the other conditions.
 fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let on = |key: &str| distinct(summary.rows.iter().filter_map(|row| value(row, key)));
     let axes = summary.rows.first()?.axes.iter();
@@ -54,8 +54,7 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let ticks: Vec<f64> = on(&key).iter().filter_map(|value| value.parse().ok()).collect();
     let heads =
         [Head::words("condition"), Head::words("series"), Head::numbers(headed(&key)), Head::numbers("RMS TRE (mm)")];
-    let mut data =
-        Table::new("error-over-noise", text!["Every point of the figure of error over noise."], heads.to_vec());
+    let mut data = Table::new("error-over-noise", text!["The data of the figure of error over noise."], heads.to_vec());
     let mut panels = Vec::new();
     for place in &places {
         let mut layers = Vec::new();
@@ -113,22 +112,22 @@ fn over_noise(run: &Run, summary: &RunSummary) -> Option<Figure> {
     Some(Figure {
         id: "error-over-noise".to_owned(),
         caption: text![
-            "Root mean square error of the transferred model points (TRE) over the pixel noise, both axes logarithmic and shared by all panels; over every fix of a trial, wrong ones included. Grey: the Cramér–Rao bound, which no unbiased estimate betters on average."
+            "RMS target registration error (TRE) over the pixel noise, for all fixes of a trial including wrong ones. Both axes are logarithmic and shared by all panels. Grey: the Cramér–Rao bound, below which no unbiased estimator can be."
         ],
         drawing: chart.draw()?,
         data,
     })
 }
 
-/// How many panels stand side by side: as many as the longest of their titles lets, up to six.
+/// The number of panels in a row: one to six, so that the longest title fits.
 fn columns(titles: &[String]) -> usize {
-    /// Letters of a title across the page, a gap of two between panels included.
+    /// The number of characters across the page, with a gap of two between titles.
     const ACROSS: usize = 120;
     let longest = titles.iter().map(|title| title.chars().count()).max().unwrap_or(0);
     (ACROSS / (longest + 2)).clamp(1, 6).min(titles.len().max(1))
 }
 
-/// The same ends for all panels.
+/// Gives all panels the same axis ranges.
 pub(super) fn same_axes(panels: &mut [Panel]) {
     let values = |which: usize| {
         panels
@@ -150,7 +149,7 @@ pub(super) fn same_axes(panels: &mut [Panel]) {
 
 fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
-        "Root mean squares beside the Cramér–Rao bound, over all n fixes, wrong ones included: m2, the position, their ratio to the bound. NEES: mean of the normalised error squared, 6 for an honest covariance; below 95 %: share of the fixes within the χ² quantile of 95 %."
+        "RMS errors (RMSE), Cramér–Rao bounds and their ratios, over all n fixes including wrong ones. NEES: mean normalised estimation error squared, 6 for a consistent covariance; below 95 %: fraction of the fixes below the 95 % quantile of χ² with six degrees of freedom."
     ];
     let mut above = results::blank(summary, 1);
     above.extend([Head::over(3, "TRE (mm)"), Head::over(3, "position error (mm)"), Head::words(""), Head::words("")]);

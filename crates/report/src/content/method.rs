@@ -1,4 +1,4 @@
-//! What was compared: the algorithm, its formulas and frames, the pipeline stage by stage.
+//! The section on the method: algorithm, formulas, coordinate frames and the stages of the pipeline.
 
 use seafix_log::Component;
 
@@ -14,19 +14,17 @@ pub(super) fn section(run: &Run) -> Section {
     let begin = match (images, points) {
         (true, false) => "Corners of both images are described, matched and triangulated into a cloud",
         (true, true) => {
-            "Corners of both images are described, matched and triangulated into a cloud; where the source gives no images, the cloud comes from it as it is"
+            "Corners of both images are described, matched and triangulated into a cloud; a source without images provides the cloud itself"
         }
-        _ => {
-            "The source gives no images, so nothing is detected, described or matched: the cloud comes from it as it is"
-        }
+        _ => "The source gives no images, so no corner is detected, described or matched: it provides the cloud itself",
     };
     let named = run.trials.iter().all(|trial| trial.method()[0] == "labelled");
     let middle = match named {
         true => {
-            "; every point says which one it is, so that nothing is searched, and for each target the solver computes the pose "
+            "; every cloud point has a label, so that no search is needed, and the solver computes for each target the pose "
         }
         false => {
-            "; for each target, the prior selects candidates, the search finds a structurally coherent set among them, and the solver computes the pose "
+            "; the prior selects candidates for each target, the search finds a structurally coherent set among them, and the solver computes the pose "
         }
     };
     let [h, c, p, e] = ["H", "C", "P", "p"].map(italic);
@@ -34,11 +32,11 @@ pub(super) fn section(run: &Run) -> Section {
         begin,
         middle,
         h.clone(),
-        " that carries its points ",
+        " that maps the cloud points ",
         c.clone(),
-        " onto the model’s points ",
+        " to the model points ",
         p.clone(),
-        ". An attempt that fails a test is refused with its reason."
+        ". An attempt that fails a test is rejected with its reason."
     ];
     let coherence = text![
         "| ‖",
@@ -69,7 +67,7 @@ pub(super) fn section(run: &Run) -> Section {
         " )",
     ];
     let frames = text![
-        "Frames: the camera’s is the left camera’s, x to the right, y downwards, z forward; the object’s has its origin in the first base point P1, x from P1 to P3, z along (P2 − P1) × (P3 − P1), right-handed. ",
+        "Coordinate frames: the camera frame is that of the left camera, x to the right, y downwards, z forward. The object frame is right-handed with its origin in the first base point P1, x from P1 to P3, z along (P2 − P1) × (P3 − P1). ",
         "Points are columns, ",
         e.clone(),
         sub("a"),
@@ -79,9 +77,9 @@ pub(super) fn section(run: &Run) -> Section {
         " ",
         e,
         sub("b"),
-        "; a covariance belongs to ξ = (φ, ρ), the rotation first, in ",
+        ". A covariance is that of ξ = (φ, ρ), rotation first, in ",
         italic("T"),
-        " Exp(ξ), in the camera’s frame. Lengths are metres, angles degrees, the centre of the first pixel is (0, 0).",
+        " Exp(ξ), in the camera frame. Lengths are in metres, angles in degrees; the centre of the first pixel is (0, 0).",
     ];
     Section::new("Method").with([
         Block::Paragraph(algorithm),
@@ -89,7 +87,7 @@ pub(super) fn section(run: &Run) -> Section {
         Block::Paragraph(frames),
         Block::Table(pipeline(run)),
         Block::Paragraph(text![
-            "Where ρ is the solver’s measure: the squared distance, its square by the covariance, or the distances in the pixels of both images (", sup(""), "Table 1 says which)."
+            "ρ is the solver’s cost: the squared distance, the squared Mahalanobis distance, or the squared reprojection error in both images (", sup(""), "see Table 1)."
         ].into_iter().filter(|span| !span.plain().is_empty()).collect()),
     ])
 }
@@ -97,8 +95,8 @@ pub(super) fn section(run: &Run) -> Section {
 fn pipeline(run: &Run) -> Table {
     let components: Vec<&Component> = run.trials.iter().flat_map(components).collect();
     let stages = distinct(components.iter().map(|component| component.stage.clone()));
-    let heads = ["Stage", "Component", "What it does, and its settings"].map(Head::words).to_vec();
-    let caption = text!["The pipeline and its parameters. Several lines of one stage are the alternatives compared."];
+    let heads = ["Stage", "Component", "Description and settings"].map(Head::words).to_vec();
+    let caption = text!["The pipeline and its settings. Several lines of one stage are the compared alternatives."];
     let mut table = Table::new("pipeline", caption, heads);
     for stage in &stages {
         let mut known: Vec<&Component> = Vec::new();
@@ -126,7 +124,7 @@ fn pipeline(run: &Run) -> Table {
     table
 }
 
-/// The components that did some work in `trial`: those that see images only where there were images.
+/// The components in use in `trial`; those of the front end only if the trial has images.
 fn components(trial: &Trial) -> impl Iterator<Item = &Component> {
     let sees =
         |component: &Component| matches!(&component.stage[..], "detector" | "descriptor" | "matcher" | "locator");

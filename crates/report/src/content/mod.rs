@@ -1,4 +1,4 @@
-//! What a report says, section by section.
+//! The content of a report, section by section.
 
 mod ablation;
 mod abstract_;
@@ -36,8 +36,9 @@ use crate::{
     run::Run,
 };
 
-/// The report on a run; a `small` one has few and small pictures, and nothing that a later version would say otherwise of
-/// the same results.
+/// The report on a run.
+///
+/// A `small` one has few small pictures and no text that depends on the program's version.
 pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<Document, ReportError> {
     let header = run.header();
     let title = if header.title.is_empty() { &header.run } else { &header.title };
@@ -45,7 +46,7 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
     let (picture, failures) = failures?;
     let mut method = method::section(run);
     method.blocks.splice(0..0, picture);
-    // Of a million rows some take a second each.
+    // Some sections take a second each for a million rows.
     let made: [&(dyn Fn() -> Option<Section> + Sync); _] = [
         &|| Some(data::section(run, summary, small)),
         &|| Some(protocol::section(run, &comparisons)),
@@ -75,7 +76,7 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
     })
 }
 
-/// The answer in numbers alone.
+/// The sentences of the abstract.
 pub(crate) fn findings(run: &Run, summary: &RunSummary) -> Vec<crate::document::Text> {
     abstract_::section(run, summary, &paired::comparisons(run, summary))
 }
@@ -91,19 +92,19 @@ pub(crate) fn distinct(texts: impl IntoIterator<Item = String>) -> Vec<String> {
     seen
 }
 
-/// With a capital letter.
+/// `text` with a capital first letter.
 fn sentence_case(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Whether `index` is better than every trial it was compared with, surely.
+/// Whether `index` is significantly better than every trial of its group.
 fn best(comparisons: &[Comparison], index: usize) -> bool {
     let is_of = |c: &&Comparison| !c.over_conditions && !c.between_conditions;
     let own: Vec<&Comparison> =
         comparisons.iter().filter(is_of).filter(|c| c.first == index || c.second == index).collect();
     let Some(condition) = own.first().map(|c| &c.condition) else { return false };
-    // Of many trials each is compared with the first alone, and none is known to be the best.
+    // In a large group each trial is compared with the first only, so no trial is known to be the best.
     let family = comparisons.iter().filter(is_of).filter(|c| c.condition == *condition);
     let members: BTreeSet<usize> = family.flat_map(|c| [c.first, c.second]).collect();
     own.len() + 1 == members.len() && own.iter().all(|c| c.better() == Some(index))

@@ -1,4 +1,4 @@
-//! The way from fix to fix: how far off the navigated pose was.
+//! The section on navigation: the error of the navigated pose from fix to fix.
 
 use super::{
     phrases::{self, Unit},
@@ -12,25 +12,25 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// Whether a trial navigates.
+/// Whether a trial has a navigator.
 fn sails(trial: &Trial) -> bool {
     trial.sample().any(|frame| frame.navigated.is_some())
 }
 
-/// The section, where any trial navigates.
+/// The section; `None` where no trial has a navigator.
 pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     if !run.trials.iter().any(sails) {
         return None;
     }
     let caption = text![
-        "The navigated pose, relative to the object of the last fix, at every frame that has one. Tried, fixed: frames at which a fix was due, and those with one; lost: frames to which the odometry knew no motion. The last three columns: the first fix, carried along by odometry alone, until that is lost or the dive ends."
+        "Error of the navigated pose relative to the object of the last fix, over all frames with a pose. Fix due: frames at which the policy asked for a fix. Fixes: frames with a fix. Lost: frames without an odometry step. The last three columns show odometry alone from the first fix until it is lost or the dive ends."
     ];
     let mut above = results::blank(summary, 5);
     above.extend([Head::over(4, "position error (mm)"), Head::over(1, "TRE (mm)"), Head::over(1, "NEES")]);
-    above.push(Head::over(3, "without further fixes: position error (mm)"));
+    above.push(Head::over(3, "odometry only: position error (mm)"));
     let mut below = results::heads(summary);
-    below.extend(["frames", "with pose", "tried", "fixed", "lost"].map(Head::numbers));
-    below.extend(["rms", "median", "p95", "most"].map(Head::numbers));
+    below.extend(["frames", "with pose", "fix due", "fixes", "lost"].map(Head::numbers));
+    below.extend(["RMS", "median", "p95", "max"].map(Head::numbers));
     below.extend(["p95", "mean", "median", "p95", "at the end"].map(Head::numbers));
     let mut table = Table { id: "navigation".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
@@ -56,15 +56,15 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     Some(Section::new("Navigation").with([Block::Table(table)]).with(figure).with(saw))
 }
 
-/// How the error grows between fixes; nothing where no trial has a stretch without them, or truth.
+/// The table of error growth between fixes; `None` without fix intervals or without ground truth.
 fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
     let caption = text![
-        "The teeth of the saw: stretches from a fix to the last frame before the next, before the pose is lost or the dive ends. Amplitude: the greatest error (m3, position) of a tooth less the one at its fix. Drift: how far the error moved, as a vector in the frame of the object, from the fix to the end of the tooth; the sum of all teeth by their way, that of the camera by the truth, and by their time."
+        "Error growth between fixes. A fix interval runs from a fix to the last frame before the next fix, before the pose is lost, or before the dive ends. Amplitude: the largest position error of an interval less the error at its fix. Drift: the length of the change of the error vector over an interval, in the object’s frame; the sum over all intervals is divided by the camera’s true path length and by time."
     ];
     let mut above = results::blank(summary, 3);
     above.extend([Head::over(3, "amplitude (mm)"), Head::over(2, "drift")]);
     let mut below = results::heads(summary);
-    below.extend(["intervals", "path (m)", "time (s)", "median", "p95", "most", "mm/m", "mm/s"].map(Head::numbers));
+    below.extend(["intervals", "path (m)", "time (s)", "median", "p95", "max", "mm/m", "mm/s"].map(Head::numbers));
     let mut table = Table { id: "saw".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let fix_intervals = fix_intervals(
@@ -75,7 +75,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
         }
         let as_number = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
             let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
-            let key = Key::of(trial, "/referencing/frame", format!("teeth {what} of navigated{suffix}"));
+            let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated{suffix}"));
             Number::new(value.map(|value| value * unit.scale()), decimals, key)
         };
         let mut line = results::cells(row);
@@ -122,49 +122,53 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
     (!table.lines.is_empty()).then_some(table)
 }
 
-/// A sentence a trial that navigates; `name` says what the trial at a place is called. That it is one dive is said once.
+/// The sentences on trials with a navigator, one for each.
+///
+/// `name` gives the name of the trial at an index.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
         let metres = |name: &str, quantity| statistic(trial, name, quantity, Unit::Millimetres);
         text![
-            format!("{}: the camera’s position, relative to the object of its last fix, errs by ", name(index)),
+            format!("{}: the camera position error relative to the object of the last fix is ", name(index)),
             metres("rms", NavigationQuantity::Position),
-            " mm (RMS) and by ",
+            " mm RMS (",
             metres("last", NavigationQuantity::Position),
             " mm at the last of the ",
             count(trial, Counted::Navigated),
-            " frames with a pose of ",
+            " frames with a pose, of ",
             count(trial, Counted::NavigationQuantity),
-            ", by less than ",
+            " frames), below ",
             metres("q95", NavigationQuantity::Position),
-            " mm in 95 % of them and at most by ",
+            " mm in 95 % of these frames and at most ",
             metres("greatest", NavigationQuantity::Position),
-            " mm, with fixes at ",
+            " mm. The dive has ",
             count(trial, Counted::Fix),
-            " frames (due by the policy at ",
+            " frames with a fix; the policy asked for one at ",
             count(trial, Counted::Tried),
-            "); the first fix, carried on by odometry alone over ",
+            " frames. Odometry alone from the first fix, over ",
             reached(trial),
-            " frames, until it is lost or the dive ends, errs by ",
+            " frames until it is lost or the dive ends, has a position error of ",
             metres("rms", NavigationQuantity::AlonePosition),
-            " mm (RMS) and by ",
+            " mm RMS (",
             metres("last", NavigationQuantity::AlonePosition),
-            " mm at the last of them; the mean NEES is ",
+            " mm at the last of them). The mean NEES is ",
             statistic(trial, "mean", NavigationQuantity::Nees, Unit::Plain),
-            " (6 for an honest covariance)."
+            " (6 for a consistent covariance)."
         ]
     };
     let mut said: Vec<Text> = trials.map(sentence).collect();
     if said.len() > 1 {
         said.extend(min(run, name));
-        said.push(text!["Each of these is one dive: how much another would differ is not in these numbers."]);
+        said.push(text!["Each trial is a single dive; these numbers do not include the variation between dives."]);
     }
     said.extend(displaced(run, name));
     said
 }
 
-/// Which trial errs least, where all that navigate know as many poses.
+/// A sentence on the trial with the smallest RMS position error.
+///
+/// The result is `None` where trials have different numbers of poses.
 fn min(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
     let rms = |trial: &Trial| -> (usize, f64) {
         let errors = trial.sample().filter_map(|frame| frame.navigated.as_ref()?.get(NavigationQuantity::Position));
@@ -177,10 +181,12 @@ fn min(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
     let min = (0..all.len()).min_by(|&a, &b| known[a].1.total_cmp(&known[b].1)).filter(|_| comparable)?;
     let (index, trial) = all[min];
     let rms = statistic(trial, "rms", NavigationQuantity::Position, Unit::Millimetres);
-    Some(text![format!("Of these, {} errs least: ", name(index)), rms, " mm (RMS)."])
+    Some(text![format!("Smallest camera position error: {}, ", name(index)), rms, " mm RMS."])
 }
 
-/// Which objects each trial told to stand elsewhere than surveyed, where any did: in the words of its log, the first time.
+/// One sentence for every trial on the displaced objects that it reported, if any trial reported one.
+///
+/// The first event of each object is quoted from the log.
 fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let as_number = |trial: &Trial| -> Vec<String> {
         let mut objects: Vec<&str> = Vec::new();
@@ -207,17 +213,13 @@ fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
         return Vec::new();
     }
     let sentence = |(index, as_number): (usize, Vec<String>)| {
-        let what = if as_number.is_empty() {
-            "that no object stands elsewhere than surveyed".to_owned()
-        } else {
-            as_number.join("; ")
-        };
-        text![format!("{}: the navigator told {}.", name(index), what)]
+        let what = if as_number.is_empty() { "none".to_owned() } else { as_number.join("; ") };
+        text![format!("{}: objects reported away from their surveyed pose: {}.", name(index), what)]
     };
     all.into_iter().map(sentence).collect()
 }
 
-/// How many frames the first fix is carried on to by odometry alone.
+/// The number of frames with a pose by odometry alone from the first fix.
 fn reached(trial: &Trial) -> Number {
     let known = trial.sample().filter_map(|frame| frame.navigated.as_ref()?.get(NavigationQuantity::AlonePosition));
     let reached = known.count() as f64;

@@ -1,18 +1,21 @@
-//! What came of each object, where several were looked for.
+//! The section on objects: outcomes and errors of each object of a run with several.
 
 use std::collections::BTreeSet;
 
-use super::{phrases::Unit, results};
+use super::{
+    phrases::{self, Unit},
+    results,
+};
 use crate::{
     Field, Key, Number, RunSummary,
     document::{Block, Head, Section, Table, Text, text},
     run::{AttemptRow, Run, Trial},
 };
 
-/// The topic that counts stand on.
+/// The topic of the counts.
 const TOPIC: &str = "/metrics/evaluation";
 
-/// An outcome that is counted.
+/// A counted outcome: its name in keys and its test.
 type Group = (&'static str, fn(&AttemptRow) -> bool);
 
 const GROUPS: [Group; 4] = [
@@ -22,21 +25,20 @@ const GROUPS: [Group; 4] = [
     ("wrong", AttemptRow::wrong),
 ];
 
-/// The errors that are told, and what they are called in a head.
+/// The reported errors with their table heads.
 const ERRORS: [(&str, Field); 2] = [("TRE (mm)", Field::Tre), ("position error (mm)", Field::Position)];
 
-/// The section, where any trial looked for several objects and logged all its frames.
+/// The section; `None` where no trial with a complete log searched several objects.
 pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     if !run.trials.iter().any(|trial| objects(trial).len() > 1) {
         return None;
     }
-    let caption =
-        text!["The attempts on each object: how many there were and what came of them; medians of the fixes found."];
+    let caption = text!["Attempts on each object by outcome, and the errors of the fixes."];
     let mut above = results::blank(summary, 5);
     above.extend(ERRORS.map(|(head, _)| Head::over(2, head)));
     let mut below = results::heads(summary);
     below.push(Head::words("object"));
-    below.extend(GROUPS.map(|(name, _)| Head::numbers(name)));
+    below.extend(GROUPS.map(|(name, _)| Head::numbers(phrases::outcome(name))));
     below.extend(ERRORS.iter().flat_map(|_| ["median", "p95"]).map(Head::numbers));
     let mut table = Table { id: "objects".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
@@ -53,19 +55,22 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     Some(Section::new("Objects").with([Block::Table(table)]))
 }
 
-/// A sentence a trial with each object's own rate and error, where the objects themselves are what is varied: whether one
-/// that stands elsewhere misleads the others; `name` says what the trial at a place is called.
+/// One sentence for every trial with the fixes and errors of each object.
+///
+/// Only experiments that change the objects have them; they show whether a displaced object affects the fixes on
+/// others. `name` gives the name of the trial at an index.
 pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let changes = |trial: &Trial| trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"));
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| changes(trial) && objects(trial).len() > 1);
     let sentence = |(index, trial): (usize, &Trial)| {
-        let mut said = text![format!("{}, object by object — ", name(index))];
+        let mut said = text![format!("{}, by object — ", name(index))];
         for (place, object) in objects(trial).iter().enumerate() {
             let [attempted, found, _, _] = GROUPS.map(|group| count(trial, object, group));
             let median = error(trial, object, "median", Field::Position);
-            said.extend(text![format!("{}{object}: ", if place > 0 { "; " } else { "" }), found, " of ", attempted]);
+            said.extend(text![format!("{}{object}: ", if place > 0 { "; " } else { "" }), found, " fixes in "]);
+            said.extend(text![attempted, " attempts"]);
             if median.value.is_some() {
-                said.extend(text![" found, median position error ", median, " mm"]);
+                said.extend(text![", median position error ", median, " mm"]);
             }
         }
         said.push(".".into());
@@ -74,8 +79,11 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     trials.map(sentence).collect()
 }
 
-/// How many frames have a fix, by how many targets are in view of the prior, where any frame has several; `name` says
-/// what the trial at a place is called.
+/// A sentence on the frames with a fix, by the number of targets in view.
+///
+/// The result is `None` where no frame has several.
+///
+/// `name` gives the name of the trial at an index.
 pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
     let sizes = |trial: &Trial| -> Vec<usize> {
         let mut sizes: Vec<usize> = trial.sample().map(|frame| trial.attempts_of(frame).count()).collect();
@@ -86,7 +94,7 @@ pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
     if !run.trials.iter().any(|trial| sizes(trial).into_iter().any(|size| size > 1)) {
         return None;
     }
-    let mut said = text!["Frames with a fix, by how many targets are in view — "];
+    let mut said = text!["Frames with a fix, by the number of targets in view — "];
     for (index, trial) in run.trials.iter().enumerate() {
         said.push(format!("{}{}: ", if index > 0 { "; " } else { "" }, name(index)).into());
         for (place, size) in sizes(trial).into_iter().enumerate() {
@@ -94,15 +102,17 @@ pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
             let fixed = own().filter(|frame| trial.attempts_of(frame).any(AttemptRow::found)).count();
             let key = |which: &str| Key::of(trial, TOPIC, format!("count {which} with {size} targets"));
             let (fixed, all) = (Number::count(fixed, key("fixed-frames")), Number::count(own().count(), key("frames")));
-            said.extend(text![if place > 0 { ", " } else { "" }, fixed, " of ", all, format!(" with {size}")]);
+            said.extend(text![if place > 0 { ", " } else { "" }, fixed, " of ", all, format!(" with {size} in view")]);
         }
     }
     said.push(".".into());
     Some(said)
 }
 
-/// The objects that were looked for, in the order of their names; none where not all frames are logged, or where every
-/// attempt has an object of its own, as drawn problems have.
+/// The searched objects by name.
+///
+/// The result is empty for a decimated log, and for generated problems, whose attempts each have an object of their
+/// own.
 fn objects(trial: &Trial) -> Vec<String> {
     let names: BTreeSet<&str> = trial.attempts().map(|(_, row)| trial.object(row)).collect();
     if trial.every() > 1 || 2 * names.len() > trial.attempts().count() {

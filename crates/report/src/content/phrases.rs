@@ -1,4 +1,4 @@
-//! Numbers about trials, with their keys.
+//! Numbers of trials with their keys, and the words for outcomes.
 
 use crate::{
     Field, Key, Number, format,
@@ -8,7 +8,7 @@ use crate::{
     run::{AttemptRow, Trial},
 };
 
-/// What a quantity is printed in.
+/// The unit in which a quantity is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unit {
     Plain,
@@ -34,23 +34,33 @@ impl Unit {
     }
 }
 
-/// The topic that counts stand on.
+/// The topic of a trial's counts: the totals where the log has them.
 fn counted(trial: &Trial) -> &'static str {
     if trial.totals.is_some() { "/metrics/totals" } else { "/metrics/evaluation" }
 }
 
-/// How many of `group` there are.
+/// The printed word for a counted group: keys keep the names `found` and `refused`.
+pub(super) fn outcome(group: &str) -> &str {
+    match group {
+        "attempted" => "attempts",
+        "found" => "fixes",
+        "refused" => "rejected",
+        _ => group,
+    }
+}
+
+/// The number of attempts of `group`.
 pub(super) fn count(trial: &Trial, group: &str, n: usize) -> Number {
     Number::count(n, Key::of(trial, counted(trial), format!("count {group}")))
 }
 
-/// Their share of all attempts, in percent.
+/// The fraction of `group` among all attempts (%).
 pub(super) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number {
     let key = Key::of(trial, counted(trial), format!("percent {group} of attempted"));
     Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
 }
 
-/// Whether an attempt is of `group`, an outcome or a region.
+/// Whether an attempt belongs to `group`, an outcome or a region of the Stanford diagram.
 fn is_of(row: &AttemptRow, group: &str) -> bool {
     match group {
         "found" => row.found(),
@@ -60,7 +70,10 @@ fn is_of(row: &AttemptRow, group: &str) -> bool {
     }
 }
 
-/// The 95 % interval of the share of `group`, as [`fraction::interval`]; the other frames of a thinned log are only counted.
+/// The 95 % interval of the fraction of `group`.
+///
+/// It is [`proportion::interval`] of the single attempts, or [`proportion::interval_of_counts`] for a decimated log,
+/// which has only counts of the skipped frames.
 fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
     if trial.every() > 1 || !proportion::is_trajectory(&trial.header) {
         return proportion::interval_of_counts(proportion::is_trajectory(&trial.header), k, n);
@@ -69,7 +82,7 @@ fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
     proportion::interval(true, &events)
 }
 
-/// Their share of all attempts or an end of its 95 % interval, in percent: `percent`, `low`, `high`.
+/// The fraction of `group` among all attempts (%), or an end of its 95 % interval: `percent`, `low`, `high`.
 pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize), decimals: usize) -> Number {
     let (low, high) = ends(trial, group, k, n);
     let value = match what {
@@ -81,7 +94,9 @@ pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize
     Number::new((n > 0).then_some(value), decimals, key)
 }
 
-/// The 95 % interval of that share. Of a thousand attempts or more it has two decimals: with one it would be its own share.
+/// The 95 % interval of the fraction of `group` (%).
+///
+/// It has two decimals from a thousand attempts on: with one decimal it would print as the fraction itself.
 pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
     let (low, high) = ends(trial, group, k, n);
     let decimals = if n < 1000 { 1 } else { 2 };
@@ -91,7 +106,7 @@ pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Numbe
     })
 }
 
-/// A statistic of a quantity over the attempts of a group, `median tre_rms of found`.
+/// A statistic of a quantity over the attempts of a group, with the key `median tre_rms of found`.
 pub(super) fn statistic(
     trial: &Trial,
     name: &str,
@@ -104,7 +119,7 @@ pub(super) fn statistic(
     Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, field.topic(), what))
 }
 
-/// A statistic of what the navigator knew, over the frames that have it.
+/// A statistic of a navigated quantity over the frames that have it.
 pub(super) fn navigated(
     trial: &Trial,
     name: &str,
@@ -116,7 +131,7 @@ pub(super) fn navigated(
     Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/referencing/frame", what))
 }
 
-/// A statistic of a point of interest, over the frames that have it in view.
+/// A statistic of a point of interest over the frames that have it in view.
 pub(super) fn poi(
     trial: &Trial,
     name: &str,
@@ -128,7 +143,7 @@ pub(super) fn poi(
     Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/metrics/inspection", what))
 }
 
-/// What the navigator knew after one frame.
+/// A navigated quantity after one frame.
 pub(super) fn navigated_at(
     trial: &Trial,
     (frame, stamp_ns): (u64, u64),
@@ -145,7 +160,7 @@ pub(super) fn navigated_at(
     Number::new(value.map(|value| value * unit.scale()), decimals, key)
 }
 
-/// One attempt's quantity.
+/// A quantity of one attempt.
 pub(super) fn value(
     trial: &Trial,
     (object, frame, stamp_ns): (&str, u64, u64),
@@ -162,14 +177,16 @@ pub(super) fn value(
     Number::new(value.map(|value| value * unit.scale()), decimals, key)
 }
 
-/// The same key over several logs: what it says is summed, or said of the least, the greatest or the middle one.
+/// A key over several logs.
+///
+/// A count is summed over them; `least`, `greatest` and `middle` select among their values.
 pub(super) fn over(trials: &[&Trial], topic: &str, what: String) -> Key {
     let spans = trials.iter().map(|trial| trial.span());
     let span = spans.fold([u64::MAX, 0], |[a, b], [from, to]| [a.min(from), b.max(to)]);
     Key { what, topic: topic.to_owned(), span, logs: trials.iter().map(|trial| trial.file()).collect() }
 }
 
-/// A number of the header.
+/// A number from the header of a trial.
 pub(super) fn header(trial: &Trial, what: &str, value: Option<f64>, decimals: usize) -> Number {
     Number::new(value, decimals, Key { span: [0; 2], ..Key::of(trial, "/run/header", what) })
 }
@@ -185,7 +202,7 @@ pub(super) fn frame(trial: &Trial, number: u64, stamp_ns: u64) -> Number {
     Number::count(number as usize, key)
 }
 
-/// As many decimals as a column needs.
+/// The number of decimals that a column of `values` needs.
 pub(super) fn decimals(values: impl Iterator<Item = Option<f64>>, unit: Unit) -> usize {
     format::decimals(values.flatten().map(|value| value * unit.scale()))
 }

@@ -1,4 +1,4 @@
-//! How it was judged: metrics, thresholds, trials, statistics, all fixed beforehand.
+//! The section on the protocol: metrics, thresholds, trials and statistics, fixed before the run.
 
 use super::BORNE;
 use crate::{
@@ -9,15 +9,16 @@ use crate::{
     run::Run,
 };
 
-/// How sure a trial's rates are, and by what.
+/// The sentences on the confidence intervals of a trial's rates.
 fn intervals(run: &Run) -> String {
     if !run.trials.iter().any(|trial| proportion::is_trajectory(&trial.header)) {
-        return "Every frame is a draw by itself: the rates of a trial, and recall, carry exact (Clopper–Pearson) 95 % intervals.".to_owned();
+        return "Every frame is an independent draw: rates and recall have exact (Clopper–Pearson) 95 % intervals."
+            .to_owned();
     }
-    let mut said = "Frames follow each other on one way, and neighbours are not independent: the 95 % intervals of a trial’s rates, and the bands of recall, are those of Clopper and Pearson for the effective number of attempts (Korn and Graubard, 1998): n over the design effect, by which sums of blocks of consecutive attempts, the cube root of n long, vary more than of independent ones, a standard error added. Where all attempts are alike (0 % or 100 %) every block is one trial. A band is widened where it would fall.".to_owned();
+    let mut said = "Frames follow each other on one trajectory, so neighbours are not independent. The 95 % intervals of rates and the bands of recall are Clopper–Pearson intervals for the effective number of attempts (Korn and Graubard, 1998): n divided by the design effect. The design effect is the variance of sums over blocks of consecutive attempts relative to independent attempts, plus one standard error; a block has the cube root of n attempts. If all attempts have the same outcome (0 % or 100 %), every block counts as one attempt. Bands are widened so that they never fall along the bound.".to_owned();
     if run.trials.iter().any(|trial| trial.every() > 1) {
         said.push_str(
-            " Where a trial logged only some of its frames the others are counted, and every block is one trial.",
+            " A trial that logged only some of its frames has counts of the others; every block counts as one attempt.",
         );
     }
     said
@@ -27,14 +28,14 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     let [h, c, p, e] = ["H", "C", "P", "E"].map(italic);
     let mut terms = vec![
         (
-            text![italic("found, refused, wrong")],
+            text![italic("fixes, rejected, wrong")],
             text![
-                "A fix is wrong when the TRE exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter); an attempt without a fix is refused; all others are found. The three add up to the attempts. ",
+                "A fix is wrong if its TRE exceeds the alert limit (the smaller of 0.10 m and 5 % of the target’s diameter). An attempt without a fix is rejected. All other attempts count as fixes. The three add up to the number of attempts. ",
                 intervals(run)
             ],
         ),
         (
-            text![italic("m1")],
+            text![italic("fit RMS")],
             text![
                 "RMS of ‖",
                 h,
@@ -42,15 +43,15 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
                 c,
                 " − ",
                 p,
-                "‖ over the correctly identified points (within 2 px of truth in both images): the paper’s figure. It contains the evaluated points’ own noise; ",
+                "‖ over the correctly identified points, those within 2 px of the true projection in both images (the paper’s measure). It includes the noise of the evaluated points; ",
                 italic("unused"),
-                " leaves out those the solver used."
+                " excludes the points that the solver used."
             ],
         ),
         (
-            text![italic("m2")],
+            text![italic("TRE")],
             text![
-                "RMS of ‖",
+                "Target registration error: RMS of ‖",
                 e.clone(),
                 " ",
                 italic("p"),
@@ -60,13 +61,13 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
                 italic("p"),
                 " of the target, ",
                 e.clone(),
-                " the estimated pose after the inverse of the true one."
+                " the estimated pose times the inverse of the true pose."
             ],
         ),
         (
-            text![italic("m3")],
+            text![italic("position error, attitude error")],
             text![
-                "Error of the left camera’s position in the frame of the target, and the rotation angle of ",
+                "Distance of the left camera from its true position in the frame of the target, and the rotation angle of ",
                 e.clone(),
                 "."
             ],
@@ -74,7 +75,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         (
             text![italic("NEES")],
             text![
-                "Squared error of the pose by its own covariance, six degrees of freedom; its mean is 6 where the covariance is honest."
+                "Normalised estimation error squared: the pose error weighted by the inverse of its covariance, with six degrees of freedom. Its mean is 6 for a consistent covariance."
             ],
         ),
     ];
@@ -82,13 +83,13 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         terms.push((
             text![italic("area under recall")],
             text![
-                "The mean over all attempts of max(0, 1 − error/bound): 1 for no error, 0 from the bound on and for every attempt refused or wrong. Bounds, set beforehand: 50 mm for m2, 5° for the attitude of m3."
+                "Mean over all attempts of max(0, 1 − error/bound): 1 without error, 0 from the bound on and for rejected attempts and wrong fixes. The bounds were set before the run: 50 mm for the TRE, 5° for the attitude error."
             ],
         ));
         terms.push((
             text![italic("at a lever arm")],
             text![
-                "Error of a point 1, 2 or 5 m from the centroid of the points that the fix used: the root mean square over all directions of the arm, √(‖",
+                "Position error of a point 1, 2 or 5 m from the centroid of the points that the fix used, RMS over all directions of the arm: √(‖",
                 e.clone(),
                 " ",
                 italic("c"),
@@ -96,11 +97,11 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
                 italic("c"),
                 "‖² + 8/3 ",
                 italic("a"),
-                "² sin²(θ/2)), ",
+                "² sin²(θ/2)), with the centroid ",
                 italic("c"),
-                " the centroid, ",
+                ", the arm ",
                 italic("a"),
-                " the arm, θ the angle of ",
+                " and the angle θ of ",
                 e.clone(),
                 "."
             ],
@@ -111,35 +112,35 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
         terms.push((
             text![italic("amplitude, drift")],
             text![
-                "Of a stretch from a fix to the last frame before the next: the greatest error of the navigated position less that at the fix, and the distance between the errors, as vectors, at its two ends, by the way and by the time between them."
+                "Over a fix interval, from a fix to the last frame before the next: the largest navigated position error less the error at the fix, and the length of the change of the error vector, divided by the path length and by the time."
             ],
         ));
     }
     if run.header().axes.iter().any(|axis| harder(&axis.key)) {
         terms.push((
-            text![italic("borne")],
+            text![italic("break-down point")],
             text![format!(
-                "A condition is borne where at least {BORNE} % of the attempts are found, a share set beforehand; the break-down point is the largest value up to which every one that was tried is."
+                "The largest value of a condition up to which the fix rate is at least {BORNE} % at every tested value. The threshold was set before the run."
             )],
         ));
     }
     let mut section = Section::new("Protocol").with([
         Block::Paragraph(text![
-            "Metrics are defined below, thresholds stand in the configuration (last section). No frame is excluded: one without an answer stays in every denominator. Medians and quantiles are over the fixes found, and say so; no failure is averaged into an error."
+            "Metrics are defined below; thresholds are in the configuration (last section). No frame is excluded: a frame without a fix stays in every denominator. Medians and quantiles of errors are over fixes that are not wrong, unless stated otherwise; failures never enter an average of errors."
         ]),
         Block::Terms(terms),
     ]);
     if !comparisons.is_empty() {
         let unit = if comparisons[0].over_conditions {
-            "Methods are compared over conditions, one value each: the median of the TRE over all attempts, failures as infinitely far off; the difference is the ratio of two such medians"
+            "Methods are compared over conditions, with one value for each: the median TRE over all attempts, with failures counted as infinite errors. The difference is the ratio of two such medians"
         } else if comparisons[0].between_conditions {
-            "Frame k of every trial is drawn from the same random numbers, so that only the condition differs: trials are compared frame by frame and target by target, as far as both attempted it, failures as infinitely far off, by the median of the paired differences of m2, where not both fail"
+            "Frame k of every trial is generated from the same random numbers, so only the condition differs. Trials are compared by frame and target, over the attempts that both made, by the median of the paired TRE differences. Failures count as infinite errors; pairs that both fail are excluded"
         } else {
-            "Trials that saw the same frames are compared attempt by attempt, failures as infinitely far off, by the median of the paired differences of m2, where not both fail"
+            "Trials on the same frames are compared attempt by attempt, by the median of the paired TRE differences. Failures count as infinite errors; pairs that both fail are excluded"
         };
         section.say(text![format!(
-            "{unit}. Its 95 % interval is the percentile bootstrap of 10 000 resamples, seed {SEED}, over {}. The test is Wilcoxon’s signed rank, two-sided, adjusted after Holm for the family of {} comparison{}; the effect is the matched-pairs rank-biserial correlation. A difference is called significant where the adjusted p is below {ALPHA} and the interval leaves out none at all. Success and failure are compared by McNemar’s exact test. Where no difference is significant, equivalence {} is tested, a margin set beforehand: it is shown where the 90 % interval, by the same bootstrap, is within it (two one-sided tests at 5 %, not adjusted) and McNemar’s test finds no difference; fewer than five blocks show nothing.",
-            if comparisons[0].over_conditions { "the conditions" } else { "blocks of consecutive attempts, ⌈∛n⌉ long, for neighbouring frames are not independent" },
+            "{unit}. The 95 % interval is a percentile bootstrap interval from 10 000 resamples (seed {SEED}) over {}. The test is Wilcoxon’s two-sided signed rank test, Holm-adjusted for the family of {} comparison{}; the effect is the matched-pairs rank-biserial correlation. A difference is significant if the adjusted p is below {ALPHA} and the interval excludes equality. Success and failure are compared by McNemar’s exact test. A difference that is not significant is tested for equivalence {}, a margin set before the run. Equivalence is shown if the 90 % interval of the same bootstrap is within the margin (two one-sided tests at 5 %, not adjusted) and McNemar’s test shows no difference; fewer than five blocks show no equivalence.",
+            if comparisons[0].over_conditions { "the conditions" } else { "blocks of consecutive attempts with a length of ⌈∛n⌉, because neighbouring frames are not independent" },
             comparisons.len(),
             if comparisons.len() == 1 { "" } else { "s" },
             super::significance::margin(comparisons),

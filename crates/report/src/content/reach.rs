@@ -1,4 +1,4 @@
-//! Recall in one number, and what a fix errs by at a distance.
+//! The area under the recall curve, and the error of a fix at lever arms.
 
 use seafix_evaluation::recall_area;
 
@@ -13,10 +13,10 @@ use crate::{
     run::{AttemptRow, Run, Trial},
 };
 
-/// Up to where recall is summed up: the error, the bound as it is printed, its unit.
+/// The errors whose recall is integrated, with the upper bound as printed and its unit.
 const AREAS: [(Field, f64, Unit); 2] = [(Field::Tre, 50.0, Unit::Millimetres), (Field::Attitude, 5.0, Unit::Degrees)];
 
-/// The table; nothing where no truth tells an error.
+/// The table; `None` without ground truth.
 pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
     if !run.trials.iter().any(|trial| AREAS.iter().any(|area| found(trial).any(|row| row.get(area.0).is_some()))) {
         return None;
@@ -68,13 +68,13 @@ pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
 
 fn caption(run: &Run, known: bool) -> Text {
     let mut caption = text![
-        "Area under recall: the share of all n attempts whose error is below a bound, averaged over the bounds from none to 50 mm of the TRE and to 5° of attitude; 100 % if no fix erred, refused and wrong attempts add nothing."
+        "Area under the recall curve: the fraction of all n attempts whose error is below a bound, averaged over the bounds from zero to 50 mm (TRE) and to 5° (attitude error). It is 100 % for fixes without error; rejected attempts and wrong fixes contribute nothing."
     ];
     if known {
-        caption.push(" At 1, 2 and 5 m: error of the fixes found at a point that far from the centroid of the points they used, its rotation included, root mean square over all directions.".into());
+        caption.push(" At 1, 2 and 5 m: position error at a point that far from the centroid of the points that a fix used, with the effect of the rotation, RMS over all directions.".into());
     }
     if run.trials.iter().any(|trial| trial.every() > 1) {
-        caption.push(" Of a trial that logged one frame in k, over those.".into());
+        caption.push(" For a trial that logged one frame in k, the values are over the logged frames.".into());
     }
     caption
 }
@@ -83,7 +83,7 @@ fn found(trial: &Trial) -> impl Iterator<Item = &AttemptRow> {
     trial.attempts().map(|(_, row)| row).filter(|row| row.found())
 }
 
-/// The area in percent; nothing where a fix has no error.
+/// The area in percent; no value where a fix has no error.
 fn area(trial: &Trial, field: Field, bound: f64, unit: Unit) -> Number {
     let suffix = if unit == Unit::Degrees { "deg" } else { "mm" };
     let what = format!("area {}<={bound} of attempted in {suffix}", field.name());

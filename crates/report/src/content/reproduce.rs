@@ -1,4 +1,4 @@
-//! How to get the same again.
+//! The sections on reproduction and on the configuration.
 
 use crate::{
     document::{Block, Section, code, text},
@@ -12,9 +12,9 @@ pub(super) fn section(run: &Run) -> Section {
     Section::new("How to reproduce").with([
         Block::Listing { title: String::new(), text: command, folded: false },
         Block::Paragraph(text![
-            "Every number of this report is computed from the logs alone and carries a key: what it is, the topic, the first and last stamp, the log. ",
+            "Every number of this report is computed from the logs alone and has a key: statistic and quantity, topic, first and last stamp, log. ",
             code("seafix report --verify"),
-            " reads the keys out of the printed page and computes each number again. With the same version and seeds everything but the times comes out the same, on any machine and any number of threads."
+            " reads the keys from the printed page and computes each number again. The same version and seeds give the same results except times, on every machine and with any number of threads."
         ]),
     ])
 }
@@ -23,7 +23,7 @@ pub(super) fn configuration(run: &Run) -> Section {
     let header = run.header();
     let mut section = Section::new("Configuration");
     section.say(text![
-        "Each trial with every default written out; what it has in common with the first is left out of the others."
+        "The resolved configuration of each trial with all defaults; later trials show only the lines that differ from the first."
     ]);
     let first: Vec<&str> = header.configuration.trim_end().lines().collect();
     for (index, trial) in run.trials.iter().enumerate() {
@@ -33,12 +33,12 @@ pub(super) fn configuration(run: &Run) -> Section {
     }
     if !header.site.is_empty() {
         let text = header.site.trim_end().to_owned();
-        section.add(Block::Listing { title: "The site".to_owned(), text, folded: true });
+        section.add(Block::Listing { title: "Site".to_owned(), text, folded: true });
     }
     section
 }
 
-/// The lines of `own` that are not those of `first`, each under its table.
+/// The lines of `own` that are missing from `first`, each under the head of its TOML table.
 fn differing(first: &[&str], own: &str) -> String {
     let placed = |lines: &mut dyn Iterator<Item = &str>| -> Vec<(String, String)> {
         let mut table = String::new();
@@ -62,5 +62,5 @@ fn differing(first: &[&str], own: &str) -> String {
         }
         text += &format!("{line}\n");
     }
-    if text.is_empty() { "the same".to_owned() } else { text }
+    if text.is_empty() { "same as the first trial".to_owned() } else { text }
 }

@@ -1,4 +1,4 @@
-//! The tables of results.
+//! The section with the results: outcomes, errors, figures and reasons of rejection.
 
 use super::{
     best, breakdown, figures, limits,
@@ -21,7 +21,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
         section.blocks.extend(limits::blocks(run, summary));
     }
     let mut plotted = figures::blocks(run, summary);
-    // The areas stand beside their curves.
+    // The table of areas follows the figure of recall curves.
     let recall = plotted.iter().position(|block| matches!(block, Block::Figure(figure) if figure.id == "recall"));
     let place = recall.map_or(plotted.len(), |place| place + 1);
     plotted.splice(place..place, reach::table(run, summary));
@@ -29,12 +29,12 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     section.blocks.extend(plotted);
     match refusals(run, summary) {
         Some(table) => section.add(Block::Table(table)),
-        None => section.say(text!["No attempt was refused."]),
+        None => section.say(text!["No attempt was rejected."]),
     }
     section
 }
 
-/// Heads of the columns that say which trial a row is.
+/// The heads of the columns that identify a trial.
 pub(super) fn heads(summary: &RunSummary) -> Vec<Head> {
     let conditions = summary.rows.first().into_iter().flat_map(Row::conditions);
     let numeric = |key: &str| {
@@ -51,34 +51,34 @@ pub(super) fn heads(summary: &RunSummary) -> Vec<Head> {
         .collect()
 }
 
-/// The cells that say which trial `row` is.
+/// The cells that identify the trial of `row`.
 pub(super) fn cells(row: &Row) -> Vec<Cell> {
     let conditions = row.conditions().map(|axis| axis.value.clone().into());
     [row.method().into()].into_iter().chain(conditions).collect()
 }
 
-/// Whether a thin line goes above row `index`: where the first condition changes.
+/// Whether a thin rule separates row `index` from the one above: the first condition changes there.
 pub(super) fn breaks(summary: &RunSummary, index: usize) -> bool {
     let first = |index: usize| summary.rows[index].conditions().next().map(|axis| &axis.value);
     index > 0 && first(index) != first(index - 1)
 }
 
-/// Empty heads above the columns that say which trial a row is.
+/// Empty heads above the columns that identify a trial and `more` columns beside them.
 pub(super) fn blank(summary: &RunSummary, more: usize) -> Vec<Head> {
     vec![Head::words(""); heads(summary).len() + more]
 }
 
 fn outcomes(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
-        "Outcomes. n: targets attempted, one a frame and target in view of the prior; rates in % of n with 95 % intervals. Frames: with at least one fix, and with a wrong one, of all frames. Points: median number identified."
+        "Outcomes. n: attempts, one for every frame and target that the prior puts in view. Rates are in % of n with 95 % intervals. Frames: frames with at least one fix, frames with a wrong fix, all frames. Points: median number of identified points of a fix."
     ];
     let mut above = blank(summary, 1);
-    above.extend([Head::over(2, "Found"), Head::over(2, "Refused"), Head::over(2, "Wrong"), Head::over(3, "Frames")]);
+    above.extend([Head::over(2, "Fixes"), Head::over(2, "Rejected"), Head::over(2, "Wrong"), Head::over(3, "Frames")]);
     above.push(Head::words(""));
     let mut below = heads(summary);
     below.push(Head::numbers("n"));
     below.extend((0..3).flat_map(|_| ["%", "interval"].map(Head::numbers)));
-    below.extend(["fixed", "wrong", "of", "Points"].map(Head::numbers));
+    below.extend(["with fix", "wrong", "all", "Points"].map(Head::numbers));
     let mut table = Table { id: "outcomes".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
@@ -98,7 +98,7 @@ fn outcomes(run: &Run, summary: &RunSummary) -> Table {
     table
 }
 
-/// One quantity of the table of errors.
+/// A quantity of the table of errors.
 struct Column {
     name: &'static str,
     field: Field,
@@ -108,7 +108,12 @@ struct Column {
 
 const COLUMNS: [Column; 5] = [
     Column { name: "fit RMS (mm)", field: Field::Fit, unit: Unit::Millimetres, value: |row| row.fit },
-    Column { name: "unused (mm)", field: Field::FitUnused, unit: Unit::Millimetres, value: |row| row.fit_unused },
+    Column {
+        name: "fit RMS, unused (mm)",
+        field: Field::FitUnused,
+        unit: Unit::Millimetres,
+        value: |row| row.fit_unused,
+    },
     Column { name: "TRE (mm)", field: Field::Tre, unit: Unit::Millimetres, value: |row| row.tre },
     Column {
         name: "position error (mm)",
@@ -124,18 +129,20 @@ const COLUMNS: [Column; 5] = [
 fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table {
     let any_best = (0..summary.rows.len()).any(|index| best(comparisons, index));
     let mut caption = text![
-        "Errors of the fixes found: median and 95 % quantile over n fixes. m3: position of the camera, and its attitude; unused: m1 without the points the solver used. ",
-        italic("All"),
-        ": median of the TRE over all attempts, refused and wrong ones counted as infinitely far off. ",
+        "Errors of the fixes: median and 95 % quantile over n fixes that are not wrong. Fit RMS, unused: the fit RMS over the identified points that the solver did not use. TRE: target registration error. Position and attitude errors are those of the camera. ",
+        italic("TRE all"),
+        ": median TRE over all attempts, with rejected attempts and wrong fixes counted as infinite errors. ",
     ];
     caption.push(Span::from(match (comparisons.first(), any_best) {
-        (None, _) => "Nothing is compared: no two trials saw the same frames.",
+        (None, _) => "No trials are compared, because no two share the same frames.",
         (Some(first), _) if first.between_conditions => "Conditions are compared below, frame by frame.",
         (_, true) => "Bold: significantly better than every other trial on the same frames.",
-        _ => "No value is in bold: of none is it shown that it is significantly better than all others on the same frames.",
+        _ => "No value is in bold, because no trial is significantly better than all others on the same frames.",
     }));
     if run.trials.iter().any(|trial| trial.every() > 1) {
-        caption.push(Span::from(" Of a trial that logged one frame in k, all but n is over those."));
+        caption.push(Span::from(
+            " For a trial that logged one frame in k, n counts all frames; the other columns are over the logged frames.",
+        ));
     }
     let mut above = blank(summary, 1);
     above.extend(COLUMNS.iter().map(|column| Head::over(2, column.name)));
@@ -172,7 +179,7 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
     line.extend((1..heads(summary).len()).map(|_| Cell::from("")));
     line.push("–".into());
     line.push(Cell::over(2, format!("{low}–{high}")));
-    line.push(Cell { minor: true, ..Cell::over(10, "virtual scene, three points, 2–5 m; nothing else reported") });
+    line.push(Cell { minor: true, ..Cell::over(10, "virtual scene, three points, 2–5 m; no other figure reported") });
     table.line(true, line);
     table
 }
@@ -188,7 +195,7 @@ fn refusals(run: &Run, summary: &RunSummary) -> Option<Table> {
     below.push(Head::numbers("n"));
     below.extend(reasons.iter().map(|reason| Head::numbers(reason.clone())));
     below.push(Head::numbers("all"));
-    let mut table = Table::new("refusals", text!["Refused attempts by reason, out of n."], below);
+    let mut table = Table::new("refusals", text!["Rejected attempts by reason, of n attempts."], below);
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
         line.push(phrases::count(trial, "attempted", row.attempted).into());

@@ -1,4 +1,4 @@
-//! Which differences are sure.
+//! The section on significance: paired comparisons of trials with tests and intervals.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,7 +19,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
     let alike = comparisons.iter().filter(|comparison| comparison.equivalent() == Some(true)).count();
     let mut section = Section::new("Significance");
     section.say(text![format!(
-        "Of {} comparison{} {} significant{}. {}: the first errs less. An effect of 1: it does so in every pair, of −1: in none.{}",
+        "{} comparison{}: {} significant{}. {} mean that the first has the smaller error. An effect of 1 means a smaller error in every pair, −1 in no pair.{}",
         comparisons.len(),
         if comparisons.len() == 1 { "" } else { "s" },
         match sure {
@@ -36,11 +36,11 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
                     n if n == rest => "all show".to_owned(),
                     n => format!("{n} show"),
                 };
-                format!("; of the {rest} that {} not, {shown} equivalence {}", if rest == 1 { "is" } else { "are" }, margin(comparisons))
+                format!("; among the {rest} that {} not, {shown} equivalence {}", if rest == 1 { "is" } else { "are" }, margin(comparisons))
             }
         },
         if comparisons[0].over_conditions { "Ratios below one" } else { "Negative differences" },
-        if with_the_first_alone(comparisons) { " Of so many each is compared with the first alone: all pairs would fill no readable table." } else { "" }
+        if with_the_first_alone(comparisons) { " Each trial is compared with the first only, because a table of all pairs would be too long." } else { "" }
     )]);
     section.add(Block::Table(table(run, comparisons)));
     section.blocks.extend(forest(run, comparisons).map(Block::Figure));
@@ -55,7 +55,7 @@ pub(super) fn margin(comparisons: &[Comparison]) -> String {
     }
 }
 
-/// Whether the members of some group were compared with its first alone.
+/// Whether the members of some group are compared with its first member only.
 fn with_the_first_alone(comparisons: &[Comparison]) -> bool {
     let mut firsts: BTreeMap<&str, (BTreeSet<&str>, BTreeSet<&str>)> = BTreeMap::new();
     for comparison in comparisons {
@@ -66,13 +66,13 @@ fn with_the_first_alone(comparisons: &[Comparison]) -> bool {
     firsts.values().any(|(firsts, seconds)| firsts.len() == 1 && seconds.len() > 1)
 }
 
-/// The surest differences in words, at most so many; that there is none, where some were tested.
+/// The sentences on the `max` most significant differences, or one sentence that none is significant.
 pub(super) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Vec<Text> {
     let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).collect();
     sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
     if sure.is_empty() && !comparisons.is_empty() {
         let what = if comparisons[0].between_conditions { "Frame by frame" } else { "On the same attempts" };
-        return vec![text![format!("{what} no difference of the TRE is significant.")]];
+        return vec![text![format!("{what}, no difference of the TRE is significant.")]];
     }
     let as_number =
         |comparison: &Comparison| match comparison.difference.is_finite() && comparison.interval.0.is_finite() {
@@ -82,22 +82,24 @@ pub(super) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Ve
     sure.into_iter().take(max).map(as_number).collect()
 }
 
-/// The same where the one fails so often that the difference, or an end of its interval, is infinite.
+/// The sentence on a comparison with an infinite difference or interval.
+///
+/// One of the trials often fails then.
 fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
     let [first, second] = &comparison.names;
     let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };
     let as_number = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
     let [own, other] = comparison.alone;
     text![
-        format!("{}, {better} errs less than {worse} (p ", begin(comparison)),
+        format!("{}, {better} has smaller errors or fewer failures than {worse} (p ", begin(comparison)),
         holm(run, comparisons, comparison),
-        format!(" after Holm), or fails less: {first} alone finds "),
+        format!(", Holm-adjusted): only {first} has a fix in "),
         as_number("alone-first", own),
-        format!(" and {second} alone "),
+        format!(" and only {second} in "),
         as_number("alone-second", other),
         " of ",
         as_number("pairs", comparison.n),
-        "."
+        " pairs."
     ]
 }
 
@@ -117,19 +119,23 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
         |what: &str, value: f64| Number::new(Some(real(value)), if over { 3 } else { 2 }, key(run, comparison, what));
     let [first, second] = &comparison.names;
     let begin = begin(comparison);
-    let what = if over { "the median ratio of m2" } else { "the median difference of m2" };
+    let (what, sign) = if over { ("the median TRE ratio", "/") } else { ("the median TRE difference", "−") };
     text![
-        format!("{begin}, {what} of {first} and {second} is "),
+        format!("{begin}, {what} {first} {sign} {second} is "),
         as_number("difference", comparison.difference),
         if over { " [" } else { " mm [" },
         as_number("difference-low", comparison.interval.0),
         ", ",
         as_number("difference-high", comparison.interval.1),
-        if over { "], 95 % bootstrap over conditions." } else { "], 95 % bootstrap over blocks of frames." }
+        if over {
+            "] (95 % bootstrap interval over conditions)."
+        } else {
+            "] (95 % bootstrap interval over blocks of frames)."
+        }
     ]
 }
 
-/// The key of something about a comparison.
+/// The key of a number of a comparison.
 fn key(run: &Run, comparison: &Comparison, what: &str) -> Key {
     let trials: Vec<&Trial> = comparison.logs.iter().map(|&index| &run.trials[index]).collect();
     let over = if comparison.over_conditions { " over conditions" } else { " over attempts" };
@@ -143,21 +149,21 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
     let head = if over { "first / second" } else { "first − second (mm)" };
     let within = if over { format!("within {MARGIN_RATIO}×") } else { format!("within {} mm", MARGIN * 1e3) };
     let caption = text![if over {
-        "Methods over conditions: n conditions, median ratio of the medians of the TRE over all attempts with its 95 % interval, rank-biserial effect (+: the first errs less), p of the signed rank test adjusted after Holm; where that is not significant, whether the two are shown to be equivalent, and within which factor the 90 % interval is. Bold: significant."
+        "Methods compared over n conditions: median ratio of the median TRE over all attempts, with its 95 % interval; rank-biserial effect (+: the first has the smaller error); Holm-adjusted p of the signed rank test. The last column applies to differences that are not significant: whether equivalence is shown, and the factor that contains the 90 % interval. Bold: significant."
     } else {
-        "Paired comparisons on the same attempts: median of the differences of the TRE (first − second), where not both fail, with its 95 % interval, rank-biserial effect (+: the first errs less, 1: in every pair), p of the signed rank test adjusted after Holm; found by the one alone and by the other alone, and McNemar’s p, which is not adjusted; where the difference is not significant, whether the two are shown to be equivalent, by the 90 % interval, which is within so many mm, and by McNemar’s test, which must find no difference. Bold: significant."
+        "Paired comparisons on the same attempts: median difference of the TRE (first − second) over pairs that do not both fail, with its 95 % interval; rank-biserial effect (+: the first has the smaller error, 1: in every pair); Holm-adjusted p of the signed rank test. Only one: pairs in which only the first, or only the second, has a fix; McNemar’s p is not adjusted. The last column applies to differences that are not significant: whether equivalence is shown, and the margin (mm) that contains the 90 % interval; McNemar’s test must show no difference either. Bold: significant."
     }];
     let mut heads = vec![Head::words("Condition"), Head::words("first"), Head::words("second"), Head::numbers("n")];
     heads.extend([
         Head::numbers(head),
         Head::numbers("interval"),
-        Head::numbers("effect (+: first less)"),
+        Head::numbers("effect (+: first smaller)"),
         Head::numbers("p (Holm)"),
     ]);
     if over {
         heads.remove(0);
     } else {
-        heads.extend([Head::numbers("alone"), Head::numbers("p (McNemar)")]);
+        heads.extend([Head::numbers("only one"), Head::numbers("p (McNemar)")]);
     }
     heads.push(Head::numbers(within));
     let mut table = Table::new("comparisons", caption, heads);
@@ -200,7 +206,7 @@ fn table(run: &Run, comparisons: &[Comparison]) -> Table {
     table
 }
 
-/// The adjusted p: its key names the logs of the whole family, those of this comparison first.
+/// The Holm-adjusted p; its key names the logs of the complete family, those of this comparison first.
 fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
     let others = comparisons.iter().filter(|other| other.names != own.names || other.condition != own.condition);
     let family: Vec<usize> = own.logs.iter().chain(others.flat_map(|other| &other.logs)).copied().collect();
@@ -210,7 +216,7 @@ fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
     Number::probability(own.holm, super::phrases::over(&trials, "/metrics/evaluation", what))
 }
 
-/// The intervals side by side.
+/// The forest plot of the intervals; `None` for fewer than two comparisons or more than fit.
 fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     if comparisons.len() < 2 || comparisons.len() > 40 {
         return None;
@@ -242,7 +248,7 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     };
     let none = if over { 1.0 } else { 0.0 };
     let zero = Layer::Guide { points: vec![[none, -0.5], [none, n as f64 - 0.5]], note: String::new(), dash: 0 };
-    let label = if over { "ratio of the medians of m2" } else { "median difference of TRE (mm)" };
+    let label = if over { "ratio of the median TRE" } else { "median TRE difference (mm)" };
     let panel = Panel {
         x: if over { Axis::logarithmic(label) } else { Axis::linear(label) },
         y: Axis { range: Some([-0.6, n as f64 - 0.4]), ..Axis::named("", names.collect()) },
@@ -252,7 +258,7 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
     let shape = ((n as f64 * 11.0 + 34.0) / 482.0).clamp(0.14, 1.1);
     let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend: Vec::new() };
     let heads = [Head::words("comparison"), Head::numbers("difference"), Head::numbers("low"), Head::numbers("high")];
-    let mut data = Table::new("forest", text!["Every interval of the figure of comparisons."], heads.to_vec());
+    let mut data = Table::new("forest", text!["The data of the figure of comparisons."], heads.to_vec());
     for comparison in comparisons {
         let as_number = |what: &str, value: f64| Number::new(Some(real(value)), 4, key(run, comparison, what)).into();
         let name = name(comparison);
@@ -268,7 +274,7 @@ fn forest(run: &Run, comparisons: &[Comparison]) -> Option<Figure> {
         );
     }
     let caption = text![
-        "The comparisons with their 95 % intervals; coloured squares are significant after Holm, grey ones are not. Left of the line the first errs less."
+        "Comparisons with their 95 % intervals. Coloured squares are significant after Holm’s adjustment, grey ones are not. Left of the line the first has the smaller error."
     ];
     Some(Figure { id: "forest".to_owned(), caption, drawing: chart.draw()?, data })
 }

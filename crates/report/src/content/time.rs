@@ -1,4 +1,4 @@
-//! What it costs: time a stage, and the search over the size of its problem.
+//! The section on run time: the stages, and the search over the size of its problem.
 
 use super::{
     figures,
@@ -13,7 +13,7 @@ use crate::{
 
 pub(super) fn section(run: &Run, summary: &RunSummary) -> Section {
     let caption = text![
-        "Time (ms), medians: of the first seven stages a frame, of the others an attempted target; total is from the images, or the points where there are none, to the answer about one target; p95 is its 95 % quantile. Wall clock: it differs from run to run and from machine to machine."
+        "Median times (ms): per frame for the front end and odometry, per attempt for candidates, search and solve. Total: from the images (or points, without images) to the outcome for one target; p95: its 95 % quantile. Wall-clock times differ between runs and machines."
     ];
     let stages: Vec<&str> = summary
         .rows
@@ -31,9 +31,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Section {
         .collect();
     if shown.is_empty() {
         let mut section = Section::new("Run time");
-        section.say(text![
-            "No durations were logged, so that the run has the same bytes wherever and whenever it is made."
-        ]);
+        section.say(text!["No durations were logged, so that every run of the configuration gives identical files."]);
         section.blocks.extend(figures::search_cost(run).map(Block::Figure));
         return section;
     }

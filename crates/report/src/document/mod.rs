@@ -1,4 +1,4 @@
-//! A paper as data: what it says, apart from how it is printed.
+//! The data structure of a report, independent of its printed form.
 
 mod span;
 mod table;
@@ -8,38 +8,38 @@ pub(crate) use table::{Cell, Head, Line, Table};
 
 use crate::figure::Drawing;
 
-/// The whole paper.
+/// A report.
 #[derive(Debug)]
 pub(crate) struct Document {
     pub(crate) title: String,
-    /// The run's name.
+    /// The name of the run.
     pub(crate) run: String,
     pub(crate) question: String,
-    /// The question's answer in numbers.
+    /// The sentences of the abstract.
     pub(crate) summary: Vec<Text>,
     pub(crate) sections: Vec<Section>,
 }
 
-/// One numbered part.
+/// A numbered section.
 #[derive(Debug)]
 pub(crate) struct Section {
     pub(crate) title: String,
     pub(crate) blocks: Vec<Block>,
 }
 
-/// One piece of a section.
+/// A block of a section.
 #[derive(Debug)]
 pub(crate) enum Block {
     Paragraph(Text),
-    /// A formula by itself.
+    /// A displayed formula.
     Formula(Text),
-    /// Terms and what they mean.
+    /// Terms with their definitions.
     Terms(Vec<(Text, Text)>),
     Items(Vec<Text>),
     Table(Table),
     Figure(Figure),
     Picture(Picture),
-    /// Text as it is; `folded` where few will read it.
+    /// Preformatted text; `folded` hides it until it is opened.
     Listing {
         title: String,
         text: String,
@@ -47,32 +47,32 @@ pub(crate) enum Block {
     },
 }
 
-/// A drawn figure, with the numbers it shows.
+/// A figure with its plotted numbers.
 #[derive(Debug)]
 pub(crate) struct Figure {
-    /// The name of its files.
+    /// The stem of its file names.
     pub(crate) id: String,
     pub(crate) caption: Text,
     pub(crate) drawing: Drawing,
-    /// Every plotted number.
+    /// The plotted numbers.
     pub(crate) data: Table,
 }
 
-/// Both images of a frame with marks.
+/// The two images of a frame, side by side, with marks.
 #[derive(Debug)]
 pub(crate) struct Picture {
-    /// The name of its file.
+    /// The stem of its file name.
     pub(crate) id: String,
     pub(crate) caption: Text,
-    /// What those who cannot see it are told.
+    /// The alternative text.
     pub(crate) alternative: String,
     pub(crate) jpeg: Vec<u8>,
-    /// Columns and rows.
+    /// The width and height (px).
     pub(crate) size: [u32; 2],
 }
 
 impl Document {
-    /// All tables, those behind the figures included, in order.
+    /// All tables in order, including the data of figures.
     pub(crate) fn tables(&self) -> impl Iterator<Item = &Table> {
         self.blocks().filter_map(|block| match block {
             Block::Table(table) => Some(table),
@@ -115,7 +115,7 @@ impl Section {
         self.blocks.push(Block::Paragraph(text));
     }
 
-    /// The same with further blocks.
+    /// The section with further blocks.
     pub(crate) fn with(mut self, blocks: impl IntoIterator<Item = Block>) -> Self {
         self.blocks.extend(blocks);
         self

@@ -1,11 +1,11 @@
-//! Running text.
+//! Formatted text.
 
 use crate::Number;
 
-/// Running text: pieces in a row.
+/// A formatted text: a sequence of spans.
 pub(crate) type Text = Vec<Span>;
 
-/// One piece of running text.
+/// A piece of text with one format.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Span {
     Plain(String),
@@ -15,7 +15,7 @@ pub(crate) enum Span {
     Sub(String),
     Sup(String),
     Number(Number),
-    /// A number that is better than all others, significantly.
+    /// A number that is significantly better than all others.
     Best(Number),
 }
 
@@ -37,7 +37,7 @@ impl From<Number> for Span {
     }
 }
 
-/// Text of pieces that become spans: `text!["of ", number, " frames"]`.
+/// A text from pieces that convert to spans: `text!["of ", number, " frames"]`.
 macro_rules! text {
     ($($piece:expr),* $(,)?) => { vec![$($crate::document::Span::from($piece)),*] };
 }
@@ -64,7 +64,7 @@ pub(crate) fn sup(text: impl Into<String>) -> Span {
 }
 
 impl Span {
-    /// What it says, without how it looks.
+    /// The unformatted text.
     pub(crate) fn plain(&self) -> &str {
         match self {
             Self::Plain(text)
@@ -77,7 +77,7 @@ impl Span {
         }
     }
 
-    /// The number it is.
+    /// The number; `None` for other spans.
     pub(crate) fn number(&self) -> Option<&Number> {
         match self {
             Self::Number(number) | Self::Best(number) => Some(number),
@@ -86,7 +86,7 @@ impl Span {
     }
 }
 
-/// What `text` says, without how it looks.
+/// The unformatted text of `text`.
 pub(crate) fn plain_text(text: &[Span]) -> String {
     text.iter().map(Span::plain).collect()
 }

@@ -2,58 +2,58 @@
 
 use super::{Span, Text, plain_text};
 
-/// A table: heads, and lines of as many cells as the last row of heads has.
+/// A table with rows of heads, and lines with one cell for every column.
 #[derive(Debug, Default)]
 pub(crate) struct Table {
-    /// The name of its files.
+    /// The stem of its file names.
     pub(crate) id: String,
     pub(crate) caption: Text,
-    /// Rows of heads, the last one head a column.
+    /// The rows of heads; the last row has one head for every column.
     pub(crate) heads: Vec<Vec<Head>>,
     pub(crate) lines: Vec<Line>,
 }
 
-/// The head of one column, or of several.
+/// The head of one or several columns.
 #[derive(Debug, Clone)]
 pub(crate) struct Head {
     pub(crate) text: String,
     pub(crate) columns: usize,
-    /// Whether numbers stand below: to the right then.
+    /// Whether the column has numbers, which are right-aligned.
     pub(crate) numbers: bool,
 }
 
-/// One line.
+/// A line of cells.
 #[derive(Debug, Default)]
 pub(crate) struct Line {
     pub(crate) cells: Vec<Cell>,
-    /// Whether a thin rule stands above it.
+    /// Whether a thin rule is above the line.
     pub(crate) rule: bool,
 }
 
-/// One cell.
+/// A cell.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cell {
     pub(crate) text: Text,
-    /// How many columns it takes; 0 and 1 are one.
+    /// The number of columns that the cell spans; 0 counts as 1.
     pub(crate) columns: usize,
-    /// Prose may be broken into lines.
+    /// Whether the text may wrap.
     pub(crate) prose: bool,
-    /// Of less weight than its neighbours.
+    /// Whether the cell is less prominent than its neighbours.
     pub(crate) minor: bool,
 }
 
 impl Head {
-    /// Of a column of words.
+    /// The head of a column of words.
     pub(crate) fn words(text: impl Into<String>) -> Self {
         Self { text: text.into(), columns: 1, numbers: false }
     }
 
-    /// Of a column of numbers.
+    /// The head of a column of numbers.
     pub(crate) fn numbers(text: impl Into<String>) -> Self {
         Self { text: text.into(), columns: 1, numbers: true }
     }
 
-    /// Over several columns.
+    /// The head over several columns.
     pub(crate) fn over(columns: usize, text: impl Into<String>) -> Self {
         Self { text: text.into(), columns, numbers: false }
     }
@@ -88,7 +88,7 @@ impl Cell {
 }
 
 impl Table {
-    /// One row of heads.
+    /// An empty table with one row of heads.
     pub(crate) fn new(id: &str, caption: Text, heads: Vec<Head>) -> Self {
         Self { id: id.to_owned(), caption, heads: vec![heads], lines: Vec::new() }
     }
@@ -102,12 +102,12 @@ impl Table {
         self.heads.last().and_then(|heads| heads.get(place)).is_some_and(|head| head.numbers)
     }
 
-    /// How many columns it has.
+    /// The number of columns.
     pub(crate) fn columns(&self) -> usize {
         self.heads.last().map_or(0, Vec::len)
     }
 
-    /// The names of its columns, those above and below in one.
+    /// The names of the columns: all heads above each column, joined.
     pub(crate) fn names(&self) -> Vec<String> {
         let mut names = vec![String::new(); self.columns()];
         for heads in &self.heads {

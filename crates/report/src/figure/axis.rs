@@ -1,22 +1,22 @@
-//! From quantities to places: axes with their ticks.
+//! Axes: scales and ticks.
 
 use crate::format;
 
-/// One axis.
+/// An axis of a panel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Axis {
-    /// Its quantity and unit.
+    /// The quantity and its unit.
     pub(crate) label: String,
     pub(crate) logarithmic: bool,
-    /// Where its ticks are; chosen where empty.
+    /// The ticks; chosen automatically if empty.
     pub(crate) ticks: Vec<f64>,
-    /// What stands at the ticks 0, 1, 2, … in place of numbers.
+    /// The labels of the ticks 0, 1, 2, … of an axis of names.
     pub(crate) names: Vec<String>,
-    /// Its ends; of the values where `None`.
+    /// The range; that of the values for `None`.
     pub(crate) range: Option<[f64; 2]>,
 }
 
-/// An axis with its ends, on an interval of the sheet.
+/// An axis with its range, mapped to an interval of the sheet.
 #[derive(Debug, Clone)]
 pub(crate) struct Scale {
     pub(crate) axis: Axis,
@@ -48,7 +48,7 @@ impl Axis {
         Self { label: label.into(), names, range, ..Self::default() }
     }
 
-    /// Ends that hold `values`, with a margin.
+    /// The range of `values` with a margin.
     pub(crate) fn ends(&self, values: impl Iterator<Item = f64>) -> [f64; 2] {
         if let Some(range) = self.range {
             return if self.logarithmic { range.map(f64::log10) } else { range };
@@ -63,7 +63,7 @@ impl Axis {
         let margin = if high > low {
             0.06 * (high - low)
         } else if self.logarithmic {
-            // Of 1, 2, 5 of the decades two are in view then, wherever the value lies.
+            // With this half range two of the ticks 1, 2, 5 of the decades are always in view.
             0.36
         } else {
             0.5
@@ -77,19 +77,19 @@ impl Scale {
         Self { axis, ends, place }
     }
 
-    /// Where `value` is on the sheet; what lies beyond the ends stands on them.
+    /// The position of `value` on the sheet; values out of range are clamped.
     pub(crate) fn at(&self, value: f64) -> f64 {
         let value = if self.axis.logarithmic { if value > 0.0 { value.log10() } else { self.ends[0] } } else { value };
         let fraction = ((value - self.ends[0]) / (self.ends[1] - self.ends[0])).clamp(0.0, 1.0);
         self.place[0] + fraction * (self.place[1] - self.place[0])
     }
 
-    /// Where it begins and ends on the sheet.
+    /// The interval on the sheet.
     pub(crate) fn interval(&self) -> [f64; 2] {
         self.place
     }
 
-    /// Whether `value` lies between the ends.
+    /// Whether `value` is within the range.
     pub(crate) fn holds(&self, value: f64) -> bool {
         let value = if self.axis.logarithmic { value.log10() } else { value };
         value >= self.ends[0] - 1e-9 && value <= self.ends[1] + 1e-9
@@ -104,7 +104,7 @@ impl Scale {
             self.axis.ticks.clone()
         } else if self.axis.logarithmic {
             let decades = decades(self.ends);
-            // So narrow a view has no decades to speak of: it is read as a linear one.
+            // A range with fewer than two decade ticks gets linear ticks.
             let few = decades.iter().filter(|tick| self.holds(**tick)).count() < 2;
             if few { steps(self.ends.map(|end| 10_f64.powf(end)), max) } else { decades }
         } else {
@@ -113,7 +113,7 @@ impl Scale {
         ticks.into_iter().filter(|tick| self.holds(*tick)).collect()
     }
 
-    /// What stands at a tick.
+    /// The label of a tick.
     pub(crate) fn label(&self, tick: f64) -> String {
         match self.axis.names.get(tick as usize) {
             Some(name) if !self.axis.names.is_empty() => name.clone(),
@@ -122,7 +122,7 @@ impl Scale {
     }
 }
 
-/// 1, 2, 5 of every decade in view; the tens alone where there are many decades.
+/// The ticks 1, 2, 5 of every decade in view, or powers of ten only for many decades.
 fn decades([low, high]: [f64; 2]) -> Vec<f64> {
     let steps: &[f64] = match high - low {
         width if width > 2.2 => &[1.0],
@@ -137,7 +137,7 @@ fn decades([low, high]: [f64; 2]) -> Vec<f64> {
         .collect()
 }
 
-/// Round steps of 1, 2 or 5, at most `max` of them.
+/// At most `max` ticks with a round step: 1, 2 or 5 times a power of ten.
 fn steps([low, high]: [f64; 2], max: f64) -> Vec<f64> {
     let wanted = (high - low) / max.max(2.0);
     let power = 10_f64.powi(wanted.log10().floor() as i32);
@@ -147,7 +147,9 @@ fn steps([low, high]: [f64; 2], max: f64) -> Vec<f64> {
     (first..=last).map(|i| i as f64 * step).collect()
 }
 
-/// A tick without needless zeros; powers of ten where many would be needed.
+/// The text of a tick without trailing zeros.
+///
+/// Very large and very small values have a power of ten.
 pub(crate) fn tick_text(tick: f64) -> String {
     let size = tick.abs();
     if size >= 1e5 || (size > 0.0 && size < 1e-4) {

@@ -1,8 +1,8 @@
-//! A picture in colour, in memory.
+//! Colour images in memory.
 
 use jpeg_encoder::{ColorType, Encoder};
 
-/// Rows of pixels, each red, green and blue.
+/// An RGB image, row by row.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Canvas {
     pub(super) width: u32,
@@ -11,7 +11,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// A picture of one colour.
+    /// An image of one colour.
     pub(super) fn new(width: u32, height: u32, colour: [u8; 3]) -> Self {
         Self { width, height, pixels: vec![colour; width as usize * height as usize] }
     }
@@ -20,18 +20,18 @@ impl Canvas {
         y as usize * self.width as usize + x as usize
     }
 
-    /// The colour of a pixel inside.
+    /// The colour of a pixel.
     pub(super) fn at(&self, x: u32, y: u32) -> [u8; 3] {
         self.pixels[self.place(x, y)]
     }
 
-    /// Sets the colour of a pixel inside.
+    /// Sets the colour of a pixel.
     pub(super) fn set(&mut self, x: u32, y: u32, colour: [u8; 3]) {
         let place = self.place(x, y);
         self.pixels[place] = colour;
     }
 
-    /// The same picture in another size.
+    /// The image resampled to another size.
     pub(super) fn resized(&self, width: u32, height: u32) -> Self {
         let size = [self.width, self.height].map(|side| side as usize);
         let planes = [0, 1, 2].map(|channel| {
@@ -42,7 +42,7 @@ impl Canvas {
         Self { width, height, pixels }
     }
 
-    /// The picture as a JPEG of this quality, 1 to 100.
+    /// The image as a JPEG with a quality from 1 to 100.
     pub(super) fn jpeg(&self, quality: u8) -> Vec<u8> {
         let mut bytes = Vec::new();
         let side = |side: u32| u16::try_from(side).expect("a picture of a frame has the size that JPEG can hold");
@@ -53,8 +53,10 @@ impl Canvas {
     }
 }
 
-/// A grey image in another size, by a triangle filter: linear interpolation where it grows, a weighted mean over the pixels
-/// that become one where it shrinks. `size` and `to` are columns and rows.
+/// A grey image resampled with a triangle filter.
+///
+/// The filter interpolates linearly when it enlarges and averages when it shrinks. `size` and `to` are width and height
+/// (px).
 pub(super) fn resized(pixels: &[u8], size: [usize; 2], to: [usize; 2]) -> Vec<u8> {
     let columns = weights(size[0], to[0]);
     let rows = weights(size[1], to[1]);
@@ -74,12 +76,14 @@ pub(super) fn resized(pixels: &[u8], size: [usize; 2], to: [usize; 2]) -> Vec<u8
     resized
 }
 
-/// For each of `to` pixels, which of `from` it is made of and with what weight; they add up to one.
+/// The source pixels and weights of each of `to` pixels.
+///
+/// The weights of a pixel add up to one.
 fn weights(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     let ratio = from as f32 / to.max(1) as f32;
     let reach = ratio.max(1.0);
     let of_one = |place: usize| {
-        // Pixel k covers k to k + 1.
+        // Pixel k covers the interval from k to k + 1.
         let centre = (place as f32 + 0.5) * ratio - 0.5;
         let first = (centre - reach).ceil().max(0.0) as usize;
         let last = ((centre + reach).floor().max(0.0) as usize).min(from.saturating_sub(1));

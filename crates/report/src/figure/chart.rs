@@ -1,4 +1,4 @@
-//! Charts: panels with axes, layers of marks, a legend.
+//! Charts: panels with axes and layers, and a legend.
 
 use super::{
     Anchor, Axis, Drawing, Ink, Scale, Stroke,
@@ -7,53 +7,53 @@ use super::{
 };
 use crate::print::width_of;
 
-/// Column and page of a journal (mm), in points.
+/// The width of a column and of a page of a journal (pt): 85 mm and 170 mm.
 const COLUMN: f64 = 85.0 * 72.0 / 25.4;
 const PAGE: f64 = 170.0 * 72.0 / 25.4;
 
-/// What stands left of a field, about (pt).
+/// The approximate room left of a plot area (pt).
 const ROOM: f64 = 46.0;
-/// From one line of a wrapped name to the next, by the font's size.
+/// The line height of wrapped names, in units of the font size.
 const LEADING: f64 = 1.1;
 
-/// Panels in rows, and a legend below them.
+/// A chart: rows of panels with a legend below.
 #[derive(Debug, Default)]
 pub(crate) struct Chart {
     pub(crate) panels: Vec<Panel>,
-    /// How many panels stand side by side.
+    /// The number of panels in a row.
     pub(crate) columns: usize,
-    /// Whether it takes the page's width, not the column's.
+    /// Whether the chart is as wide as a page instead of a column.
     pub(crate) page: bool,
-    /// Height of a panel by its width; 0.72 where zero.
+    /// The ratio of height to width of a panel; 0 means 0.72.
     pub(crate) shape: f64,
-    /// What the series are called, with their index.
+    /// The entries of the legend.
     pub(crate) legend: Vec<Entry>,
 }
 
-/// A line of the legend.
+/// An entry of the legend.
 #[derive(Debug, Clone)]
 pub(crate) struct Entry {
     pub(crate) name: String,
-    /// Index of the series.
+    /// The index of the series.
     pub(crate) series: usize,
     pub(crate) line: bool,
     pub(crate) mark: bool,
 }
 
-/// One pair of axes and what stands between them.
+/// A panel: a pair of axes with layers.
 #[derive(Debug, Default)]
 pub(crate) struct Panel {
-    /// Its condition.
+    /// The condition of the panel.
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
     pub(crate) layers: Vec<Layer>,
-    /// Whether a metre is as long in both directions.
+    /// Whether both axes have the same scale.
     pub(crate) equal: bool,
 }
 
 impl Chart {
-    /// Draws it; `None` where there is nothing to draw.
+    /// The drawing; `None` without any data.
     pub(crate) fn draw(&self) -> Option<Drawing> {
         let any = self.panels.iter().flat_map(|panel| &panel.layers).any(Layer::draws);
         if !any {
@@ -64,7 +64,7 @@ impl Chart {
         Some(drawing)
     }
 
-    /// Draws it on a sheet of this width, with so many panels side by side.
+    /// The drawing on a sheet of this width (pt), with `columns` panels in a row.
     fn on(&self, width: f64, columns: usize) -> Drawing {
         let columns = columns.clamp(1, self.panels.len().max(1));
         let cell = width / columns as f64;
@@ -72,11 +72,11 @@ impl Chart {
         let titled = self.panels.iter().any(|panel| !panel.title.is_empty());
         let mut height = cell * shape + if titled { FONT * 1.7 } else { 0.0 };
         if self.page && width < PAGE {
-            // As tall as wide drawings are, and two lines for every name beside an axis.
+            // Narrow panels are as tall as wide ones, with at least two lines for every name of the vertical axis.
             let lines = self.panels.iter().map(|panel| panel.y.names.len()).max().unwrap_or(0);
             height = height.max(cell * 0.6).max(lines as f64 * FONT * 2.7 + FONT * 4.0);
         }
-        // Names below an axis that take more than two lines make the drawing taller, not its field smaller.
+        // Names of the horizontal axis with more than two lines enlarge the drawing instead of shrinking the plot area.
         let lines = self.panels.iter().filter(|panel| !panel.x.names.is_empty());
         let lines = lines.map(|panel| panel.below(panel.x.ends([].into_iter()), cell - ROOM).lines());
         height += FONT * (lines.fold(2.0, f64::max) - 2.0);
@@ -90,7 +90,7 @@ impl Chart {
         drawing
     }
 
-    /// The entries in as many columns as fit; gives where the drawing ends.
+    /// Draws the legend in as many columns as fit, and gives the lower end of the drawing.
     fn legend(&self, drawing: &mut Drawing, width: f64, top: f64) -> f64 {
         if self.legend.is_empty() {
             return top;
@@ -134,15 +134,15 @@ impl Panel {
         let values = |which: usize| self.layers.iter().flat_map(move |layer| layer.reach()).map(move |p| p[which]);
         let (mut x_ends, mut y_ends) = (self.x.ends(values(0)), self.y.ends(values(1)));
         let top = y + if titled { FONT * 1.7 } else { 4.0 };
-        // Names on the vertical axis need the room of the longest.
+        // The room left of the plot area fits the longest name of the vertical axis.
         let probe = Scale::new(self.y.clone(), y_ends, [0.0, height]);
         let label = probe.ticks().iter().map(|&tick| width_of(&probe.label(tick), FONT)).fold(0.0, f64::max);
-        // Where that would take most of the width, they stand above their places.
+        // Names that would take most of the width are placed above their ticks.
         let room = height / self.y.names.len().max(1) as f64 > 2.2 * FONT;
         let above = !self.y.names.is_empty() && label > 0.4 * width && room;
         let left = x + if above { 0.0 } else { label } + 7.0 + if self.y.label.is_empty() { 2.0 } else { FONT * 1.6 };
         let mut right = x + width - 7.0;
-        // The number at the end of the horizontal axis stands out by half of itself.
+        // Half of the last label of the horizontal axis extends beyond the plot area.
         let across = Scale::new(self.x.clone(), x_ends, [left, right]);
         let ends = across.ticks().into_iter().map(|tick| across.at(tick) + width_of(&across.label(tick), FONT) / 2.0);
         let beyond = if self.x.names.is_empty() { ends.fold(right, f64::max) - (x + width - 1.0) } else { 0.0 };
@@ -199,8 +199,9 @@ impl Panel {
         drawing.words([left, y + FONT * 1.1], Anchor::Start, Ink::Text, self.title.clone());
     }
 
-    /// How the labels of the horizontal axis stand so that none touches another: names wrapped to the room that each has, or
-    /// upright where a word is too long for that; numbers in levels.
+    /// The arrangement of the labels of the horizontal axis without overlaps.
+    ///
+    /// Names are wrapped, or turned upright if a word is too long; numbers are staggered in levels.
     fn below(&self, ends: [f64; 2], width: f64) -> Below {
         const MAX: usize = 6;
         let scale = Scale::new(self.x.clone(), ends, [0.0, width]);
@@ -219,18 +220,18 @@ impl Panel {
     }
 }
 
-/// How labels stand below an axis.
+/// The arrangement of labels below an axis.
 enum Below {
-    /// In turn on so many levels.
+    /// Numbers, staggered in this many levels.
     Levels(usize),
-    /// Each in lines of its own.
+    /// Names, each wrapped into lines.
     Wrapped(Vec<Vec<String>>),
-    /// Turned by a quarter, the longest so long (pt).
+    /// Names turned by 90°, with the length of the longest (pt).
     Upright(f64),
 }
 
 impl Below {
-    /// How many lines of the font's size they take.
+    /// The height in lines of the font size.
     fn lines(&self) -> f64 {
         match self {
             Self::Levels(levels) => *levels as f64,
@@ -243,7 +244,7 @@ impl Below {
     }
 }
 
-/// The words in lines no wider than `room` (pt), where no word is wider by itself.
+/// A name wrapped into lines of at most `room` (pt); a single longer word exceeds it.
 fn wrapped(name: &str, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in name.split_whitespace() {
@@ -258,7 +259,7 @@ fn wrapped(name: &str, room: f64) -> Vec<String> {
     lines
 }
 
-/// Widens the shorter of both ranges until a metre is as long in both directions.
+/// Widens one of both ranges so that both axes have the same scale.
 fn equalise(x: &mut [f64; 2], y: &mut [f64; 2], aspect: f64) {
     let extend = |ends: &mut [f64; 2], to: f64| {
         let more = (to - (ends[1] - ends[0])).max(0.0) / 2.0;

@@ -1,18 +1,18 @@
-//! Lines, areas and words on a sheet: what every printer of figures can draw.
+//! Drawings: the shapes that every printer of figures supports.
 
-/// A drawing in typographic points (1/72 inch), y downwards.
+/// A drawing in points (1/72 inch), with y downwards.
 #[derive(Debug, Default)]
 pub(crate) struct Drawing {
     pub(crate) size: [f64; 2],
     pub(crate) shapes: Vec<Shape>,
-    /// The same for a sheet half as wide, where this one is as wide as a page: panels below each other.
+    /// A variant of half the width with panels below each other, for drawings as wide as a page.
     pub(crate) narrow: Option<Box<Drawing>>,
 }
 
-/// One thing drawn.
+/// A shape of a drawing.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
-    /// A line through points, or an area.
+    /// A polyline, or an area if it is closed and filled.
     Path {
         points: Vec<[f64; 2]>,
         closed: bool,
@@ -25,7 +25,7 @@ pub(crate) enum Shape {
         fill: Option<Ink>,
         stroke: Option<Stroke>,
     },
-    /// Words; `at` is on the base line.
+    /// A text with its anchor `at` on the baseline.
     Words {
         at: [f64; 2],
         text: String,
@@ -36,39 +36,40 @@ pub(crate) enum Shape {
     },
 }
 
-/// What is drawn with.
+/// The colour of a shape, by its role.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Ink {
-    /// Words and axes: black on white, white on black.
+    /// The colour of text and axes: black on a light page, white on a dark one.
     Text,
-    /// Less important words.
+    /// The colour of less important text.
     Minor,
     Grid,
-    /// A shaded range of reference.
+    /// The colour of a shaded reference range.
     Band,
-    /// One of the colours that the colour-blind tell apart.
+    /// The colour of a series, from a palette safe for colour-blind readers.
     Series(usize),
-    /// The same, as a light area.
+    /// The colour of a light area of a series.
     Light(usize),
-    /// From 0, pale, to 1, dark.
+    /// The colour of a cell of a heat map, from 0 (pale) to 1 (dark).
     Heat(f64),
-    /// The sheet itself.
+    /// The colour of the sheet.
     Paper,
-    /// Words on a cell of a heat map, pale or dark.
+    /// The colour of text on a pale cell of a heat map.
     OnPale,
+    /// The colour of text on a dark cell of a heat map.
     OnDark,
 }
 
-/// How a line is drawn.
+/// The style of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stroke {
     pub(crate) ink: Ink,
     pub(crate) width: f64,
-    /// Which of [`DASHES`].
+    /// The index into [`DASHES`].
     pub(crate) dash: usize,
 }
 
-/// Where words stand relative to their place.
+/// The alignment of a text relative to its anchor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Anchor {
     Start,
@@ -76,15 +77,15 @@ pub(crate) enum Anchor {
     End,
 }
 
-/// Kinds of lines: told apart also in print without colour.
+/// The dash patterns of lines (pt), which are distinguishable in print without colour.
 pub(crate) const DASHES: [&[f64]; 5] = [&[], &[5.0, 2.5], &[1.2, 1.8], &[6.0, 2.0, 1.2, 2.0], &[3.0, 1.5]];
 
-/// Colours that the colour-blind tell apart (Okabe and Ito, 2008), in an order of differing lightness.
+/// The palette of Okabe and Ito (2008), safe for colour-blind readers, ordered so that neighbours differ in lightness.
 pub(crate) const PALETTE: [[u8; 3]; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [86, 180, 233], [230, 159, 0], [90, 90, 90]];
 
 impl Ink {
-    /// Red, green and blue on white paper, 0 to 255.
+    /// The RGB colour on white paper, 0 to 255.
     pub(crate) fn on_white(self) -> [u8; 3] {
         match self {
             Self::Text => [34, 34, 34],
@@ -134,7 +135,7 @@ impl Drawing {
         self.shapes.push(Shape::Words { at, text, size: FONT, anchor: Anchor::Middle, turned: true, ink });
     }
 
-    /// Another shape for every series: circle, square, triangle, diamond, then the same hollow.
+    /// Draws the mark of a series: circle, square, triangle, diamond, then the same shapes hollow.
     pub(crate) fn mark(&mut self, index: usize, [x, y]: [f64; 2], radius: f64) {
         let ink = Ink::Series(index);
         let hollow = index % 8 >= 4;
@@ -154,5 +155,5 @@ impl Drawing {
     }
 }
 
-/// Size of words in figures (pt).
+/// The font size in figures (pt).
 pub(crate) const FONT: f64 = 7.5;

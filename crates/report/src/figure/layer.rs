@@ -1,65 +1,65 @@
-//! What stands between the axes.
+//! The layers of a panel.
 
 use super::{Anchor, Drawing, Ink, Scale, Stroke, drawing::Shape};
 
-/// One kind of mark, for many values.
+/// A layer of a panel: one kind of mark for many values.
 #[derive(Debug, Clone)]
 pub(crate) enum Layer {
     /// A line through points.
     Line { series: usize, points: Vec<[f64; 2]> },
     /// Marks at points.
     Marks { series: usize, points: Vec<[f64; 2]>, radius: f64 },
-    /// Upright bars (x, low, high).
+    /// Vertical error bars (x, low, high).
     Whiskers { series: usize, values: Vec<[f64; 3]> },
-    /// Lying bars (y, low, high).
+    /// Horizontal error bars (y, low, high).
     Spans { series: usize, values: Vec<[f64; 3]> },
-    /// An area between two lines (x, low, high).
+    /// A filled band between two lines (x, low, high).
     Band { series: usize, values: Vec<[f64; 3]> },
-    /// The two lines around such an area (x, low, high).
+    /// The two border lines of a band without filling (x, low, high).
     Edges { series: usize, values: Vec<[f64; 3]> },
-    /// A shaded range of the ordinate over the whole width, and what it is.
+    /// A shaded range of the ordinate over the full width, with a label.
     Range { from: f64, to: f64, note: String },
-    /// A thin grey line and what it is, said at its end.
+    /// A thin grey line with a label at its end.
     Guide { points: Vec<[f64; 2]>, note: String, dash: usize },
-    /// Boxes: x, half width, then the 5, 25, 50, 75, 95 % quantiles.
+    /// Box plots: x and half width, then the 5, 25, 50, 75, 95 % quantiles.
     Boxes { series: usize, values: Vec<([f64; 2], [f64; 5])> },
     /// Columns of a histogram: left, right, height.
     Columns { series: usize, values: Vec<[f64; 3]> },
-    /// A field of coloured cells at whole numbers: x, y, share of the darkest, words.
+    /// Cells of a heat map at integer coordinates: x, y, value from 0 to 1, label.
     Heat { values: Vec<([f64; 3], String)> },
-    /// A thin circle round a place.
+    /// A thin circle round a point.
     Ring { at: [f64; 2], radius: f64 },
-    /// A field of the sheet, lightly coloured.
+    /// A lightly coloured polygon.
     Area { series: usize, points: Vec<[f64; 2]> },
-    /// A thin line between fields.
+    /// A thin line between areas.
     Rule { points: Vec<[f64; 2]>, dash: usize },
-    /// Lines of words beginning, or ending, at a place, below it or above.
+    /// Lines of text that begin, or `end`, at a point, below it or `up` above it.
     Words { at: [f64; 2], end: bool, up: bool, lines: Vec<String> },
 }
 
-/// From one line of words to the next (pt).
+/// The line height of text in a panel (pt).
 const LEADING: f64 = 8.5;
 
-/// The line of a series.
+/// The line style of a series.
 pub(super) fn stroke(series: usize) -> Stroke {
     Stroke { ink: Ink::Series(series), width: 1.1, dash: series % 5 }
 }
 
-/// From this share on white words stand out more from a cell of a heat map than black ones: its luminance is below 0.21.
+/// Minimum value of a heat map cell with white text; its luminance is below 0.21.
 const DARK: f64 = 0.9;
 
 impl Layer {
-    /// Whether there is anything to draw, apart from guides.
+    /// Whether the layer has data; reference ranges do not count.
     pub(crate) fn draws(&self) -> bool {
         self.reach().next().is_some() && !matches!(self, Self::Range { .. })
     }
 
-    /// Whether it lies below the grid.
+    /// Whether the layer is drawn below the grid.
     pub(super) fn below(&self) -> bool {
         matches!(self, Self::Range { .. } | Self::Band { .. } | Self::Columns { .. } | Self::Area { .. })
     }
 
-    /// The points that the axes must hold.
+    /// The points that the axes must cover.
     pub(crate) fn reach(&self) -> Box<dyn Iterator<Item = [f64; 2]> + '_> {
         match self {
             Self::Line { points, .. } | Self::Marks { points, .. } => Box::new(points.iter().copied()),
@@ -81,7 +81,7 @@ impl Layer {
         }
     }
 
-    /// Draws it.
+    /// Draws the layer.
     pub(super) fn draw(&self, drawing: &mut Drawing, x: &Scale, y: &Scale) {
         let place = |[a, b]: [f64; 2]| [x.at(a), y.at(b)];
         match self {
@@ -118,7 +118,7 @@ impl Layer {
             Self::Guide { points, note, dash } => {
                 let seen: Vec<_> = points.iter().filter(|p| y.holds(p[1]) && x.holds(p[0])).copied().collect();
                 drawing.line(seen.iter().copied().map(place), Stroke { ink: Ink::Minor, width: 0.7, dash: *dash });
-                // Before its end: there stand the bars of the last place.
+                // The label is placed before the end of the line, where the bars of the last point are.
                 if let Some(&near) = seen.get((7 * seen.len() / 8).min(seen.len().saturating_sub(1))) {
                     let [a, b] = place(near);
                     drawing.words([a - 2.0, b - 3.0], Anchor::End, Ink::Minor, note.clone());

@@ -1,19 +1,19 @@
-//! Marks drawn into an image, with smooth edges.
+//! Anti-aliased marks on an image.
 
 use super::canvas::Canvas;
 
-/// White.
+/// The colour white.
 pub(super) const WHITE: [u8; 3] = [255; 3];
-/// Black.
+/// The colour black.
 pub(super) const BLACK: [u8; 3] = [0; 3];
-/// Blue that the colour-blind tell from the others.
+/// A blue that colour-blind readers can distinguish from the other colours.
 pub(super) const BLUE: [u8; 3] = [86, 180, 233];
-/// Orange, likewise.
+/// An orange that colour-blind readers can distinguish from the other colours.
 pub(super) const ORANGE: [u8; 3] = [255, 176, 0];
-/// Vermilion, likewise.
+/// A vermilion that colour-blind readers can distinguish from the other colours.
 pub(super) const VERMILION: [u8; 3] = [230, 60, 20];
 
-/// Fills the pixels within `reach` of `centre` where `distance` (px, negative inside) says so.
+/// Paints a shape around `centre`, given by its signed distance (px, negative inside) within `reach`.
 fn paint(image: &mut Canvas, [u, v]: [f64; 2], reach: f64, colour: [u8; 3], distance: impl Fn(f64, f64) -> f64) {
     let bounds = |at: f64, size: u32| {
         let first = (at - reach - 1.0).floor().clamp(0.0, f64::from(size));
@@ -30,31 +30,31 @@ fn paint(image: &mut Canvas, [u, v]: [f64; 2], reach: f64, colour: [u8; 3], dist
     }
 }
 
-/// A filled circle.
+/// Draws a filled circle.
 pub(super) fn disc(image: &mut Canvas, centre: [f64; 2], radius: f64, colour: [u8; 3]) {
     paint(image, centre, radius, colour, |x, y| x.hypot(y) - radius);
 }
 
-/// A circle of this line width.
+/// Draws a circle with a line width.
 pub(super) fn ring(image: &mut Canvas, centre: [f64; 2], radius: f64, width: f64, colour: [u8; 3]) {
     paint(image, centre, radius + width, colour, |x, y| (x.hypot(y) - radius).abs() - width / 2.0);
 }
 
-/// A plus sign with arms of this length.
+/// Draws a plus sign with arms of length `arm`.
 pub(super) fn plus(image: &mut Canvas, centre: [f64; 2], arm: f64, width: f64, colour: [u8; 3]) {
     let bar = |along: f64, across: f64| (along.abs() - arm).max(across.abs() - width / 2.0);
     paint(image, centre, arm, colour, |x, y| bar(x, y).min(bar(y, x)));
 }
 
-/// The outline of a rectangle with these half sides.
+/// Draws the outline of a rectangle with half sides `a` and `b`.
 pub(super) fn frame(image: &mut Canvas, centre: [f64; 2], [a, b]: [f64; 2], width: f64, colour: [u8; 3]) {
     let inside = |x: f64, y: f64| (x.abs() - a).max(y.abs() - b);
     paint(image, centre, a.max(b) + width, colour, |x, y| inside(x, y).abs() - width / 2.0);
 }
 
-/// A digit from 0 to 9 of this half height, as lines of even width.
+/// Draws a digit from 0 to 9 of half height `half`, in lines of constant width.
 pub(super) fn digit(image: &mut Canvas, centre: [f64; 2], digit: usize, half: f64, colour: [u8; 3]) {
-    // Lines between the corners of a grid of 3 × 5: (x, y) from −1 to 1 and from −2 to 2.
+    // The strokes on a grid of 3 × 5 points: x from −1 to 1, y from −2 to 2.
     const LINES: [&[[[f64; 2]; 2]]; 10] = [
         &[
             [[-1.0, -2.0], [1.0, -2.0]],

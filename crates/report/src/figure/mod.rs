@@ -1,4 +1,4 @@
-//! Figures.
+//! Figures: charts, drawings and pictures with marks.
 
 mod axis;
 mod canvas;

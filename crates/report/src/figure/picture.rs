@@ -1,4 +1,4 @@
-//! Both images of one frame with what was found in them, in the manner of the paper's Figures 7 to 9.
+//! Pictures of a frame with its identified points, like Figures 7 to 9 of the paper.
 
 use std::collections::BTreeSet;
 
@@ -11,25 +11,28 @@ use super::{
 };
 use crate::{ReportError, place::matrix, run::Trial};
 
-/// Columns between the two images.
+/// The gap between the two images (px).
 const GAP: u32 = 8;
-/// A shell holds the truth with 99 %: χ² with three degrees of freedom is below 11.34.
+/// The half size of a gate in standard deviations, √11.34.
+///
+/// 11.34 is the 99 % quantile of χ² with three degrees of freedom.
 const GATE: f64 = 3.368;
 
-/// The picture of one frame.
+/// The picture of a frame.
 #[derive(Debug)]
 pub(crate) struct Marked {
     canvas: Canvas,
     pub(crate) frame: u64,
     pub(crate) stamp_ns: u64,
-    /// Key points of the left image, points of the cloud, candidates, identified, used.
+    /// The counts of key points in the left image, cloud points, candidates, identified points and used points.
     pub(crate) counts: [usize; 5],
-    /// The targets that were fixed.
+    /// The targets with a fix.
     pub(crate) objects: Vec<String>,
 }
 
-/// The pictures of the frames of `trial` with these stamps, in the order of the log, as far as it has their images. The log
-/// is read to the last of them.
+/// The pictures of the frames of `trial` with these stamps, in the order of the log.
+///
+/// Frames without images are skipped. The log is read up to the last stamp.
 pub(crate) fn draw(trial: &Trial, stamps: &[u64]) -> Result<Vec<Marked>, ReportError> {
     let mut wanted: BTreeSet<u64> = stamps.iter().copied().collect();
     let mut pictures: Vec<Marked> = Vec::new();
@@ -103,12 +106,12 @@ impl Marked {
         }
     }
 
-    /// Columns and rows at this scale.
+    /// The width and height (px) at a scale.
     pub(crate) fn size(&self, scale: f64) -> [u32; 2] {
         [self.canvas.width, self.canvas.height].map(|side| ((f64::from(side) * scale).round() as u32).max(1))
     }
 
-    /// The file, at this scale and quality: marks stay sharp, a page with it can be sent by mail.
+    /// The JPEG file at a scale and quality.
     pub(crate) fn jpeg(&self, scale: f64, quality: u8) -> Vec<u8> {
         if scale >= 1.0 {
             return self.canvas.jpeg(quality);
@@ -118,8 +121,9 @@ impl Marked {
     }
 }
 
-/// The shells of the points that have candidates, as both images see them: where the rough pose expects each point, and
-/// how far off it may be (px).
+/// The gates of the model points with candidates, in both images.
+///
+/// Each has its centre by the prior pose and its half size (px).
 fn gates(header: &TrialHeader, frame: &FrameRecord, offset: f64) -> Vec<([f64; 2], [f64; 2])> {
     let (Some(prior), Some(position)) = (&frame.prior, header.prior_position_sigma) else { return Vec::new() };
     let attitude = header.prior_attitude_sigma.unwrap_or(0.0);
@@ -145,7 +149,7 @@ fn gates(header: &TrialHeader, frame: &FrameRecord, offset: f64) -> Vec<([f64; 2
     gates
 }
 
-/// Where a camera without distortion sees a cube of this half width.
+/// The projection of a cube by an undistorted camera: centre and half sizes (px).
 fn seen(camera: &CameraRecord, at: Point3<f64>, half: f64, offset: f64) -> Option<([f64; 2], [f64; 2])> {
     let k = camera.matrix;
     let inside = at.z > 2.0 * half.max(0.05);
@@ -155,7 +159,7 @@ fn seen(camera: &CameraRecord, at: Point3<f64>, half: f64, offset: f64) -> Optio
     })
 }
 
-/// A thumbnail as large as the camera's image, so that marks lie where they belong.
+/// A thumbnail enlarged to the size of the camera's image, so that marks are placed correctly.
 fn full(image: &GreyImage, [width, height]: [u32; 2]) -> GreyImage {
     if [image.width, image.height] == [width, height] {
         return image.clone();

@@ -1,9 +1,9 @@
-//! The run as an entry of a bibliography.
+//! A run as a BibTeX entry.
 
 use super::latex::escape;
 use crate::run::Run;
 
-/// One `@misc` entry.
+/// The `@misc` entry of a run.
 pub(crate) fn bibtex(run: &Run) -> String {
     let header = run.header();
     let key: String = header.run.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();

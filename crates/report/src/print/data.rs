@@ -1,4 +1,4 @@
-//! Tables as CSV and JSON: what others compute with.
+//! Tables as CSV and JSON, for further computation.
 
 use serde_json::{Value, json};
 
@@ -7,10 +7,12 @@ use crate::{
     print::unicode::harmless,
 };
 
-/// The cells as they are printed, one line each; a number under its head alone, never with its unit.
+/// A table as CSV, one line for every line of the table.
+///
+/// A number has all its digits and no unit.
 pub(crate) fn csv(table: &Table) -> String {
     let mut out = line(table.names().iter().map(String::as_str));
-    // A first cell that is left empty says what the one above it says.
+    // An empty first cell repeats the one above.
     let mut above = String::new();
     for row in &table.lines {
         let mut cells: Vec<String> = Vec::new();
@@ -30,14 +32,14 @@ pub(crate) fn csv(table: &Table) -> String {
     out
 }
 
-/// A lone number with every digit it has; other cells as they read.
+/// A single number with all its digits; other cells as printed.
 fn printed(cell: &Cell) -> String {
     match &cell.text[..] {
         [span] => match span.number() {
             Some(number) => number.value.map_or_else(String::new, |value| value.to_string()),
             None => cell.plain(),
         },
-        // Several numbers: as they read, with the minus that programs know.
+        // Several numbers are printed as text, with an ASCII minus.
         spans if spans.iter().any(|span| span.number().is_some()) => cell.plain().replace('\u{2212}', "-"),
         _ => cell.plain(),
     }
@@ -47,7 +49,9 @@ fn line<'a>(fields: impl Iterator<Item = &'a str>) -> String {
     fields.map(field).collect::<Vec<_>>().join(",") + "\n"
 }
 
-/// A field, quoted where it must be; a spreadsheet shall not take a name for a formula.
+/// A CSV field, quoted if necessary.
+///
+/// It is guarded so that spreadsheets do not interpret a name as a formula.
 pub(crate) fn field(text: &str) -> String {
     let text = harmless(text);
     let number = text.parse::<f64>().is_ok();
@@ -56,7 +60,7 @@ pub(crate) fn field(text: &str) -> String {
     if formula || text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
 
-/// The same with keys: `{id, caption, columns, rows: [[{text, value, key} | text, …], …]}`.
+/// A table as JSON with keys: `{id, caption, columns, rows: [[{text, value, key} | text, …], …]}`.
 pub(crate) fn json(table: &Table) -> String {
     let rows: Vec<Value> = table.lines.iter().map(|row| row.cells.iter().map(cell).collect()).collect();
     let value = json!({

@@ -1,10 +1,10 @@
-//! The fonts that papers and figures are set in: subsets of Liberation, metrically those of Times, Helvetica, Courier.
+//! The fonts of reports and figures: subsets of Liberation, metrically equal to Times, Helvetica and Courier.
 
 use std::sync::LazyLock;
 
 use ttf_parser::{Face, GlyphId};
 
-/// One of the faces.
+/// A font face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Font {
     Regular,
@@ -14,7 +14,7 @@ pub(crate) enum Font {
     Sans,
 }
 
-/// A face with what typesetting asks of it.
+/// A loaded font face.
 pub(crate) struct Loaded {
     pub(crate) name: &'static str,
     pub(crate) bytes: &'static [u8],
@@ -25,7 +25,7 @@ pub(crate) struct Loaded {
 impl Font {
     pub(crate) const ALL: [Self; 5] = [Self::Regular, Self::Italic, Self::Bold, Self::Mono, Self::Sans];
 
-    /// The face itself.
+    /// The loaded face.
     pub(crate) fn loaded(self) -> &'static Loaded {
         static FACES: LazyLock<[Loaded; 5]> = LazyLock::new(|| Font::ALL.map(load));
         &FACES[self as usize]
@@ -46,30 +46,30 @@ fn load(font: Font) -> Loaded {
         Font::Mono => ("SeafixMono-Regular", include_bytes!("../../fonts/seafix-mono-regular.ttf")),
         Font::Sans => ("SeafixSans-Regular", include_bytes!("../../fonts/seafix-sans-regular.ttf")),
     };
-    let face = Face::parse(bytes, 0).expect("the fonts in the program are whole");
+    let face = Face::parse(bytes, 0).expect("the embedded fonts are valid");
     let em = f64::from(face.units_per_em());
     Loaded { name, bytes, face, em }
 }
 
 impl Loaded {
-    /// The glyph of a character; a question mark's for one that the font lacks.
+    /// The glyph of a character, or of a question mark if the font lacks it.
     pub(crate) fn glyph(&self, c: char) -> u16 {
         let glyph = |c| self.face.glyph_index(c).map(|glyph| glyph.0);
         glyph(c).or_else(|| glyph('?')).unwrap_or(0)
     }
 
-    /// How far a glyph advances, in ems.
+    /// The advance of a glyph (em).
     pub(crate) fn advance(&self, glyph: u16) -> f64 {
         f64::from(self.face.glyph_hor_advance(GlyphId(glyph)).unwrap_or(0)) / self.em
     }
 
-    /// Font units in thousandths of an em.
+    /// A length in font units, converted to thousandths of an em.
     pub(crate) fn thousandths(&self, units: i16) -> f32 {
         (f64::from(units) * 1000.0 / self.em) as f32
     }
 }
 
-/// The advance of words in a figure (pt).
+/// The advance of a text in a figure (pt).
 pub(crate) fn width_of(text: &str, size: f64) -> f64 {
     Font::Sans.width(text, size)
 }

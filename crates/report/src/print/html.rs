@@ -1,4 +1,4 @@
-//! A paper as one page of HTML: inline style, inline drawings, pictures as data, no scripts, nothing from elsewhere.
+//! A report as one self-contained HTML page: inline style, drawings and pictures, no scripts, no external resources.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
@@ -9,12 +9,14 @@ use crate::{
     document::{Block, Cell, Document, Figure, Picture, Span, Table},
 };
 
-/// Where a page says with which forms it was written.
+/// The name of the meta element that records the forms of a report.
 pub(crate) const FORMS: &str = "seafix-forms";
 
-/// The whole page; a small one names faces of the same widths instead of holding the face of its figures. It says with which
-/// other forms it was written, so that a form that is gone is missed. Every name out of the logs is escaped by the macro that
-/// writes it, or by [`svg::escape`].
+/// The complete page.
+///
+/// A small page names fonts of the same widths instead of embedding the font of its figures. The page records the forms
+/// of the report, so that verification can detect a missing form. Names from the logs are escaped by the macro, or by
+/// [`svg::escape`].
 pub(crate) fn html(document: &Document, forms: Forms) -> String {
     let page = markup! {
         (DOCTYPE)
@@ -25,7 +27,7 @@ pub(crate) fn html(document: &Document, forms: Forms) -> String {
                 meta name="color-scheme" content="light dark";
                 meta name="generator" content={ "seafix-report " (env!("CARGO_PKG_VERSION")) };
                 meta name=(FORMS) content=(forms.words());
-                // Without an icon of its own a browser asks the server for one.
+                // An empty icon, because browsers otherwise request one from the server.
                 link rel="icon" href="data:,";
                 title { (plain(&document.title)) }
                 style { (PreEscaped(include_str!("style.css"))) (PreEscaped(font(!forms.small))) (PreEscaped(svg::style())) }
@@ -45,14 +47,16 @@ pub(crate) fn html(document: &Document, forms: Forms) -> String {
                         @for block in &section.blocks { (self::block(block)) }
                     }
                 }
-                footer { "Made by seafix-report " (env!("CARGO_PKG_VERSION")) " from the logs alone. Point at a number to see where it comes from; " code { "seafix report --verify" } " computes it again." }
+                footer { "Made by seafix-report " (env!("CARGO_PKG_VERSION")) " from the logs alone. Hover over a number to see its key; " code { "seafix report --verify" } " computes it again." }
             }
         }
     };
     page.into_string()
 }
 
-/// The face of the figures, so that their words are as wide everywhere as they were measured; or the names of its likes.
+/// The style with the font of the figures, embedded or by name.
+///
+/// An embedded font gives text the measured width everywhere; a small page has names of fonts with the same widths.
 fn font(embedded: bool) -> String {
     if !embedded {
         return "svg{font-family:\"Liberation Sans\",Arimo,Helvetica,Arial,sans-serif}".to_owned();
@@ -102,13 +106,13 @@ fn spans(text: &[Span]) -> Markup {
     }
 }
 
-/// A number carries what it is and where it comes from.
+/// A number with its key as the tooltip.
 fn number(number: &Number) -> Markup {
     let value = number.value.map_or_else(String::new, |value| value.to_string());
     markup! { data value=(value) title=(number.key.to_string()) { (number.text) } }
 }
 
-/// Text without characters that hide themselves.
+/// A text without invisible characters.
 fn plain(text: &str) -> String {
     super::unicode::harmless(text)
 }
@@ -147,13 +151,13 @@ fn table(table: &Table) -> Markup {
     }
 }
 
-/// Whether a table takes more than the width of the text.
+/// Whether a table is wider than the text.
 fn wide(table: &Table) -> bool {
     table.columns() > 7
 }
 
 fn cells(table: &Table, cells: &[Cell]) -> Markup {
-    // On a narrow sheet every line of a wide table stands by itself, each cell below the name of its column.
+    // On a narrow screen every line of a wide table becomes a block, with the column name above each cell.
     let names = if wide(table) { table.names() } else { Vec::new() };
     let mut next = 0;
     let mut place = |cell: &Cell| {

@@ -1,16 +1,16 @@
-//! A paper as LaTeX source for `article` with `booktabs` and `graphicx`, nothing else.
+//! A report as LaTeX source for `article` with only `booktabs` and `graphicx`.
 
 use std::fmt::Write;
 
 use super::unicode::harmless;
 use crate::document::{Block, Cell, Document, Figure, Picture, Span, Table};
 
-/// Lines of a table that fit on a page; longer tables go on in another.
+/// Maximum number of lines of a table on a page; longer tables are split.
 const LINES: usize = 42;
-/// Signs a line of a listing may have.
+/// Maximum number of characters in a line of a listing.
 const SIGNS: usize = 96;
 
-/// The source; figures are `figures/<id>.pdf` and pictures `<id>.jpg` beside it.
+/// The LaTeX source, which refers to figures `figures/<id>.pdf` and pictures `<id>.jpg`.
 pub(crate) fn latex(document: &Document) -> String {
     let mut out = String::from(PREAMBLE);
     // Writing to a string does not fail.
@@ -177,7 +177,7 @@ fn listing(title: &str, text: &str) -> String {
     out + "}\n\n"
 }
 
-/// A name that may be broken after its separators.
+/// A name with possible line breaks after its separators.
 fn breakable(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars() {
@@ -189,7 +189,7 @@ fn breakable(text: &str) -> String {
     out
 }
 
-/// Text as LaTeX prints it, with nothing left that it could take for a command.
+/// A text with all special characters of LaTeX escaped.
 pub(super) fn escape(text: &str) -> String {
     let mut out = String::new();
     for c in harmless(text).chars() {
@@ -205,7 +205,7 @@ pub(super) fn escape(text: &str) -> String {
             '>' => out += "\\ensuremath{>}",
             '|' => out += "\\ensuremath{|}",
             '"' => out += "\\textquotedbl{}",
-            // Hyphens and quotes that would join stand apart.
+            // An empty group prevents ligatures of hyphens and quotes.
             '-' => out += "-{}",
             '\'' => out += "'{}",
             '`' => out += "`{}",
@@ -214,11 +214,11 @@ pub(super) fn escape(text: &str) -> String {
             c => out += symbol(c),
         }
     }
-    // OT1 has no such sign.
+    // The encoding OT1 has no straight double quote.
     out.replace("\\textquotedbl{}", "''{}")
 }
 
-/// What pdflatex with its own fonts can print beyond ASCII.
+/// The LaTeX command for a character beyond ASCII that pdflatex's fonts contain; `?` for others.
 fn symbol(c: char) -> &'static str {
     match c {
         '\u{a0}' | '\u{2009}' | '\u{202f}' => "~",

@@ -1,8 +1,8 @@
-//! Running text as Markdown.
+//! Formatted text as Markdown.
 
 use crate::document::Span;
 
-/// `text` with its emphasis; what Markdown would read as its own is escaped.
+/// `text` as Markdown with its emphasis; special characters are escaped.
 pub(crate) fn markdown(text: &[Span]) -> String {
     text.iter()
         .map(|span| {
@@ -17,7 +17,7 @@ pub(crate) fn markdown(text: &[Span]) -> String {
         .collect()
 }
 
-/// Names in Markdown are text, never markup.
+/// A text with all special characters of Markdown escaped.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::new();
     for c in super::unicode::harmless(text).chars() {

@@ -1,4 +1,4 @@
-//! One paper, several printers. None of them knows what a report is about.
+//! Printers of a report: HTML, LaTeX, PDF, SVG, CSV, JSON, Markdown and BibTeX. They do not depend on its content.
 
 mod bibtex;
 mod data;

@@ -1,24 +1,24 @@
-//! Drawings as SVG: inside a page, whose style colours them, and as files by themselves.
+//! Drawings as SVG: inside a page, coloured by its style, and as standalone files.
 
 use std::fmt::Write;
 
 use crate::figure::{Anchor, DASHES, Drawing, Ink, Shape, Stroke};
 
-/// Whether colours stand in the drawing, or as classes that a style of the page colours.
+/// The colouring of a drawing: literal colours, or classes coloured by the style of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Colours {
     Fixed,
     Classes,
 }
 
-/// A file by itself, in millimetres.
+/// A standalone SVG file, with its size in millimetres.
 pub(crate) fn standalone(drawing: &Drawing) -> String {
     let [width, height] = drawing.size.map(|points| points * 25.4 / 72.0);
     let size = format!("width=\"{}mm\" height=\"{}mm\"", c(width), c(height));
     format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{}\n", svg(drawing, &size, Colours::Fixed))
 }
 
-/// A part of a page.
+/// An inline SVG element of a page.
 pub(super) fn inline(drawing: &Drawing, class: &str) -> String {
     let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
     svg(drawing, &format!("role=\"img\"{class}"), Colours::Classes)
@@ -38,7 +38,7 @@ fn svg(drawing: &Drawing, attributes: &str, colours: Colours) -> String {
     out + "</svg>"
 }
 
-/// Two decimals, without needless zeros: the same text on every machine.
+/// A coordinate with two decimals and no trailing zeros, the same on every machine.
 fn c(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -107,7 +107,7 @@ fn paint(fill: Option<Ink>, stroke: Option<Stroke>, colours: Colours) -> String 
     attributes
 }
 
-/// The class of an ink whose colour depends on the page being light or dark.
+/// The class of an ink whose colour differs between light and dark pages.
 fn class(ink: Ink, of: &str) -> Option<String> {
     Some(match ink {
         Ink::Text => format!("{of}t"),
@@ -126,7 +126,7 @@ fn hex(ink: Ink) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// The style that colours the classes, light and dark.
+/// The style of the classes for light and dark pages.
 pub(super) fn style() -> String {
     let rules = |dark: bool| {
         let mut inks = vec![Ink::Text, Ink::Minor, Ink::Grid, Ink::Band, Ink::Paper];
@@ -144,7 +144,7 @@ pub(super) fn style() -> String {
     format!("{}@media screen and (prefers-color-scheme: dark){{{}}}", rules(false), rules(true))
 }
 
-/// Colours on a dark page: lighter, so that they stand out as much.
+/// The colour on a dark page, lighter for equal contrast.
 fn on_black(ink: Ink) -> [u8; 3] {
     use crate::figure::{PALETTE, mix};
     let sheet = [21, 23, 26];
@@ -161,7 +161,7 @@ fn on_black(ink: Ink) -> [u8; 3] {
     }
 }
 
-/// Text inside of elements and attributes.
+/// A text escaped for elements and attributes.
 pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

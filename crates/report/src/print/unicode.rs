@@ -1,6 +1,6 @@
-//! What a person may read as another thing than it is.
+//! Removal of invisible and misleading characters.
 
-/// Text without characters that move the cursor, hide themselves, or turn the direction of reading.
+/// A text without control characters, invisible characters and changes of the writing direction.
 pub(crate) fn harmless(text: &str) -> String {
     text.chars().map(|c| if hidden(c) { '\u{fffd}' } else { c }).collect()
 }

@@ -1,4 +1,4 @@
-//! What a key says, by the definitions.
+//! The evaluation of keys from the logs, by the definitions of their quantities.
 
 use std::{collections::BTreeMap, rc::Rc};
 
@@ -17,14 +17,14 @@ use crate::{
     proportion,
 };
 
-/// The value of a key, or why there is none.
+/// The value of a key, `None` for a dash, or the reason why it cannot be computed.
 type Answer = Result<Option<f64>, String>;
 
-/// Computes what `key` says.
+/// Computes the value of `key`.
 pub(super) fn evaluate(key: &Key, logs: &mut Logs) -> Result<Answer, ReportError> {
     for name in &key.logs {
         if logs.get(name)?.is_none() {
-            return Ok(Err(format!("there is no log {name}")));
+            return Ok(Err(format!("the log {name} is missing")));
         }
     }
     let mut all: Vec<&Log> = Vec::new();
@@ -32,14 +32,14 @@ pub(super) fn evaluate(key: &Key, logs: &mut Logs) -> Result<Answer, ReportError
     for name in &key.logs {
         all.extend(logs.known(name));
     }
-    Ok(answer(&key.what, key.span, &all).ok_or_else(|| format!("nobody knows what `{}` is", key.what)))
+    Ok(answer(&key.what, key.span, &all).ok_or_else(|| format!("unknown quantity `{}`", key.what)))
 }
 
 fn rows(log: &Log, span: [u64; 2]) -> impl Iterator<Item = &Row> {
     log.sample(span).flat_map(|frame| &frame.rows)
 }
 
-/// `Some(None)`: a dash.
+/// The value of a quantity: `None` if it is unknown, `Some(None)` for a dash.
 fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     let (what, scale) = match what {
         _ if what.ends_with(" in mm") => (what.trim_end_matches(" in mm"), 1e3),
@@ -114,7 +114,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         ("count", group) => Some(pooled(logs, group, span)? as f64),
         ("percent" | "low" | "high", group) => fraction_of(first, group, scale, span, logs)?,
         ("sum", fields) => {
-            // Only fixes have pairs that are known to be correct.
+            // Correct pairs are known for fixes only.
             let (above, below) = fields.split_once(" by ")?;
             let (below, fixes) = below.strip_suffix(" of fixes").map_or((below, false), |below| (below, true));
             let (above, below) = (Field::named(above)?, Field::named(below)?);
@@ -169,7 +169,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     })
 }
 
-/// `NAME QUANTITY at the point OBJECT/POINT`: over the frames that have the point in view.
+/// The value of `NAME QUANTITY at the point OBJECT/POINT`, over the frames with the point in view.
 fn poi(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let own = log.sample(span).flat_map(|frame| &frame.poi).filter(|seen| points_of_interest::name(seen) == point);
     if (name, quantity) == ("count", "views") {
@@ -179,7 +179,7 @@ fn poi(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Op
     statistic(name, own.filter_map(|seen| quantity.of(seen)).collect())
 }
 
-/// `count GROUP on the object NAME`, `NAME FIELD of found on the object NAME`.
+/// The value of `count GROUP on the object NAME` or `NAME FIELD of found on the object NAME`.
 fn on_object(name: &str, of: &str, object: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let own = || rows(log, span).filter(|row| row.record.object == object);
     let is: fn(&TargetRecord) -> bool = match of {
@@ -207,7 +207,7 @@ fn error(row: &TargetRecord, field: Field) -> f64 {
     if found(row) { field.of(row).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
 }
 
-/// Something about the teeth of the saw.
+/// The value of a quantity of fix intervals: `count`, `seconds`, `path-length`, drift or amplitude.
 fn toothed(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let steps = log.sample(span).filter(|frame| frame.navigation.is_some()).map(|frame| frame.step.as_ref());
     let fix_intervals = fix_intervals(steps);
@@ -228,7 +228,9 @@ fn toothed(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     })
 }
 
-/// The area under recall up to `bound`, in percent, step by step of the curve; nothing where a fix has no error.
+/// The area under the recall curve up to `bound` (%), summed over its steps.
+///
+/// The result is `None` where a fix has no error.
 fn area<'a>(attempts: impl Iterator<Item = &'a TargetRecord>, field: Field, bound: f64) -> Option<f64> {
     let attempts: Vec<&TargetRecord> = attempts.collect();
     if attempts.is_empty() || attempts.iter().any(|row| found(row) && field.of(row).is_none()) {
@@ -274,7 +276,7 @@ fn statistic(name: &str, mut values: Vec<f64>) -> Option<Option<f64>> {
     })
 }
 
-/// How many there are of `group`, in all logs together.
+/// The number of attempts or frames of `group` in all logs together.
 fn pooled(logs: &[&Log], group: &str, span: [u64; 2]) -> Option<usize> {
     logs.iter().map(|log| counted(log, group, span)).sum()
 }
@@ -329,7 +331,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
     })
 }
 
-/// Whether a fix is in a region, by the region's definition.
+/// Whether a fix is in a region of the Stanford diagram, by the region's definition.
 fn inside(region: Region, row: &TargetRecord) -> bool {
     let values = [Field::Position, Field::Level, Field::Limit].map(|field| field.of(row));
     let [Some(e), p, Some(a)] = values.map(|value| value.filter(|_| row.outcome == Outcome::Fix)) else {
@@ -346,7 +348,7 @@ fn inside(region: Region, row: &TargetRecord) -> bool {
     }
 }
 
-/// A share of attempts in percent, or an end of its interval.
+/// The fraction of a group (%), among attempts or fixes, or an end of its interval.
 fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     let fixes = group.strip_suffix(" of fixes");
     let group = fixes.or_else(|| group.strip_suffix(" of attempted"))?;
@@ -369,7 +371,7 @@ fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Lo
         }
         let errors: Vec<f64> = all().map(|row| error(&row.record, field)).collect();
         if which != "percent" {
-            // An end of a band follows from those of the other bounds.
+            // An end of a band depends on the intervals at all bounds.
             let at = proportion::bounds().position(|(_, known)| known == bound)?;
             let (low, high) = proportion::band(trajectory, &errors)[at];
             return Some((!errors.is_empty()).then_some(100.0 * if which == "low" { low } else { high }));
@@ -396,19 +398,19 @@ fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Lo
     Some((n > 0).then_some(value))
 }
 
-/// `nees from A to B of found`.
+/// A column of the NEES histogram: the value of `nees from A to B of found`.
 fn histogram(which: &str, range: &str, span: [u64; 2], logs: &[&Log]) -> Option<f64> {
     let (from, to) = range.strip_prefix("nees from ")?.strip_suffix(" of found")?.split_once(" to ")?;
     let (from, to): (f64, f64) = (from.parse().ok()?, to.parse().ok()?);
     let found = logs.iter().flat_map(|log| rows(log, span)).filter(|row| found(&row.record));
     let all: Vec<f64> = found.filter_map(|row| row.record.evaluation.nees).collect();
     let inside = all.iter().filter(|nees| **nees >= from && **nees < to).count();
-    // The last column is as wide as all others in the drawing.
+    // The last column is plotted with the width of the others.
     let width = if to.is_finite() { to - from } else { 1.5 };
     Some(if which == "count" { inside as f64 } else { inside as f64 / all.len() as f64 / width })
 }
 
-/// Root mean squares over all frames, logged or not.
+/// RMS errors, bounds and NEES over all frames, logged or not.
 fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
     let totals = log.totals.as_ref()?;
     let rms = |squares: f64| (squares / totals.judged as f64).sqrt();
@@ -428,7 +430,7 @@ fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
     }))
 }
 
-/// `FIELD of OBJECT at FRAME`.
+/// The value of `FIELD of OBJECT at FRAME`.
 fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let (field, rest) = of.split_once(" of ")?;
     let (object, number) = rest.rsplit_once(" at ")?;
@@ -442,7 +444,7 @@ fn single(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     Some(value(row, field))
 }
 
-/// `truth of  at FRAME`, `fix of OBJECT at FRAME`: one coordinate.
+/// One coordinate of `truth of  at FRAME` or `fix of OBJECT at FRAME`.
 fn located(axis: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let axis = ["place-x", "place-y", "place-z"].iter().position(|name| *name == axis)?;
     let (what, rest) = of.split_once(" of ")?;
@@ -456,7 +458,7 @@ fn located(axis: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64
     })
 }
 
-/// Something about paired logs: first and second in turn.
+/// A statistic of paired logs, first and second alternating.
 fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Option<f64>> {
     let conditions = over.starts_with("conditions");
     if what == "holm" {
@@ -465,7 +467,7 @@ fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Opt
         return Some(holm(&raw.collect::<Vec<_>>()).first().copied());
     }
     if what == "margin" {
-        // The greatest that an end of the 90 % interval is off.
+        // The larger absolute end of the 90 % interval.
         let pairs = if conditions { medians(logs, span) } else { errors(logs[0], logs[1], span) };
         let margin = Statistics::margin(&pairs, conditions);
         return Some(Some(if conditions { margin.exp() } else { margin * 1e3 }));
@@ -486,7 +488,7 @@ fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Opt
     }))
 }
 
-/// How many pairs there are and what they say; resampled once for all numbers of a comparison.
+/// The number of pairs and their statistics, resampled once for all numbers of a comparison.
 fn once(logs: &[&Log], span: [u64; 2], conditions: bool) -> Rc<(usize, Statistics)> {
     let trials: Vec<&str> = logs.iter().map(|log| log.header.trial.as_str()).collect();
     let name = format!("{conditions} {span:?} {trials:?}");
@@ -508,7 +510,7 @@ fn errors(first: &Log, second: &Log, span: [u64; 2]) -> Vec<(f64, f64)> {
     of(first).into_iter().filter_map(|(key, error)| Some((error, *second.get(&key)?))).collect()
 }
 
-/// The logarithms of the medians over all attempts.
+/// The logarithms of the median TRE over all attempts, by pairs of logs.
 fn medians(logs: &[&Log], span: [u64; 2]) -> Vec<(f64, f64)> {
     let of = |log: &Log| {
         let all = answer("all tre_rms of attempted", span, &[log]).flatten();

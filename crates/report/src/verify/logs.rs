@@ -1,4 +1,4 @@
-//! The logs that keys name, read once each.
+//! The logs of a run for verification, each read once.
 
 use std::{
     cell::RefCell,
@@ -19,48 +19,48 @@ use crate::{
     place,
 };
 
-/// The logs of a run.
+/// The logs of a run that have been read.
 pub(super) struct Logs {
     folder: PathBuf,
     read: HashMap<String, Log>,
 }
 
-/// One log: its records without clouds, candidates and images.
+/// A log without clouds, candidates and images.
 pub(super) struct Log {
     pub(super) header: TrialHeader,
     pub(super) frames: Vec<Seen>,
     pub(super) totals: Option<Totals>,
-    /// Squared errors of disparities, and how many.
+    /// The sum of the squared disparity errors (px²), and their number.
     pub(super) disparity: (f64, usize),
-    /// Comparisons that begin with this log, by what they are over: a table prints many numbers of each.
+    /// The comparisons that begin with this log, cached because a table prints many numbers of each.
     pub(super) compared: RefCell<HashMap<String, Rc<(usize, Statistics)>>>,
 }
 
-/// One frame.
+/// A frame of a log.
 pub(super) struct Seen {
     pub(super) number: u64,
     pub(super) stamp_ns: u64,
     pub(super) times: FrameTimes,
     pub(super) truth: Option<[f64; 3]>,
     pub(super) navigation: Option<Box<NavigationRecord>>,
-    /// Where the navigated pose and the first fix carried by odometry put the camera in the world.
+    /// The camera positions in the world (m), navigated and by odometry only from the first fix.
     pub(super) carried: [[f64; 3]; 2],
-    /// What it says of the growth of the error between fixes.
+    /// The pose error for fix intervals.
     pub(super) step: Option<Step>,
     pub(super) poi: Vec<PointOfInterest>,
-    /// Key points, points, candidates, identified, used.
+    /// The counts of key points, cloud points, candidates, identified points, used points.
     pub(super) marks: [usize; 5],
     pub(super) rows: Vec<Row>,
 }
 
-/// One attempt.
+/// An attempt.
 pub(super) struct Row {
     pub(super) record: TargetRecord,
-    /// How many candidates its points have together.
+    /// The number of candidates of all model points together.
     pub(super) candidates: usize,
-    /// Where it puts the camera.
+    /// The camera position in the world by the fix (m).
     pub(super) at: [f64; 3],
-    /// Its error at each of the lever arms; NaN where unknown.
+    /// The error at each lever arm (m); NaN where unknown.
     pub(super) arms: [f64; 3],
 }
 
@@ -69,10 +69,10 @@ impl Logs {
         Self { folder: folder.to_owned(), read: HashMap::new() }
     }
 
-    /// The log of this name; `None` where the folder has no such file.
+    /// The log of this name, read if necessary; `None` if the folder has no such file.
     pub(super) fn get(&mut self, name: &str) -> Result<Option<&Log>, ReportError> {
         if !self.read.contains_key(name) {
-            // A key names a file of this folder, never one elsewhere.
+            // A key may name files of this folder only.
             if name.contains(['/', '\\']) || !self.folder.join(name).is_file() {
                 return Ok(None);
             }
@@ -83,7 +83,7 @@ impl Logs {
 }
 
 impl Logs {
-    /// The log of this name, where it has been read.
+    /// The log of this name, if it has been read.
     pub(super) fn known(&self, name: &str) -> Option<&Log> {
         self.read.get(name)
     }
@@ -146,20 +146,24 @@ impl Log {
         Ok(Self { header, frames, totals, disparity, compared: RefCell::default() })
     }
 
-    /// The frames of this stamp; stamps do not decrease.
+    /// The frames with this stamp, by binary search: stamps never decrease.
     pub(super) fn at(&self, stamp_ns: u64) -> impl Iterator<Item = &Seen> {
         let first = self.frames.partition_point(|frame| frame.stamp_ns < stamp_ns);
         self.frames[first..].iter().take_while(move |frame| frame.stamp_ns == stamp_ns)
     }
 
-    /// The frames that were logged whatever came of them, within the stamps.
+    /// The frames within the stamps that are logged for any outcome.
+    ///
+    /// Their numbers are multiples of the decimation factor.
     pub(super) fn sample(&self, [from, to]: [u64; 2]) -> impl Iterator<Item = &Seen> {
         let every = self.totals.as_ref().map_or(1, |totals| totals.every.max(1));
         self.frames.iter().filter(move |frame| frame.number % every == 0 && (from..=to).contains(&frame.stamp_ns))
     }
 }
 
-/// How far points are moved that stand around the centroid, six along the axes: their mean square is that of a sphere of them.
+/// The RMS error (m) of six points at a lever arm from the centroid, along the axes.
+///
+/// Their mean square equals that over a sphere.
 fn moved(header: &TrialHeader, truth: Option<&TruthRecord>, row: &TargetRecord, arm: f64) -> f64 {
     let judged = lever::misplaced(header, truth, row).filter(|_| row.evaluation.attitude_error.is_some());
     let Some((e, centroid)) = judged else { return f64::NAN };

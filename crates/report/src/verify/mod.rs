@@ -1,4 +1,4 @@
-//! Every printed number, computed again from the logs.
+//! Verification of reports: every printed number is computed again from the logs.
 
 mod evaluate;
 mod logs;
@@ -17,53 +17,53 @@ use crate::{
 use evaluate::evaluate;
 use logs::Logs;
 
-/// What a verification found.
+/// The result of a verification.
 #[derive(Debug, Default)]
 pub struct Verified {
-    /// Numbers that were computed again.
+    /// The number of printed numbers that were computed again.
     pub numbers: usize,
-    /// Those that are printed otherwise.
+    /// The printed numbers that differ from the logs.
     pub mismatches: Vec<Mismatch>,
-    /// Files that the logs make.
+    /// The number of files that the logs generate.
     pub files: usize,
-    /// Those of them that are not there.
+    /// The generated files that are missing in the folder.
     pub missing: Vec<String>,
-    /// Those of them that are there and differ, by numbers or not.
+    /// The generated files whose content differs from that in the folder.
     pub changed: Vec<String>,
-    /// Files beside them that the logs do not make.
+    /// The files in the folder that the logs do not generate.
     pub strays: Vec<String>,
-    /// Its section of the page that [`index`](crate::index) writes, as the logs make it.
+    /// The report's section of the page that [`index`](crate::index) writes, generated from the logs.
     pub findings: String,
 }
 
-/// A number that is not what the logs say.
+/// A printed number that differs from the logs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
-    /// The file it is printed in.
+    /// The file with the number.
     pub file: String,
-    /// Where it comes from: what, topic, stamps, logs.
+    /// The key of the number: quantity, topic, stamps, logs.
     pub key: String,
-    /// As it is printed.
+    /// The printed text.
     pub printed: String,
-    /// What the logs say; why nothing, where they say nothing.
+    /// The text according to the logs, or the reason why there is none.
     pub logged: String,
 }
 
 impl Verified {
-    /// Whether the report says what the logs say.
+    /// Whether the report agrees with the logs in every number and file.
     pub fn holds(&self) -> bool {
         let full = self.missing.is_empty() && self.changed.is_empty() && self.strays.is_empty();
         full && self.mismatches.is_empty()
     }
 }
 
-/// Reads the printed numbers of the report in `folder` with their keys, computes each again from the messages of the
-/// logs in `run_dir`, to the last digit printed, and compares every file with what the logs make of it now.
+/// Verifies the report in `folder` against the logs in `run_dir`.
 ///
-/// The numbers are computed apart from those that write reports: what a key says, by the definitions.
+/// Every printed number is computed again from its key and compared to the last printed digit. Every file is generated
+/// again and compared byte by byte. The code that evaluates keys is independent of the code that writes reports.
 ///
 /// # Errors
-/// [`ReportError`] when there is no report, or a log cannot be read.
+/// [`ReportError`] when the folder has no report, or a log cannot be read.
 pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
     let mut verified = Verified::default();
     let mut logs = Logs::new(run_dir);
@@ -108,7 +108,7 @@ impl Verified {
                 Ok(value) => again(&parsed, value, printed),
                 Err(why) => why,
             },
-            None => "its key cannot be read".to_owned(),
+            None => "cannot parse its key".to_owned(),
         };
         if logged != printed {
             let mismatch = Mismatch { file: file.to_owned(), key: key.to_owned(), printed: printed.to_owned(), logged };
@@ -118,14 +118,14 @@ impl Verified {
     }
 }
 
-/// The forms with which a page says that it was written; all, where it does not say.
+/// The forms that a page records; all forms without a record.
 fn forms(page: &str) -> Forms {
     let as_number =
         page.split_once(&format!("<meta name=\"{FORMS}\" content=\"")).and_then(|(_, rest)| rest.split_once('"'));
     as_number.map_or(Forms::ALL, |(words, _)| Forms::of_words(words))
 }
 
-/// A value as it would be printed.
+/// A value in the printed format of `printed`.
 fn again(key: &Key, value: Option<f64>, printed: &str) -> String {
     if key.what == "stamp" {
         return key.span[0].to_string();
@@ -133,7 +133,7 @@ fn again(key: &Key, value: Option<f64>, printed: &str) -> String {
     Number::like(printed, value)
 }
 
-/// Keys and texts of all numbers of a page.
+/// The keys and texts of all numbers of a page.
 fn of_page(page: &str) -> Vec<(String, String)> {
     let mut found = Vec::new();
     for part in page.split("<data ").skip(1) {
@@ -150,7 +150,7 @@ fn unescape(text: &str) -> String {
     signs.iter().fold(text.to_owned(), |text, (written, sign)| text.replace(written, sign))
 }
 
-/// Keys and texts of all numbers of a table in JSON.
+/// The keys and texts of all numbers of a JSON table.
 fn of_table(bytes: &[u8]) -> Vec<(String, String)> {
     let Ok(table) = serde_json::from_slice::<serde_json::Value>(bytes) else { return Vec::new() };
     let rows = table["rows"].as_array().cloned().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Up to where a method bears a condition, by hand.
+//! Break-down points against values by hand.
 
 use std::fs;
 
@@ -7,9 +7,10 @@ use seafix_report::{Forms, report, verify};
 
 use crate::made_up::{blind, header};
 
-/// Found at 2 and 3 m, refused at 4 m, found again at 5 m: it breaks down beyond 3 m. Eight of eight are not surely 95 %.
+/// All attempts are fixes at 2, 3 and 5 m, one is rejected at 4 m: the break-down point is 3 m. Eight fixes in eight
+/// attempts do not show a fix rate of 95 % with confidence.
 ///
-/// Seen to fail where the verification goes on beyond the break.
+/// Seen to fail where the verification continues beyond the first value that fails.
 #[test]
 fn what_comes_after_a_break_does_not_count() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The page in a browser. Skipped where there is no Chromium.
+//! The layout of the page in a browser. Skipped without Chromium.
 
 use std::{fs, process::Command};
 
@@ -6,7 +6,9 @@ use seafix_report::{Forms, report};
 
 use crate::made_up::write_run;
 
-/// Shows the page in a frame of both widths and writes down what sticks out of it or is too small to read; a wide table may scroll in its own box.
+/// A page that shows the report at both widths and lists faulty elements.
+///
+/// Faulty elements overflow or are too small to read; a wide table may scroll in its own box.
 const FRAME: &str = "<iframe id=f style='height:900px;border:0' src=report.html></iframe><p id=found></p><script>
 onload = () => { const said = [];
 for (const width of [380, 1280]) { f.style.width = width + 'px';
@@ -39,5 +41,5 @@ fn nothing_sticks_out_of_a_wide_page_or_a_narrow_one_and_words_can_be_read() {
     let shown = String::from_utf8_lossy(&ran.stdout);
     assert!(shown.contains("amiss: ."), "{}", shown.split("<p id=").last().unwrap_or_default());
     let console = String::from_utf8_lossy(&ran.stderr).lines().filter(|line| line.contains("CONSOLE")).count();
-    assert_eq!(console, 0, "the page has something to say to its console");
+    assert_eq!(console, 0, "the page writes to the console");
 }

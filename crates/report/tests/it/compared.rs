@@ -1,4 +1,4 @@
-//! Runs side by side, where that says something (B56).
+//! Comparison of runs on the same data (B56).
 
 use std::path::{Path, PathBuf};
 
@@ -7,12 +7,12 @@ use seafix_report::{ReportError, compare};
 
 use crate::made_up::{blind, header};
 
-/// A run of one trial: its errors are those of `solver`.
+/// A run of one trial with the errors of `solver`.
 fn run(folder: &Path, name: &str, solver: &str, seed: u64) -> PathBuf {
     long(folder, name, solver, seed, 36)
 }
 
-/// The same of so many frames.
+/// A run of one trial with `frames` frames.
 fn long(folder: &Path, name: &str, solver: &str, seed: u64, frames: u64) -> PathBuf {
     let path = folder.join(name);
     std::fs::create_dir_all(&path).unwrap();
@@ -37,13 +37,13 @@ fn runs_of_the_same_data_are_compared() {
     assert!(compared.differ && compared.table.contains("significant"), "{}", compared.table);
     assert!(compared.page.unwrap().exists());
     let again = run(folder.path(), "c", "triad", 1);
-    assert!(!compared.table.contains("bit for bit"), "{}", compared.table);
+    assert!(!compared.table.contains("identical results"), "{}", compared.table);
     let compared = compare(&[first, again], false, None, None).unwrap();
-    assert!(compared.table.contains("a and c have the same results, bit for bit"), "{}", compared.table);
+    assert!(compared.table.contains("a and c have bitwise identical results"), "{}", compared.table);
     assert!(!compared.differ && compared.table.contains("p 1.0000, not significant"), "{}", compared.table);
 }
 
-/// Seen to fail where nobody looks at what the runs saw.
+/// Seen to fail where the data of the runs are not checked.
 #[test]
 fn runs_of_other_data_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -55,19 +55,21 @@ fn runs_of_other_data_are_refused() {
         other => panic!("{other:?}"),
     }
     let forced = compare(&runs, true, None, None).unwrap().table;
-    assert!(forced.contains("a and b saw different data: seeds: experiment 1 against experiment 2."), "{forced}");
+    assert!(forced.contains("a and b have different data: seeds: experiment 1 against experiment 2."), "{forced}");
 }
 
-/// A run that is shorter is compared by the frames that both have, and that is said; no line is wider than the terminal.
+/// A shorter run is compared over the common frames, with a notice.
 ///
-/// Seen to fail where nothing is compared, and where all columns stand side by side.
+/// No line is wider than the terminal.
+///
+/// Seen to fail where runs of different length are not compared, and where the table is not split by width.
 #[test]
 fn what_is_compared_of_a_shorter_run_is_stated() {
     let folder = tempfile::tempdir().unwrap();
     let runs = [run(folder.path(), "a", "triad", 1), long(folder.path(), "b", "kabsch", 1, 24)];
     assert!(matches!(compare(&runs, false, None, None), Err(ReportError::Incomparable { .. })));
     let table = compare(&runs, true, None, None).unwrap().table;
-    let said = "a has 36 frames a trial, b has 24 frames a trial: compared are the 24 attempts at the same frame and target that both made.";
+    let said = "a has 36 frames per trial, b has 24 frames per trial: the comparison uses the 24 attempts at the same frame and target in both.";
     assert!(table.lines().any(|line| line == said) && table.contains("n 24, p "), "{table}");
     for width in [40, 80, 120] {
         let table = compare(&runs, true, None, Some(width)).unwrap().table;

@@ -1,4 +1,4 @@
-//! What a report costs grows with its rows, and what it writes does not.
+//! The growth of time, memory and page size of a report with its rows.
 
 use std::{alloc::System, env, fs, process::Command};
 
@@ -10,9 +10,9 @@ use crate::rows;
 #[global_allocator]
 static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Whether this process runs `test` alone; if not, a process that does has passed.
+/// Whether this process runs `test` alone; otherwise it runs `test` in another process.
 ///
-/// The counters belong to the process: a test that runs beside this one would be counted.
+/// The allocation counters belong to the process, so a concurrent test would be counted too.
 fn alone(test: &str) -> bool {
     if env::var_os("SEAFIX_ALONE").is_some() {
         return true;
@@ -25,10 +25,11 @@ fn alone(test: &str) -> bool {
     false
 }
 
-/// With four times the rows a report, and its verification, ask for four times the memory at most; and its page, which is for
-/// people, hardly grows.
+/// Four times the rows cost at most four times the memory, and the page hardly grows.
 ///
-/// Seen to fail where the diagram of integrity draws every fix.
+/// This holds for a report and for its verification.
+///
+/// Seen to fail where the Stanford diagram plots every fix.
 #[test]
 fn a_report_grows_with_its_rows_at_most() {
     if !alone("growth::a_report_grows_with_its_rows_at_most") {

@@ -1,5 +1,7 @@
-//! What comes from files does no harm: names are text in HTML, LaTeX, CSV, PDF and the terminal (B42), and a log of a
-//! newer version is refused by its name (B57).
+//! Safety against hostile input and newer versions.
+//!
+//! Names are plain text in HTML, LaTeX, CSV, PDF and the terminal (B42). Logs of a newer version are rejected with both
+//! versions (B57).
 
 use std::{fs, process::Command};
 
@@ -7,7 +9,7 @@ use seafix_report::{Forms, report, summary};
 
 use crate::made_up::write_run;
 
-/// Seen to fail where characters that command a terminal are printed.
+/// Seen to fail where control characters reach the terminal.
 #[test]
 fn names_command_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -40,8 +42,9 @@ fn names_command_nothing() {
     }
 }
 
-/// Compiled with what `article`, `booktabs` and `graphicx` offer, without an error or a box that sticks out by more than
-/// 2 pt. Skipped where there is no LaTeX.
+/// The source compiles with `article`, `booktabs` and `graphicx` alone.
+///
+/// It gives no error and no box that is more than 2 pt too wide. Skipped without LaTeX.
 #[test]
 fn latex_compiles() {
     if Command::new("pdflatex").arg("--version").output().is_err() {
@@ -81,10 +84,10 @@ fn a_newer_log_is_refused_with_both_versions() {
     writer.finish().unwrap();
     let refused = report(folder.path(), &folder.path().join("report"), Forms::ALL).unwrap_err().to_string();
     assert!(refused.contains("seafix.v3.TrialHeader") && refused.contains("seafix.v2.TrialHeader"), "{refused}");
-    assert!(!folder.path().join("report").exists(), "nothing is written");
+    assert!(!folder.path().join("report").exists(), "no report is written");
 }
 
-/// Seen to fail where the manifest is not looked at.
+/// Seen to fail where the manifest is not read.
 #[test]
 fn a_newer_manifest_is_refused_with_both_versions() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,6 +101,6 @@ fn a_newer_manifest_is_refused_with_both_versions() {
         let Err(refused) = made else { continue };
         let refused = refused.to_string();
         assert!(refused.contains(&format!("seafix-manifest/{format}")), "{refused}");
-        assert!(refused.contains("knows seafix-manifest/2"), "{refused}");
+        assert!(refused.contains("reads seafix-manifest/2"), "{refused}");
     }
 }

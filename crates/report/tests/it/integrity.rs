@@ -1,4 +1,4 @@
-//! Errors beside protection levels and alert limits, counted and drawn.
+//! The regions of the Stanford diagram, as counted and as plotted.
 
 use std::{fs, path::Path};
 
@@ -7,7 +7,7 @@ use seafix_report::{Forms, report, summary, verify};
 
 use crate::made_up::{blind, header};
 
-/// Errors and levels (m) beside a limit of 50 mm, one fix in each region.
+/// Position errors and protection levels (m) for an alert limit of 50 mm, one fix in each region.
 const CASES: [(f64, Option<f64>, Region); 6] = [
     (0.010, Some(0.020), Region::Available),
     (0.030, Some(0.020), Region::Misleading),
@@ -17,7 +17,9 @@ const CASES: [(f64, Option<f64>, Region); 6] = [
     (0.010, None, Region::Unprotected),
 ];
 
-/// Twelve frames, each case twice; `totals` are written where they are wanted, `change` may make the log an older one.
+/// Writes twelve frames, each case twice, with or without totals.
+///
+/// `change` can imitate a log of an older version.
 fn write(folder: &Path, totals: bool, change: impl Fn(&mut FrameRecord)) {
     let header = header(1, 3.0, "kabsch");
     let mut sums = Totals { every: 1, ..Totals::default() };
@@ -46,7 +48,7 @@ fn write(folder: &Path, totals: bool, change: impl Fn(&mut FrameRecord)) {
 fn every_fix_is_counted_in_its_region_and_each_number_is_that_of_the_log() {
     for (totals, older) in [(true, false), (false, false), (false, true)] {
         let folder = tempfile::tempdir().unwrap();
-        // Logs that are older than limits of their own have those of their targets in the header.
+        // Older logs have no alert limit for each fix, only those of the targets in the header.
         write(folder.path(), totals, |frame| {
             if older {
                 frame.targets[0].evaluation.alert_limit = None;
@@ -65,7 +67,7 @@ fn every_fix_is_counted_in_its_region_and_each_number_is_that_of_the_log() {
                 "{table}"
             );
         }
-        assert_eq!(table.lines().count(), 11, "a fix without a level has no place in the drawing");
+        assert_eq!(table.lines().count(), 11, "a fix without a protection level is not plotted");
         let table = fs::read_to_string(out.join("tables/integrity.csv")).unwrap();
         assert!(table.contains(",12,2,16.6"), "two of twelve attempts are available: {table}");
     }

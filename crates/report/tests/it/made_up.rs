@@ -1,4 +1,4 @@
-//! A made-up run whose results are known.
+//! A synthetic run with known results.
 
 use std::{
     collections::BTreeMap,
@@ -19,7 +19,7 @@ pub(crate) const SIZE: [u32; 2] = [512, 384];
 const F: f64 = 250.0;
 pub(crate) const NAME: &str = "<script>alert('x')</script>&\" 50%_a \\input{x} =cmd|x \u{1b}[31m";
 
-/// Numbers between −0.5 and 0.5 that look random and are the same everywhere.
+/// Pseudo-random numbers between −0.5 and 0.5, the same on every machine.
 pub(crate) fn noise(seed: u64) -> f64 {
     let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -51,7 +51,7 @@ pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
         ],
         components: vec![
             component("detector", "harris", "corners with sub-pixel peaks", "Harris and Stephens 1988"),
-            component("search", "maximum-clique", "the largest coherent set, one-to-one, mirror images refused", ""),
+            component("search", "maximum-clique", "the largest coherent set, one-to-one, mirror images rejected", ""),
             component("solver", solver, "a rigid motion from points", "Kabsch 1976"),
         ],
         configuration: format!("seed = 1\n[pipeline]\nsolver = \"{solver}\"\n"),
@@ -86,19 +86,21 @@ pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
     }
 }
 
-/// What tells one frame from the others.
+/// The seed of a frame at a distance.
 fn seed(number: u64, distance: f64) -> u64 {
     10_000 * number + (distance * 10.0) as u64
 }
 
-/// Frame `number` at `distance`; every sixth is refused, one in all the run is wrong.
+/// Frame `number` at `distance`.
+///
+/// Every sixth is rejected, and one frame of the run has a wrong fix.
 pub(crate) fn frame(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
     let blind = blind(header, number, distance);
     let images = Some([0, 1].map(|side| image(&blind.cloud, side, seed(number, distance))));
     FrameRecord { images, ..blind }
 }
 
-/// An image of the cloud.
+/// A synthetic image with a corner at every cloud point.
 fn image(cloud: &[CloudPoint], side: usize, seed: u64) -> GreyImage {
     let wave = |n: u32, of: fn(f64) -> f64| (0..n).map(|k| of(f64::from(k))).collect::<Vec<f64>>();
     let (across, down) = (wave(SIZE[0], |x| (x / 23.0).sin()), wave(SIZE[1], |y| (y / 17.0).cos()));
@@ -120,7 +122,7 @@ fn image(cloud: &[CloudPoint], side: usize, seed: u64) -> GreyImage {
     GreyImage { width: SIZE[0], height: SIZE[1], pixels }
 }
 
-/// The frame without its images, which take the most time.
+/// The frame without its images, which take most of the time.
 pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRecord {
     let target = &header.targets[0];
     let mut world_from_camera = IDENTITY;
@@ -230,10 +232,12 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
     }
 }
 
-/// The names and the bytes of the logs of a run.
+/// The logs of a run: file names and contents.
 type Logs = Vec<(String, Vec<u8>)>;
 
-/// Writes a run; one of the same distances is made once.
+/// Writes a run with two trials at each distance.
+///
+/// The logs of the same distances are generated once.
 pub(crate) fn write_run(folder: &Path, distances: &[f64]) {
     static MADE: Mutex<BTreeMap<String, Arc<Logs>>> = Mutex::new(BTreeMap::new());
     let made = {

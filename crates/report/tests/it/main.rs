@@ -1,6 +1,6 @@
-//! Reports on runs whose results are known.
+//! Tests of reports on synthetic runs with known results.
 
-#![allow(clippy::unwrap_used, reason = "a test may stop at once, and says what it measured")]
+#![allow(clippy::unwrap_used, reason = "a failing test may panic")]
 
 mod breakdown;
 mod browser;

@@ -1,4 +1,4 @@
-//! Of several objects, and of points of interest, each number is that of its own.
+//! Tables and sentences about single objects and points of interest.
 
 use std::{fs, path::Path};
 
@@ -9,7 +9,7 @@ use crate::made_up::{blind, header};
 
 const OBJECTS: [&str; 2] = ["manifold", "pod"];
 
-/// Frame `number`: the manifold in every one, the pod in every third, three times as far off.
+/// Frame `number`: the manifold in every frame, the pod in every third, with three times the position error.
 fn made(header: &seafix_log::TrialHeader, number: u64) -> FrameRecord {
     let mut frame = blind(header, number, 3.0);
     if number.is_multiple_of(3) {
@@ -23,7 +23,7 @@ fn made(header: &seafix_log::TrialHeader, number: u64) -> FrameRecord {
     frame
 }
 
-/// Two trials, of which the second has a pod that stands elsewhere; what was logged.
+/// Writes two trials, the second with a displaced pod, and gives their frames.
 fn write(folder: &Path) -> Vec<Vec<FrameRecord>> {
     let one = |(index, moved): (usize, &str)| {
         let mut header = header(index + 1, 3.0, "kabsch");
@@ -43,14 +43,14 @@ fn write(folder: &Path) -> Vec<Vec<FrameRecord>> {
     ["none", "pod"].into_iter().enumerate().map(one).collect()
 }
 
-/// Over the ranks, by hand: the mean of the middle two, or the middle one.
+/// The median by sorting: the middle value, or the mean of the middle two.
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let n = values.len();
     (values[(n - 1) / 2] + values[n / 2]) / 2.0
 }
 
-/// Seen to fail where an object takes in the fixes of the others, and where its medians are over refused attempts too.
+/// Seen to fail where an object counts the fixes of others, and where its medians include rejected attempts.
 #[test]
 fn each_object_has_its_own_attempts() {
     let folder = tempfile::tempdir().unwrap();
@@ -73,7 +73,8 @@ fn each_object_has_its_own_attempts() {
             let medians = table.lines().filter_map(|l| l.split_once(&line)?.1.split(',').next()?.parse::<f64>().ok());
             let medians: Vec<f64> = medians.collect();
             assert!(medians.len() == 2 && medians.iter().all(|of| (of - tre).abs() < 1e-9), "{line} {tre} in {table}");
-            let said = format!("{object}: {} of {n} found, median position error {position:.1} mm", found.len());
+            let said =
+                format!("{object}: {} fixes in {n} attempts, median position error {position:.1} mm", found.len());
             assert!(page.contains(&said), "{said}");
         }
     }
@@ -81,7 +82,7 @@ fn each_object_has_its_own_attempts() {
     assert!(verified.holds(), "{verified:#?}");
 }
 
-/// Seen to fail where the best and the worst known point change places.
+/// Seen to fail where the best and the worst point are exchanged.
 #[test]
 fn of_points_of_interest_the_best_and_the_worst_known_are_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -101,7 +102,7 @@ fn of_points_of_interest_the_best_and_the_worst_known_are_reported() {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let at = |(error, name): (f64, &str)| {
         let words = format!("{} ", name.split(' ').next().unwrap());
-        let begin = page.find("of the points of interest").unwrap();
+        let begin = page.find("errors of the points of interest").unwrap();
         let sentence = &page[begin..begin + page[begin..].find(" views)").unwrap() + 300];
         let expected = format!("{error:.1} mm (median;");
         (sentence.find(&words).unwrap(), sentence.find(&expected).unwrap_or_else(|| panic!("{expected} in {sentence}")))

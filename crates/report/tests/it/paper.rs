@@ -1,4 +1,4 @@
-//! What reports say.
+//! The content of reports.
 
 use std::{fs, path::Path, sync::LazyLock};
 
@@ -89,7 +89,7 @@ static FRAMES: LazyLock<Vec<FrameRecord>> = LazyLock::new(|| {
     (0..12).map(|number| frame(&header, number, 3.0)).collect()
 });
 
-/// Writes the run of one trial that `change` makes of frames at 3 m, and gives its report and summary.
+/// The report and the summary of a run of one trial at 3 m, with header and frames modified by `change`.
 fn changed(change: impl Fn(&mut TrialHeader, &mut FrameRecord)) -> (String, seafix_report::RunSummary) {
     let folder = tempfile::tempdir().unwrap();
     let mut header = header(1, 3.0, "kabsch");
@@ -126,7 +126,7 @@ fn what_saw_no_images_is_not_stated_to_match_them() {
     let pipeline = &text[text.find("id=\"pipeline\"").unwrap()..text.find("id=\"data\"").unwrap()];
     assert!(text.contains("The source gives no images") && !text.contains("are described, matched"));
     assert!(!pipeline.contains("harris") && pipeline.contains("maximum-clique"));
-    // Images that were looked at but not logged are another thing.
+    // Images that were used but not logged count as images.
     let (text, _) = changed(|_, frame| frame.images = None);
     assert!(text.contains("are described, matched and triangulated") && text.contains("harris"));
 }

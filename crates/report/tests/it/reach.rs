@@ -1,4 +1,4 @@
-//! Recall in one number, and errors at lever arms, by hand.
+//! Areas under recall curves and errors at lever arms, against values by hand.
 
 use std::fs;
 
@@ -7,9 +7,10 @@ use seafix_report::{Forms, report, verify};
 
 use crate::made_up::{blind, header};
 
-/// Three fixes of four attempts, turned by 0.02 rad about the points they used and shifted by 3 mm.
+/// Three fixes in four attempts, rotated by 0.02 rad about the centroid of their points and shifted by 3 mm.
 ///
-/// Seen to fail where the turn is left out, where refused attempts are, and where the arm starts at the object's origin.
+/// Seen to fail where the rotation or the rejected attempts are ignored, and where the arm starts at the object's
+/// origin.
 #[test]
 fn areas_and_lever_arms_are_as_by_hand() {
     let folder = tempfile::tempdir().unwrap();
@@ -24,7 +25,7 @@ fn areas_and_lever_arms_are_as_by_hand() {
         if let Some(pose) = &mut row.object_from_camera {
             let points = &header.targets[0].points[..7];
             let centre = [0, 1].map(|k| points.iter().map(|point| point.at[k]).sum::<f64>() / 7.0);
-            // E = shift · turn about the centroid, times the truth, which turns nothing.
+            // E = shift · rotation about the centroid; the true pose has no rotation.
             let [x, y] = centre;
             *pose = [
                 [cosine, -sine, 0.0, x - cosine * x + sine * y],

@@ -1,4 +1,4 @@
-//! Runs of many rows.
+//! Runs with many rows.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use seafix_log::{FrameRecord, Writer};
 
 use crate::made_up::{blind, header};
 
-/// Writes a run of two trials with so many frames each, without images.
+/// Writes a run of two trials with `frames` frames each, without images.
 pub(crate) fn write_rows(folder: &Path, frames: u64) {
     for (index, solver) in ["triad", "kabsch"].into_iter().enumerate() {
         let header = header(index + 1, 3.0, solver);

@@ -1,4 +1,4 @@
-//! Every number is that of the log (P66), every attempt is in every table once (P67).
+//! Verification: every number agrees with the log (P66), and every attempt counts once in every table (P67).
 
 use std::{fs, path::Path};
 
@@ -13,20 +13,20 @@ fn made(folder: &Path) -> Verified {
     verify(folder, &folder.join("report")).unwrap()
 }
 
-/// Seen to fail where statistics are printed one per cent too large, and where refused attempts are not counted.
+/// Seen to fail where statistics are printed one per cent too large, and where rejected attempts are not counted.
 #[test]
 fn all_numbers_are_computed_again() {
     let folder = tempfile::tempdir().unwrap();
     let verified = made(folder.path());
     assert!(verified.holds(), "{verified:#?}");
     assert!(verified.numbers > 500, "{}", verified.numbers);
-    // All cells of the tables of numbers carry a key: a bare number is none.
+    // Every number in a table has a key.
     let page = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(page.contains("title=\"q95 poi_error at the point ") && page.contains("valve over of &lt;2&gt;"));
     let bare =
         page.split("<td class=\"n\">").skip(1).filter(|cell| cell.starts_with(|c: char| c.is_ascii_digit())).count();
-    let axes = 4; // the distance stands in the tables of results
-    assert_eq!(bare % axes, 0, "numbers of the header alone stand without a key");
+    let axes = 4; // the distance of each trial, in the tables of results
+    assert_eq!(bare % axes, 0, "only values of axes have no key");
 }
 
 #[test]
@@ -47,9 +47,9 @@ fn a_changed_digit_is_found() {
     assert_eq!(verified.changed, ["report.html"]);
 }
 
-/// Of every file of a report it is noticed that it is gone, changed or not its own, each by its name.
+/// Missing, changed and foreign files of a report are all reported by name.
 ///
-/// Seen to fail where strange files are passed over.
+/// Seen to fail where foreign files are ignored.
 #[test]
 fn every_file_is_missed_and_a_strange_one_reported() {
     let folder = tempfile::tempdir().unwrap();
@@ -69,8 +69,7 @@ fn every_file_is_missed_and_a_strange_one_reported() {
             names.extend(entries.map(|path| path.strip_prefix(&report_of).unwrap().display().to_string()));
         }
         assert_eq!(names.len(), verified.files);
-        // The page itself says which others there are. Every other one is gone and those between are changed, then the other
-        // way round.
+        // The page records which files exist. Every second file is removed and the others are changed, then vice versa.
         names.retain(|name| name != "report.html");
         names.sort();
         let [even, odd] = [0, 1].map(|first| names.iter().skip(first).step_by(2).cloned().collect::<Vec<_>>());
@@ -95,9 +94,9 @@ fn every_file_is_missed_and_a_strange_one_reported() {
     }
 }
 
-/// B44. A folder with something in it and no report is left as it is; one with a report is written anew.
+/// B44. A folder with other files and no report is left unchanged; a folder with a report is overwritten.
 ///
-/// Seen to fail where nobody looks what is in the folder.
+/// Seen to fail where the content of the folder is not checked.
 #[test]
 fn what_is_no_report_is_left_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -107,7 +106,7 @@ fn what_is_no_report_is_left_alone() {
     for name in ["figures/mine.svg", "summary.txt", "report.txt"] {
         fs::write(other.join(name), b"mine").unwrap();
         let refused = report(folder.path(), &other, Forms::ALL).unwrap_err().to_string();
-        assert!(refused.contains("other holds `figures` and no report"), "{refused}");
+        assert!(refused.contains("other: it holds `figures` and no report"), "{refused}");
         assert_eq!(fs::read(other.join(name)).unwrap(), b"mine");
     }
     let own = folder.path().join("report");
@@ -115,9 +114,11 @@ fn what_is_no_report_is_left_alone() {
     report(folder.path(), &own, Forms::ALL).unwrap();
 }
 
-/// A finished run that has lost a log is no smaller run; one that was interrupted has what it has.
+/// A finished run with a missing log is rejected.
 ///
-/// Seen to fail where the manifest is not asked for its logs.
+/// An interrupted run is reported with the logs that it has.
+///
+/// Seen to fail where the logs of the manifest are not checked.
 #[test]
 fn a_lost_log_is_missed() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,7 +130,7 @@ fn a_lost_log_is_missed() {
         report(folder.path(), &folder.path().join("report"), Forms::ALL)
     };
     let refused = manifest("finished").unwrap_err().to_string();
-    assert!(refused.contains("names the log not-there.mcap, which is not there"), "{refused}");
+    assert!(refused.contains("its log not-there.mcap is missing"), "{refused}");
     manifest("interrupted").unwrap();
 }
 
@@ -152,7 +153,7 @@ fn another_log_is_noticed() {
     assert!(!verified.mismatches.is_empty() && !verified.holds());
 }
 
-/// Seen to fail where refused attempts are not counted.
+/// Seen to fail where rejected attempts are not counted.
 #[test]
 fn outcomes_add_up_and_every_attempt_counts_once() {
     let folder = tempfile::tempdir().unwrap();

@@ -2,7 +2,7 @@ use seafix_geometry::{Pixel, Point};
 
 use super::*;
 
-/// A small, quick rig that still sees an object: the virtual camera at a quarter of its size.
+/// A small, fast rig with an object in view: the virtual camera at a quarter of its size.
 fn small() -> Dive {
     Dive { frames: 7, rig: VirtualRig { size: [256, 192], focal: 125.0, baseline: 0.25 }, ..Dive::default() }
 }
@@ -29,7 +29,7 @@ fn visible_points_have_the_pixels_of_the_truth() {
             let model = dive.site().objects[seen.object].points[seen.point].at;
             let at = frame.truth().world_from_camera.inverse() * (dive.world_from_object()[seen.object] * model);
             let pixels = dive.rig().project(&at).unwrap();
-            // The model is good to a millimetre, which is a fraction of these large pixels.
+            // The model error of a millimetre is a fraction of these large pixels.
             assert!(pixels.left.distance(&seen.pixels.left) < 0.3);
             assert!((seen.pixels.left.v - seen.pixels.right.v).abs() < 1e-9);
         }
@@ -119,7 +119,7 @@ fn depth_is_what_a_ray_meets() {
     assert!(same as f64 >= 0.999 * all as f64, "{same} of {all}");
 }
 
-/// Seen to fail when the slope of a surface is taken from its own axes.
+/// Regression: taking a surface's slope from its own axes fails this test.
 #[test]
 fn rows_have_the_radiance_of_each_pixel() {
     let dive = small().plan(9, 0).unwrap();
@@ -135,7 +135,7 @@ fn rows_have_the_radiance_of_each_pixel() {
 
 #[test]
 fn left_and_right_image_show_one_scene() {
-    // No noise: where both cameras see a place of the flat surfaces, its grey is the same.
+    // Without noise both cameras see the same grey at a point of a flat surface.
     let quiet = Sensor { noise: 0.0, blur: 0.0, ..Sensor::default() };
     let dive = Dive { sensor: quiet, frames: 2, ..Dive::default() }.plan(9, 0).unwrap();
     for frame in dive.frames() {
@@ -158,7 +158,7 @@ fn left_and_right_image_show_one_scene() {
                 }
                 let cell = there.floor() as usize;
                 if (other.depth(cell, row).unwrap() / z - 1.0).abs() > 0.01 {
-                    continue; // hidden from the right camera
+                    continue; // occluded for the right camera
                 }
                 let fraction = (there - cell as f64) as f32;
                 let seen = right.row(row)[cell] * (1.0 - fraction) + right.row(row)[cell + 1] * fraction;
@@ -171,9 +171,9 @@ fn left_and_right_image_show_one_scene() {
     }
 }
 
-/// Where the two dark squares of an X mark meet, by the least-squares saddle of the grey levels.
+/// The common corner of an X mark's two dark squares, by the least-squares saddle point of the grey levels.
 fn saddle(image: &Image, near: &Pixel) -> Option<Pixel> {
-    // f = a + b x + c y + d x² + e xy + g y² over a window, iterated around its own saddle.
+    // f = a + b x + c y + d x² + e xy + g y² over a window, iterated around its own saddle point.
     let mut at = *near;
     for _ in 0..8 {
         let (mut normal, mut gradient) = (nalgebra::Matrix6::<f64>::zeros(), nalgebra::Vector6::<f64>::zeros());
@@ -201,7 +201,7 @@ fn saddle(image: &Image, near: &Pixel) -> Option<Pixel> {
     Some(at)
 }
 
-/// Whether a feature point is where two panels touch.
+/// Whether a feature point is the common corner of two panels.
 fn is_x_mark(plan: &crate::ObjectPlan, point: usize) -> bool {
     let Some(panel) = plan.points[point].panel else { return false };
     let here = &plan.panels[panel];

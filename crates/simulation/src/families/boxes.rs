@@ -11,33 +11,33 @@ use super::{
 };
 use crate::stream::Stream;
 
-/// Share of the model points that lie on edges; the rest lies on faces.
+/// Fraction of the model points on edges; the rest lies on faces.
 const ON_EDGES: f64 = 0.6;
-/// Half the boxes along their axes (m).
+/// Half extents of the boxes along their axes (m).
 const SMALL: [f64; 3] = [1.25, 0.75, 0.75];
 const LARGE: [f64; 3] = [2.5, 1.75, 1.5];
 const MEDIUM: [f64; 3] = [2.0, 1.5, 1.25];
 
-/// What a problem's number decides.
+/// The parameters that the problem number determines.
 struct Cell {
     half: [f64; 3],
-    /// How far ahead of the camera the object is (m).
+    /// Distance of the object from the camera (m).
     distance: f64,
-    /// The least distance of two model points (m).
+    /// Minimum distance of two model points (m).
     apart: f64,
     n: usize,
     m: usize,
     visible: usize,
-    /// Half-size of the shells (m); `None` without a prior.
+    /// Half-size of the gates (m); `None` without a prior.
     gate: Option<f64>,
-    /// How far the scene goes beyond the object (m).
+    /// Margin of the scene about the object (m).
     margin: f64,
     sigma: f64,
-    /// How much noisier depth is.
+    /// Ratio of depth noise to lateral noise.
     depth: u32,
-    /// Whether all clutter lies in shells.
+    /// Whether all clutter lies in gates.
     dense: bool,
-    /// How near clutter may come to a hidden model point (m).
+    /// Minimum distance of clutter from a hidden model point (m).
     clear: f64,
 }
 
@@ -114,7 +114,7 @@ impl Cell {
     }
 }
 
-/// The model: each point at least `apart` from the others.
+/// The model points, with a minimum distance of `apart`.
 fn model(cell: &Cell, stream: &mut Stream) -> Vec<Vector3<f64>> {
     let half = Vector3::from(cell.half);
     let mut points: Vec<Vector3<f64>> = Vec::new();
@@ -128,7 +128,7 @@ fn model(cell: &Cell, stream: &mut Stream) -> Vec<Vector3<f64>> {
     points
 }
 
-/// The indices 0..n in an order that tells nothing.
+/// The indices 0..n in random order.
 pub(super) fn shuffled(n: usize, stream: &mut Stream) -> Vec<usize> {
     let mut order: Vec<usize> = (0..n).collect();
     for k in (1..n).rev() {
@@ -180,7 +180,7 @@ pub(super) fn draw(source: &Source) -> Generated {
     Generated { problem, truth }
 }
 
-/// Standard deviations along the camera's axes (m), their root mean square the cell's σ.
+/// Standard deviations along the camera's axes (m), whose root mean square is the cell's σ.
 fn noise(cell: &Cell) -> Vector3<f64> {
     let depth = f64::from(cell.depth);
     let across = cell.sigma * (3.0 / (2.0 + depth * depth)).sqrt();

@@ -1,4 +1,4 @@
-//! Points that are no feature points: where they lie.
+//! Distributions of clutter points.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, Transform};
@@ -6,24 +6,24 @@ use seafix_geometry::{Camera, Object, Point, Transform};
 use super::prior::cube;
 use crate::stream::Stream;
 
-/// How far points on an edge are off it along each axis, one standard deviation (m).
+/// Standard deviation of a point from its edge on each axis (m).
 pub(super) const EDGE_JITTER: f64 = 0.02;
-/// How rough the floor is, one standard deviation (m).
+/// Standard deviation of the floor's height (m).
 const FLOOR_RELIEF: f64 = 0.05;
 
 /// The scene about a box that stands on a floor.
 pub(super) struct Scene<'a> {
     pub(super) camera_from_object: &'a Transform<Camera, Object>,
-    /// Half the box along its axes (m).
+    /// Half extents of the box along its axes (m).
     pub(super) half: Vector3<f64>,
-    /// How far the scene goes beyond the object (m).
+    /// Margin of the scene about the object (m).
     pub(super) margin: f64,
-    /// The model points in the camera.
+    /// The model points in the camera frame.
     pub(super) placed: &'a [Vector3<f64>],
 }
 
 impl Scene<'_> {
-    /// One point: half of all anywhere, a quarter on the box's edges, a quarter on the floor about it.
+    /// A clutter point: half lie anywhere, a quarter on the box's edges, a quarter on the floor about it.
     pub(super) fn clutter(&self, stream: &mut Stream) -> Vector3<f64> {
         let place = |at: Vector3<f64>| (*self.camera_from_object * Point::from(at)).coords;
         match stream.below(4) {
@@ -37,7 +37,7 @@ impl Scene<'_> {
     }
 }
 
-/// Uniform in the bounding box of `placed` along the camera's axes, widened by `margin`.
+/// A uniform point in the bounding box of `placed` along the camera's axes, extended by `margin`.
 pub(super) fn anywhere(stream: &mut Stream, placed: &[Vector3<f64>], margin: f64) -> Vector3<f64> {
     Vector3::from_fn(|k, _| {
         let (low, high) = placed.iter().fold((f64::MAX, f64::MIN), |(low, high), at| (low.min(at[k]), high.max(at[k])));
@@ -45,24 +45,24 @@ pub(super) fn anywhere(stream: &mut Stream, placed: &[Vector3<f64>], margin: f64
     })
 }
 
-/// Uniform in the shell of a model point, any of them as likely.
+/// A uniform point in the gate of a random model point.
 pub(super) fn in_gates(stream: &mut Stream, predicted: &[Vector3<f64>], half: f64) -> Vector3<f64> {
     predicted[stream.below(predicted.len())] + cube(stream, half)
 }
 
-/// A point of an edge of the box, any edge as likely.
+/// A point on a random edge of the box.
 pub(super) fn on_edge(stream: &mut Stream, half: &Vector3<f64>) -> Vector3<f64> {
     let along = stream.below(3);
     on_box(stream, half, |axis| axis == along)
 }
 
-/// A point of a face of the box, any face as likely.
+/// A point on a random face of the box.
 pub(super) fn on_face(stream: &mut Stream, half: &Vector3<f64>) -> Vector3<f64> {
     let across = stream.below(3);
     on_box(stream, half, |axis| axis != across)
 }
 
-/// Uniform along the axes that are `free`, on either side along the others.
+/// A point uniform along the `free` axes, and on a random side along the others.
 fn on_box(stream: &mut Stream, half: &Vector3<f64>, free: impl Fn(usize) -> bool) -> Vector3<f64> {
     Vector3::from_fn(|axis, _| {
         let at = stream.between(-1.0, 1.0);

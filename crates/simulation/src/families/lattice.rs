@@ -1,4 +1,4 @@
-//! Family e: a lattice that its surroundings continue, told apart by four points off it.
+//! Family e: a lattice that its surroundings continue, distinguished by four points off it.
 
 use std::collections::HashSet;
 
@@ -14,31 +14,39 @@ use super::{
 };
 use crate::stream::Stream;
 
-/// Sites of the lattice along x and y, and the distance of neighbours (m).
+/// Number of lattice sites along x and y.
 const SITES: [i32; 2] = [6, 5];
+/// Distance of neighbouring sites (m).
 const PITCH: f64 = 0.25;
-/// The points off the lattice, before their jitter (m).
+/// The points off the lattice before their jitter (m).
 const OFF: [[f64; 3]; 4] = [[0.11, 0.16, 0.18], [-0.52, 0.06, 0.09], [0.33, -0.41, 0.07], [-0.2, -0.35, 0.22]];
+/// Jitter of the points off the lattice (m).
 const OFF_JITTER: f64 = 0.02;
-/// How likely a site of the lattice, and a point off it, is visible.
+/// Probability that a lattice site is visible, and that a point off the lattice is.
 const VISIBLE: [f64; 2] = [0.7, 0.83];
-/// Least number of visible points off the lattice.
+/// Minimum number of visible points off the lattice.
 const MIN_OFF: usize = 3;
-/// How far the surroundings continue the lattice (sites), and how likely a site of theirs is.
+/// Width of the continued lattice about the object (sites).
 const AROUND: i32 = 2;
+/// Probability that a continued site is occupied.
 const CONTINUED: f64 = 0.43;
-/// By how many points the truth is ahead of the best wrong placement of the lattice.
+/// Minimum lead of the truth over the best wrong placement of the lattice (points).
 const LEAD: usize = 2;
-/// Points just beyond the tolerance of a visible one: how many, and how far off in multiples of Δ.
+/// Number of near misses of visible points.
 const NEAR: usize = 12;
+/// Range of their distances from the visible points, as multiples of Δ.
 const NEAR_BY: [f64; 2] = [1.5, 3.0];
-/// Points anywhere, and how far the scene goes beyond the object (m).
+/// Number of clutter points anywhere in the scene.
 const ANYWHERE: usize = 30;
+/// Margin of the scene about the object (m).
 const MARGIN: f64 = 0.3;
+/// Standard deviation of the noise (m).
 const SIGMA: f64 = 0.01;
+/// Distance of the object from the camera (m).
 const DISTANCE: f64 = 3.0;
+/// Half-size of the gate (m).
 const GATE: f64 = 0.4;
-/// How far the rough pose is moved along each axis, in shells.
+/// Maximum displacement of the prior pose along each axis, as a multiple of the gate.
 const SHIFT: f64 = 0.5;
 
 fn site(i: i32, k: i32) -> Vector3<f64> {
@@ -50,7 +58,7 @@ fn sites() -> impl Iterator<Item = (i32, i32)> {
     (0..SITES[0]).flat_map(|i| (0..SITES[1]).map(move |k| (i, k)))
 }
 
-/// What is seen of the lattice and of the points off it, and where the surroundings continue it.
+/// The visible lattice sites and points off the lattice, and the continued sites.
 struct Seen {
     model: Vec<usize>,
     continued: Vec<(i32, i32)>,
@@ -58,7 +66,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// Drawn until the truth leads, so that an exact method can know it.
+    /// Samples until the truth leads, so that an exact method can identify it.
     fn draw(stream: &mut Stream) -> Self {
         loop {
             let lattice: Vec<usize> = (0..sites().count()).filter(|_| stream.unit() < VISIBLE[0]).collect();
@@ -77,8 +85,8 @@ impl Seen {
     }
 }
 
-/// The most occupied sites that a placement of the lattice other than the true one covers: shifted or
-/// not, flipped (which covers the same sites), or turned by a quarter.
+/// The maximum number of occupied sites under a wrong placement of the lattice: shifted or not, flipped (which covers
+/// the same sites) or turned by 90°.
 fn best_wrong(occupied: &HashSet<(i32, i32)>) -> usize {
     let covered = |along: [i32; 2], by: (i32, i32)| {
         let all = (0..along[0]).flat_map(|i| (0..along[1]).map(move |k| (i + by.0, k + by.1)));
@@ -144,10 +152,10 @@ mod tests {
     fn a_lattice_is_covered_by_its_flip_its_shift_and_its_quarter_turn() {
         let full: HashSet<(i32, i32)> = sites().collect();
         assert_eq!(best_wrong(&full), 30);
-        // A column less at one side, a column more at the other: the shift covers all.
+        // One column less on one side and one more on the other: the shift covers all sites.
         let shifted: HashSet<(i32, i32)> = sites().map(|(i, k)| (i + 1, k)).collect();
         assert_eq!(best_wrong(&shifted), 30);
-        // Where five columns of five are left, a quarter turn covers them too.
+        // A quarter turn also covers all sites of five columns of five.
         assert_eq!(best_wrong(&sites().filter(|&(i, _)| i < 5).collect()), 25);
     }
 }

@@ -1,22 +1,22 @@
-//! Families of identification problems with truth: a model, a cloud of noisy points and clutter, and
-//! what is known beforehand, each a function of (seed, family, number).
+//! Families of generated coherence problems with truth: a model, a cloud of noisy points and clutter, and a prior.
 //!
-//! The laws are those of the development problems `a`–`g` (coherence-problem/1); what a family fixes
-//! cycles with the number of the problem, the rest is drawn. All coordinates are rounded to 1 µm, as
-//! the files have them.
+//! Each problem is a function of (seed, family, number). The distributions are those of the development problems
+//! `a`–`g` (`coherence-problem/1`). Parameters of a family cycle with the problem number; the others are sampled. All
+//! coordinates are rounded to 1 µm, as in the files. M is the size of the cloud, N that of the model.
 //!
-//! | family | model | cloud | known beforehand |
+//! | family | model | cloud | prior |
 //! |---|---|---|---|
-//! | a | 7–8 points on a box | M = 89, 2–8 visible; clutter over the scene or, in every second 63, all in shells | shell 0.2–0.5 m |
-//! | b | 50 points on a box | M = 500–2000, 12–35 visible, σ 1–3 cm, in every second 9 three times as much in depth | shell 0.5 m |
-//! | c | 20–50 points on a box | M = 100–300, 60 % visible | nothing |
-//! | d | N = 100–10 000 points in a cube | the same, 50–99 % of them elsewhere | the pairs (i, i) |
-//! | e | a lattice and four points off it | two thirds visible, its continuation, near misses, clutter | shell 0.4 m or nothing |
-//! | f | 50 points on a box | M = 500–2000, 4–9 visible | shell 0.3–0.5 m |
-//! | g | 50 points on a box | M = 500–2000, 6–20 visible, all clutter in shells | shell 0.5 m |
+//! | a paper-scale | 7–8 points on a box | M = 89, 2–8 visible; clutter anywhere or all in gates | gate 0.2–0.5 m |
+//! | b site-scale | 50 points on a box | M = 500–2000, 12–35 visible, σ 1–3 cm, in part 3σ in depth | gate 0.5 m |
+//! | c no-prior | 20–50 points on a box | M = 100–300, 60 % visible | none |
+//! | d putative | N = 100–10 000 points in a cube | M = N, 50–99 % of them outliers | the pairs (i, i) |
+//! | e lattice | a lattice and four points off it | 2/3 visible, continued; near misses, clutter | gate 0.4 m or none |
+//! | f few-visible | 50 points on a box | M = 500–2000, 4–9 visible | gate 0.3–0.5 m |
+//! | g dense-clutter | 50 points on a box | M = 500–2000, 6–20 visible, all clutter in gates | gate 0.5 m |
 //!
-//! An [absent](Presence::Absent) object has no visible points; its prior, the clutter about it and the
-//! size of the cloud stay as they are.
+//! The clutter of family a alternates every 63 problems; the depth noise of family b alternates every 9. An
+//! [absent](Presence::Absent) object has no visible points; its prior, the clutter about it and the size of the cloud
+//! do not change.
 
 mod boxes;
 mod clutter;
@@ -34,22 +34,22 @@ pub use truth::{GeneratedParameters, GeneratedTruth};
 
 use crate::stream::{Purpose, Stream};
 
-/// A family of identification problems.
+/// A family of generated coherence problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Family {
-    /// The paper's scale.
+    /// Paper-scale: the size of the paper's scenes.
     A,
-    /// A whole site.
+    /// Site-scale: a complete site.
     B,
-    /// A site without a prior.
+    /// No-prior: a site without a prior pose.
     C,
     /// Putative correspondences.
     D,
-    /// A lattice with decoys.
+    /// Lattice: a lattice with decoys.
     E,
-    /// A site of which little is visible.
+    /// Few-visible: a site of which few points are visible.
     F,
-    /// A site with all clutter in its shells.
+    /// Dense-clutter: a site with all clutter in the gates.
     G,
 }
 
@@ -57,12 +57,12 @@ impl Family {
     /// All families, in order.
     pub const ALL: [Self; 7] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F, Self::G];
 
-    /// Its name.
+    /// Name of the family.
     pub fn name(self) -> &'static str {
         ["paper-scale", "site-scale", "no-prior", "putative", "lattice", "few-visible", "dense-clutter"][self as usize]
     }
 
-    /// Its letter in `coherence-problem/1`.
+    /// Letter of the family in `coherence-problem/1`.
     pub fn letter(self) -> &'static str {
         ["a", "b", "c", "d", "e", "f", "g"][self as usize]
     }
@@ -75,32 +75,32 @@ impl FromStr for Family {
         let found = Self::ALL.into_iter().find(|family| family.name() == name);
         found.ok_or_else(|| {
             let names = Self::ALL.map(Self::name).join(", ");
-            format!("no family is called `{name}`; there are {names}")
+            format!("unknown family `{name}`; give one of {names}")
         })
     }
 }
 
-/// Whether the object is there.
+/// Presence of the object in the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Presence {
-    /// It is, and its visible points were measured.
+    /// The object is there, and its visible points were measured.
     #[default]
     Present,
-    /// It is not: the cloud is clutter.
+    /// The object is absent, and the cloud is clutter.
     Absent,
 }
 
-/// A problem and its truth.
+/// A generated problem with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Generated {
-    /// What a method may see.
+    /// The problem, as a method receives it.
     pub problem: GeneratedProblem,
-    /// What only the judge may see.
+    /// The truth, for evaluation only.
     pub truth: GeneratedTruth,
 }
 
 impl Generated {
-    /// The problem of this `number` in a family.
+    /// Generates problem `number` of a family.
     pub fn new(family: Family, seed: u64, number: u64, presence: Presence) -> Self {
         let source = Source { family, seed, number, presence };
         match family {
@@ -110,14 +110,14 @@ impl Generated {
         }
     }
 
-    /// The problem of this `number` among those of family d, with pairs of another kind: of one seed and number the object,
-    /// its pose and the noise are the same whatever the share of wrong pairs.
+    /// Generates problem `number` of family d (putative) with other parameters. The object, its pose and the noise
+    /// depend on seed and number alone, not on the fraction of outliers.
     pub fn of_pairs(pairs: &PutativePairs, seed: u64, number: u64) -> Self {
         putative::generated(&Source { family: Family::D, seed, number, presence: Presence::Present }, pairs)
     }
 }
 
-/// Where a problem comes from.
+/// The origin of a problem.
 struct Source {
     family: Family,
     seed: u64,
@@ -125,7 +125,7 @@ struct Source {
     presence: Presence,
 }
 
-/// What a stream of a problem is for: a change of one leaves the others as they are.
+/// A part of a problem with a stream of its own, so that a change of one part leaves the others unchanged.
 #[derive(Clone, Copy)]
 enum Part {
     Cell,

@@ -1,4 +1,4 @@
-//! Poses and rough poses.
+//! Poses and prior poses.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, Object, Point, Transform};
@@ -6,36 +6,37 @@ use seafix_geometry::{Camera, Object, Point, Transform};
 use super::GeneratedPrior;
 use crate::stream::Stream;
 
-/// Rough poses that are tried before the last is kept whatever it hides.
+/// Maximum number of prior poses that are tried; the last is kept although a point may lie outside of its gate.
 const MAX_TRIES: usize = 1000;
 
-/// A rotation uniform over all rotations. (Four normal numbers, normalised.)
+/// A uniform random rotation: four normal numbers, normalised.
 pub(super) fn rotation(stream: &mut Stream) -> UnitQuaternion<f64> {
     let [w, i, j, k] = std::array::from_fn(|_| stream.normal());
     UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k))
 }
 
-/// A direction uniform over the sphere.
+/// A uniform random direction.
 pub(super) fn direction(stream: &mut Stream) -> Vector3<f64> {
     stream.normal3(1.0).normalize()
 }
 
-/// Uniform in the cube of this half-size.
+/// A uniform point in the cube with this half-size.
 pub(super) fn cube(stream: &mut Stream, half: f64) -> Vector3<f64> {
     let [x, y, z] = std::array::from_fn(|_| stream.between(-half, half));
     Vector3::new(x, y, z)
 }
 
-/// An object at this distance ahead, turned anyhow, off the axis by at most half a metre each way.
+/// A random pose of the object at this distance, at most 0.5 m off the optical axis on each axis.
 pub(super) fn ahead(stream: &mut Stream, distance: f64) -> Transform<Camera, Object> {
     let rotation = rotation(stream);
     let off = cube(stream, 0.5);
     Transform::new(rotation, Vector3::new(off.x, off.y, distance))
 }
 
-/// A rough pose such that every point that was measured (`seen`: object frame, camera frame) lies in
-/// its shell: turned about the model's centre by up to 0.6 s over its radius, moved by up to `shift`·s
-/// along each camera axis, s the shell's half-size.
+/// A prior pose under which every measured point (`seen`: object frame, camera frame) lies in its gate.
+///
+/// The true pose is rotated about the model's centroid by up to 0.6 s divided by the model's radius, and displaced by
+/// up to `shift`·s along each camera axis; s is the gate's half-size.
 pub(super) fn prior_pose(
     stream: &mut Stream,
     truth: &Transform<Camera, Object>,

@@ -1,4 +1,4 @@
-//! A drawn problem as plain data, and as what a search is given.
+//! A generated problem as plain data, and as input of a search.
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
@@ -7,48 +7,48 @@ use serde::Serialize;
 
 use super::Source;
 
-/// A problem in the keys and the order of `coherence-problem/1`.
+/// A problem with the keys and the order of `coherence-problem/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GeneratedProblem {
-    /// The format's name.
+    /// Name of the format.
     pub format: &'static str,
     /// Family and number.
     pub id: String,
-    /// The family's letter.
+    /// Letter of the family.
     pub family: &'static str,
-    /// The seed, as a name.
+    /// Name of the seed.
     pub seed_set: String,
-    /// The number in the family.
+    /// Number in the family.
     pub seed: u64,
-    /// The feature points, object frame (m).
+    /// Model points in the object frame (m).
     pub model: Vec<[f64; 3]>,
-    /// The measured points, camera frame (m).
+    /// Cloud points in the camera frame (m).
     pub cloud: Vec<[f64; 3]>,
-    /// RMS standard deviation of a measured coordinate (m).
+    /// Root mean square of the coordinates' standard deviations (m).
     pub sigma: f64,
-    /// The distance tolerance Δ = 3√2 σ (m).
+    /// Distance tolerance Δ = 3√2 σ (m).
     pub delta: f64,
-    /// What is known of the pose.
+    /// Prior pose, if there is one.
     pub prior: Option<GeneratedPrior>,
-    /// The only pairs to consider.
+    /// Putative pairs, if the search is restricted to them.
     pub putative: Option<Vec<[usize; 2]>>,
-    /// Standard deviations along the camera's axes, where they differ (m).
+    /// Standard deviations along the camera's axes (m), if they differ.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_xyz: Option<Vec<[f64; 3]>>,
 }
 
-/// The rough pose and how far it may be off.
+/// A prior pose with its gate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GeneratedPrior {
-    /// camera_from_object.
+    /// Prior camera_from_object.
     #[serde(rename = "T_cam_obj")]
     pub t_cam_obj: [[f64; 4]; 4],
-    /// Half-size of the shell (m).
+    /// Half-size of the gate (m).
     pub shell_half_m: f64,
 }
 
 impl GeneratedProblem {
-    /// The frame of a problem: everything but model, cloud and what is known beforehand.
+    /// A problem without cloud, prior pose and putative pairs.
     pub(super) fn new(source: &Source, model: &[Vector3<f64>], sigma: f64) -> Self {
         Self {
             format: seafix_referencing::problem_file::FORMAT,
@@ -66,7 +66,7 @@ impl GeneratedProblem {
         }
     }
 
-    /// What a search is given.
+    /// The problem as input of a search.
     pub fn problem(&self) -> CoherenceProblem {
         let model = self.model.iter().enumerate().map(|(i, at)| ModelPoint::exact(i.to_string(), Point::from(*at)));
         let cloud = self.cloud.iter().enumerate().map(|(j, at)| {
@@ -94,12 +94,12 @@ impl GeneratedPrior {
     }
 }
 
-/// To six decimals.
+/// Rounds to six decimals.
 pub(super) fn round(x: f64) -> f64 {
     (x * 1e6).round() / 1e6
 }
 
-/// The coordinates in whole micrometres, as the files have them.
+/// Coordinates rounded to 1 µm, as in the files.
 pub(super) fn micrometres(at: &Vector3<f64>) -> [f64; 3] {
     [round(at.x), round(at.y), round(at.z)]
 }

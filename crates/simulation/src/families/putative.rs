@@ -1,4 +1,4 @@
-//! Family d: putative correspondences, most of them wrong.
+//! Family d: putative correspondences, most of them outliers.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Point, Transform};
@@ -10,7 +10,7 @@ use super::{
     problem::micrometres,
 };
 
-/// Pairs, and of these wrong ones (%).
+/// Number of pairs, and percentage of outliers among them.
 const CELLS: [(usize, usize); 13] = [
     (100, 50),
     (100, 80),
@@ -26,19 +26,20 @@ const CELLS: [(usize, usize); 13] = [
     (10_000, 95),
     (10_000, 99),
 ];
-/// Problems of a cell before the next one's turn.
+/// Number of consecutive problems in one cell.
 const A_CELL: usize = 4;
 
-/// Putative correspondences between the points of an object, uniform in a cube of edge 1 m, and as many measured points.
+/// Putative correspondences between model points and equally many measured points; the model is uniform in a cube of
+/// edge 1 m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PutativePairs {
-    /// How many.
+    /// Number of pairs.
     pub pairs: usize,
-    /// How many in a hundred are wrong: their measured points lie anywhere in a ball about the object.
+    /// Percentage of outliers, whose measured points are uniform in a ball about the object.
     pub outliers: usize,
-    /// The radius of the ball (m).
+    /// Radius of the ball (m).
     pub radius: f64,
-    /// Noise of the measured points, an axis (m).
+    /// Standard deviation of the measured points on each axis (m).
     pub sigma: f64,
 }
 

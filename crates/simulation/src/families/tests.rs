@@ -6,7 +6,7 @@ use seafix_referencing::problem_file::CoherenceProblem;
 
 use super::*;
 
-/// Numbers that show every cell of the smaller sizes.
+/// Numbers that cover every cell of the smaller sizes.
 fn numbers(family: Family) -> Vec<u64> {
     match family {
         Family::A => (0..28).chain(63..91).collect(),
@@ -36,7 +36,7 @@ fn the_file_holds_the_problem() {
         let text = serde_json::to_string(&generated.problem).unwrap();
         let mut read = CoherenceProblem::parse(&text, Path::new("drawn.json")).unwrap();
         let mut given = generated.problem.problem();
-        // The reader may miss the last bit of seventeen digits.
+        // The parser may differ in the last bit of seventeen digits.
         match (read.prior.take(), given.prior.take()) {
             (Some(read), Some(given)) => {
                 assert_eq!(read.bound, given.bound);
@@ -44,7 +44,7 @@ fn the_file_holds_the_problem() {
             }
             (read, given) => assert!(read.is_none() && given.is_none()),
         }
-        assert!(read == given, "{} is read as another problem", generated.problem.id);
+        assert!(read == given, "{} changes when it is parsed", generated.problem.id);
     }
 }
 
@@ -90,7 +90,7 @@ fn visible_points_lie_in_their_gates() {
             nearest_edge = nearest_edge.max(off);
         }
     }
-    assert!(nearest_edge > 0.9, "the shells are never used: {nearest_edge}");
+    assert!(nearest_edge > 0.9, "no point lies near the border of its gate: {nearest_edge}");
 }
 
 #[test]
@@ -132,7 +132,11 @@ fn an_absent_object_leaves_model_prior_and_size_as_they_are() {
 }
 
 #[test]
-fn families_are_known_by_their_letters() {
+fn families_are_known_by_their_names() {
     assert!(Family::ALL.into_iter().all(|family| family.name().parse() == Ok(family)));
-    assert_eq!("h".parse::<Family>().unwrap_err(), "no family is called `h`; there are a, b, c, d, e, f and g");
+    assert_eq!(
+        "h".parse::<Family>().unwrap_err(),
+        "unknown family `h`; give one of paper-scale, site-scale, no-prior, putative, lattice, few-visible, \
+         dense-clutter"
+    );
 }

@@ -1,4 +1,4 @@
-//! The truth of a problem, and what the best possible method could know.
+//! The truth of a generated problem, and the limits of the best possible method.
 
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_referencing::{Correspondence, Kabsch, Observations, Solver, problem_file::CoherenceProblem, rms_apart};
@@ -6,72 +6,72 @@ use serde::Serialize;
 
 use super::GeneratedProblem;
 
-/// From this many true pairs on, the largest coherent set among them is not computed.
+/// Number of true pairs from which on the largest coherent subset is not computed.
 const MANY_PAIRS: usize = 100;
 
-/// The truth of a problem, for its judge alone.
+/// The truth of a problem, for evaluation only.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GeneratedTruth {
     /// Family and number.
     pub id: String,
-    /// camera_from_object; of an absent object, where the clutter about it stands.
+    /// True camera_from_object; for an absent object, the pose of the clutter about it.
     #[serde(rename = "T_cam_obj")]
     pub t_cam_obj: [[f64; 4]; 4],
-    /// The true pairs (model point, cloud point), by model point.
+    /// True pairs (model point, cloud point), sorted by model point.
     pub pairs: Vec<[usize; 2]>,
-    /// Whether they determine a pose.
+    /// Whether the true pairs determine a pose.
     pub pose_defined: bool,
-    /// Their least-squares pose.
+    /// Least-squares pose of the true pairs.
     #[serde(rename = "ideal_T_cam_obj")]
     pub ideal_t_cam_obj: Option<[[f64; 4]; 4]>,
-    /// Root mean square over all model points of where it misplaces them (m).
+    /// Target registration error of the least-squares pose: RMS over all model points (m).
     pub ideal_tre_rms: Option<f64>,
-    /// The largest coherent set among the true pairs; `None` of 100 pairs or more.
+    /// Size of the largest coherent subset of the true pairs; `None` from 100 pairs on.
     pub max_coherent_true: Option<usize>,
-    /// What the family fixed or drew.
+    /// Parameters of the problem.
     pub params: GeneratedParameters,
 }
 
-/// What a family fixed or drew; a family has some of them.
+/// Parameters of a problem; each family has some of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct GeneratedParameters {
-    /// Model points.
+    /// Number of model points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub n: Option<usize>,
-    /// Cloud points.
+    /// Number of cloud points.
     #[serde(rename = "M", skip_serializing_if = "Option::is_none")]
     pub m: Option<usize>,
-    /// Model points that were measured.
+    /// Number of measured model points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub visible: Option<usize>,
-    /// Half-size of the shells (m).
+    /// Half-size of the gates (m).
     #[serde(rename = "shell", skip_serializing_if = "Option::is_none")]
     pub gate: Option<f64>,
-    /// Whether all clutter lies in shells.
+    /// Whether all clutter lies in gates.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dense: Option<bool>,
-    /// Noise (m).
+    /// Standard deviation of the noise (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
-    /// How much noisier depth is.
+    /// Ratio of depth noise to lateral noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aniso: Option<u32>,
-    /// Points that the best wrong placement of the lattice matches.
+    /// Number of points that the best wrong placement of the lattice matches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_wrong_symmetry: Option<usize>,
-    /// Whether a prior is given.
+    /// Whether the problem has a prior pose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<bool>,
-    /// Putative pairs.
+    /// Number of putative pairs.
     #[serde(rename = "N", skip_serializing_if = "Option::is_none")]
     pub pairs: Option<usize>,
-    /// Of these, wrong ones (%).
+    /// Percentage of outliers among the putative pairs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outliers: Option<usize>,
-    /// Radius of the ball they lie in (m).
+    /// Radius of the ball that holds the outliers (m).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<f64>,
-    /// Given where the object is absent.
+    /// Whether the object is absent; not given for a present object.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absent: Option<bool>,
 }
@@ -103,7 +103,7 @@ impl GeneratedTruth {
     }
 }
 
-/// The size of the largest coherent set among one-to-one pairs nearly all of which agree.
+/// The size of the largest coherent subset of one-to-one pairs of which nearly all agree.
 fn max_coherent(problem: &CoherenceProblem, pairs: &[Correspondence]) -> usize {
     let agree = |a: Correspondence, b: Correspondence| {
         let model = problem.model[a.model].at.distance(&problem.model[b.model].at);
@@ -116,8 +116,9 @@ fn max_coherent(problem: &CoherenceProblem, pairs: &[Correspondence]) -> usize {
     without_conflict(&conflicts, &vec![true; pairs.len()])
 }
 
-/// The most vertices of those `left` of which no two are in conflict: one without or with a single
-/// conflict is always taken, and of the others the one with most conflicts is tried both ways.
+/// The size of a maximum independent set in the conflict graph restricted to `left`.
+///
+/// A vertex with at most one conflict is always taken. Otherwise the vertex with the most conflicts is tried both ways.
 fn without_conflict(conflicts: &[Vec<usize>], left: &[bool]) -> usize {
     let of = |i: usize| conflicts[i].iter().filter(|&&k| left[k]).count();
     let with = |i: usize| {

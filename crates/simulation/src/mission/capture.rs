@@ -1,4 +1,4 @@
-//! What the cameras show, working or not.
+//! The state of the cameras under faults.
 
 use super::Instant;
 use crate::{
@@ -6,25 +6,25 @@ use crate::{
     stream::{Purpose, Stream},
 };
 
-/// Slow cameras show every so many-th frame until the next.
+/// Slow cameras capture every fifth frame and repeat it until the next.
 const SLOW: usize = 5;
 
-/// What the cameras show at an instant, in images as in points.
+/// The content that the cameras deliver at an instant, for images and for points.
 pub(super) enum CaptureState<'a> {
-    /// What is there.
+    /// The current view.
     Current,
-    /// What was there.
+    /// An earlier view.
     Earlier(Instant<'a>),
-    /// The right image as the left, and the left as the right.
+    /// Left and right images exchanged.
     Swapped,
-    /// Nothing.
+    /// Black images.
     Dark,
-    /// Anything, drawn from this.
+    /// Random grey levels from this stream.
     Garbage(Stream),
 }
 
 impl<'a> Instant<'a> {
-    /// What the cameras show; of faults at once the last one counts.
+    /// The content under the active faults; the last active fault in the list decides.
     pub(super) fn capture(&self) -> CaptureState<'a> {
         let faults = self.mission.settings.faults.iter();
         let mut acting = faults.filter(|fault| fault.device == FaultyDevice::Images && fault.acts(self.time));

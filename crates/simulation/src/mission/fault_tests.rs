@@ -1,11 +1,11 @@
-//! Cameras that fail, each in its way.
+//! Camera faults.
 
 use seafix_vision::{Image, Threads};
 
 use super::{Mission, PlannedMission, RigPlan};
 use crate::sensors::{DeviceFault, FaultKind, FaultyDevice};
 
-/// Twelve frames a fifth of a second apart; the fault acts from the fifth to the tenth.
+/// A mission of twelve frames at 5 Hz; the fault is active from the fifth to the tenth.
 fn planned(faults: Vec<DeviceFault>) -> PlannedMission {
     let rig = RigPlan { size: [64, 48], focal: 31.0, ..RigPlan::default() };
     super::tests::planned(&Mission { frames: 12, rate: 5.0, start: 3.0, rig, faults, ..Mission::default() })
@@ -49,14 +49,14 @@ fn cameras_fail_as_reported() {
             FaultKind::Stuck => each(&|k| failed[k] == sound[5]),
             FaultKind::Garbage => {
                 each(&|k| failed[k].0 != failed[k].1 && failed[k] != failed[k - 1]);
-                // Even over all levels: a mean of 127.5 and a standard deviation of 74.
+                // A uniform distribution over all levels has a mean of 127.5 and a standard deviation of 74.
                 let pixels = failed[6].0.pixels();
                 let mean = pixels.iter().sum::<f32>() / pixels.len() as f32;
                 assert!((mean - 127.5).abs() < 5.0, "{mean}");
             }
             FaultKind::Wrong => each(&|k| (&failed[k].0, &failed[k].1) == (&sound[k].1, &sound[k].0)),
             FaultKind::Slow => each(&|k| failed[k] == sound[k - k % 5]),
-            // What was seen two frames ago, with the noise of now: nearer to that than to what is there.
+            // The view of two frames ago with new noise: nearer to that view than to the current one.
             FaultKind::Delayed => each(&|k| {
                 let far = |other: &Image| {
                     let pixels = failed[k].0.pixels().iter().zip(other.pixels());
@@ -75,7 +75,7 @@ fn cameras_fail_as_reported() {
 
 #[test]
 fn the_truth_does_not_fail() {
-    // Stamps, poses and what is visible stay those of the instant: a judge must not fail with the device.
+    // Stamps, poses and visible points do not change with the camera fault, because they are the evaluation's truth.
     let fault =
         DeviceFault { device: FaultyDevice::Images, kind: FaultKind::Delayed, from: 0.0, to: 99.0, amount: 0.4 };
     let (sound, failed) = (planned(Vec::new()), planned(vec![fault]));

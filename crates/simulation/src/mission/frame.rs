@@ -1,4 +1,4 @@
-//! One instant of a mission: what a method may see, and apart from it the truth.
+//! One instant of a mission: the data for a method, and apart from them the truth.
 
 use nalgebra::{Matrix6, Vector6};
 use seafix_geometry::{
@@ -16,26 +16,26 @@ use crate::{
     stream::{Purpose, Stream},
 };
 
-/// One instant.
+/// One instant of a mission.
 #[derive(Debug, Clone)]
 pub struct Instant<'a> {
     pub(super) mission: &'a PlannedMission,
-    /// Its number in the mission.
+    /// Frame number in the mission.
     pub index: usize,
-    /// When it was taken (ns since 1970).
+    /// Time of the exposure (ns since 1970).
     pub stamp_ns: u64,
-    /// The rough pose, where one is known, and its covariance.
+    /// The prior pose and its covariance; `None` before the first acoustic position.
     pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
     pub(super) time: f64,
     truth: InstantTruth,
 }
 
-/// What no method may see.
+/// The truth of an instant, which no method receives.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InstantTruth {
-    /// The left camera in the world, at the middle of the exposure.
+    /// The left camera's pose at the middle of the exposure.
     pub world_from_camera: Transform<World, Camera>,
-    /// The feature points, of any object, that lie in both images with nothing before them.
+    /// The feature points of all objects that are inside both images and not occluded.
     pub visible: Vec<VisiblePoint>,
 }
 
@@ -53,12 +53,12 @@ impl<'a> Instant<'a> {
         instant
     }
 
-    /// What no method may see.
+    /// The truth, for evaluation only.
     pub fn truth(&self) -> &InstantTruth {
         &self.truth
     }
 
-    /// The left and the right image: a plain function of the instant, whoever works.
+    /// Renders the left and the right image, a function of the instant alone; the bytes do not depend on `threads`.
     pub fn render(&self, threads: Threads) -> (Image, Image, Exposure) {
         match self.capture() {
             CaptureState::Current => self.sound(threads),
@@ -72,24 +72,24 @@ impl<'a> Instant<'a> {
         }
     }
 
-    /// The images of cameras that work.
+    /// Renders the images of intact cameras.
     fn sound(&self, threads: Threads) -> (Image, Image, Exposure) {
         let shot = self.shot();
         self.mission.with_memory(threads, |work| self.mission.studio.render(&self.mission.scene, &shot, work))
     }
 
-    /// Images of these levels.
+    /// Builds two images from generated grey levels, without a scene.
     fn without_light(&self, level: &mut dyn FnMut() -> f32) -> (Image, Image, Exposure) {
         let [width, height] = self.mission.cameras.lens.camera().size().map(|n| n as usize);
         let mut image = || {
             let pixels = (0..width * height).map(|_| level()).collect();
-            Image::new(width, height, pixels).expect("a pixel for each place")
+            Image::new(width, height, pixels).expect("width × height pixels were generated")
         };
         let left = image();
         (left, image(), Exposure { ms: 0.0, gain: 0.0 })
     }
 
-    /// Where the right camera is taken from: later by the error of synchronisation.
+    /// Time of the right exposure (s), which differs from the left by the synchronisation error.
     fn right_time(&self) -> f64 {
         self.time + self.mission.settings.imager.sync_ms * 1e-3
     }
@@ -108,7 +108,7 @@ impl<'a> Instant<'a> {
         }
     }
 
-    /// The pixels of a feature point that both cameras see in their images.
+    /// The pixels of a feature point that both cameras see.
     fn see(&self, shot: &Shot, point: &ScenePoint) -> Option<StereoPixels> {
         let pixels = self.project_visible(shot, &Point::from(point.at))?;
         let scene = &self.mission.scene;
@@ -116,7 +116,7 @@ impl<'a> Instant<'a> {
         seen.iter().all(|from| scene.sees(from, point)).then_some(pixels)
     }
 
-    /// Where both cameras would see a place, within their images.
+    /// The pixels of a place inside both images, occluded or not.
     fn project_visible(&self, shot: &Shot, place: &Point<World>) -> Option<StereoPixels> {
         let studio = &self.mission.studio;
         let camera = self.mission.cameras.lens.camera();
@@ -141,19 +141,21 @@ impl<'a> Instant<'a> {
         all
     }
 
-    /// The same view as measured points, without an image: visible feature points with the noise of the
-    /// settings, and clutter, triangulated with the told rig, in an order that tells nothing.
+    /// Measured points of the same view, without rendering.
+    ///
+    /// Visible feature points carry the noise of the settings. Clutter points are added, all are triangulated with the
+    /// nominal rig, and their order is random.
     pub fn points(&self) -> Vec<MeasuredPoint> {
         match self.capture() {
             CaptureState::Current => self.sound_points(),
             CaptureState::Earlier(then) => then.sound_points(),
-            // Nothing before the cameras has a point to the right in the right image.
+            // Swapped images give negative disparities, which no point before the cameras has.
             CaptureState::Dark | CaptureState::Swapped => Vec::new(),
             CaptureState::Garbage(stream) => self.any_points(stream),
         }
     }
 
-    /// Points of nothing: as many false pairs as there is clutter.
+    /// Points from random pixel pairs; their number equals the clutter's.
     fn any_points(&self, mut stream: Stream) -> Vec<MeasuredPoint> {
         let noise = &self.mission.settings.points;
         let [width, height] = self.mission.cameras.lens.camera().size().map(|n| f64::from(n - 1));
@@ -166,16 +168,16 @@ impl<'a> Instant<'a> {
         pairs.into_iter().filter_map(|pixels| self.triangulated(pixels)).collect()
     }
 
-    /// What the told rig makes of a pair of pixels.
+    /// The triangulation of a pixel pair by the nominal rig.
     fn triangulated(&self, seen: StereoPixels) -> Option<MeasuredPoint> {
-        // A covariance of zero would claim what no camera can know.
+        // A covariance of zero would claim an exact measurement.
         let pixels = UncertainPixels::independent(seen, self.mission.settings.points.sigma_px.max(1e-3));
         let found = self.mission.cameras.nominal.triangulate(&pixels).ok()?;
         let position = UncertainPoint { at: found.point, covariance: found.covariance };
         Some(MeasuredPoint { position, pixels: Some(pixels) })
     }
 
-    /// The points of cameras that work.
+    /// Measures the points of intact cameras.
     fn sound_points(&self) -> Vec<MeasuredPoint> {
         let mission = self.mission;
         let noise = &mission.settings.points;
@@ -214,8 +216,8 @@ impl<'a> Instant<'a> {
     }
 }
 
-/// A drawn rough pose: T_true = T_rough · Exp(ξ), the attitude's error about the camera's axes, the position's
-/// along the world's.
+/// A sampled prior pose: T_true = T_prior · Exp(ξ), with the attitude error about the camera's axes and the position
+/// error along the world's.
 fn prior_pose(
     mission: &PlannedMission,
     index: usize,
@@ -227,17 +229,17 @@ fn prior_pose(
     let turn = so3::exp(&-stream.normal3(attitude));
     let step = stream.normal3(position);
     let world_from_camera = Transform::new(truth.rotation() * turn, truth.translation() - step);
-    // A covariance of zero would claim what no sensor can know.
+    // A covariance of zero would claim an exact pose.
     (world_from_camera, Covariance6::isotropic(attitude.max(1e-6), position.max(1e-6)))
 }
 
-/// The rough pose of the camera from that of the vehicle.
+/// The camera's prior pose from the vehicle's.
 fn from_sensors(
     mission: &PlannedMission,
     prior_pose: &SensorPrior,
 ) -> (Transform<World, Camera>, Covariance6<World, Camera>) {
     let world_from_camera = prior_pose.world_from_body * mission.body_from_camera;
-    // ρ lives in the camera's frame.
+    // The translation part ρ of the covariance is expressed in the camera's frame.
     let turn = world_from_camera.rotation_matrix();
     let mut covariance = Matrix6::from_diagonal_element(prior_pose.attitude * prior_pose.attitude);
     covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(turn.transpose() * prior_pose.position * turn));

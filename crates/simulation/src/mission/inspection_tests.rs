@@ -1,4 +1,4 @@
-//! Inspections over the built-in sites.
+//! Inspections of the built-in sites.
 
 use std::path::Path;
 
@@ -32,8 +32,10 @@ fn planned(mission: &Mission) -> PlannedMission {
     mission.plan(3, 0, Path::new("")).unwrap()
 }
 
-/// A site in a file, gone when this is dropped: one object, whose frame is the world, with these feature points, the first
-/// three its base, and one point of interest, seen from above.
+/// A site in a temporary file, deleted on drop.
+///
+/// Its only object has the world's frame, these feature points (the first three are the base) and one point of
+/// interest, visible from above.
 struct Written(std::path::PathBuf);
 
 impl Written {
@@ -70,8 +72,10 @@ impl Drop for Written {
     }
 }
 
-/// Every point of interest is looked at, at rest, from the stand-off, in both images and with nothing between; on the whole
-/// way every camera keeps clear of the shells. How many points there are.
+/// Checks an inspection and returns its number of points of interest.
+///
+/// The vehicle stops at a view of every point, at the stand-off, with the point in both images and not occluded. Every
+/// camera keeps its clearance from the bounding boxes over the complete route.
 fn looked_at(mission: &Mission) -> usize {
     let (site, route) = (&mission.site, &mission.route);
     let plan = planned(mission);
@@ -82,7 +86,7 @@ fn looked_at(mission: &Mission) -> usize {
         .iter()
         .map(|object| BoundingBox::<World>::around(object.points.iter().map(|point| Point::from(point.at))).unwrap())
         .collect();
-    // The planner looks every 0.1 m: between two such places a straight way comes nearer by the sagitta at most.
+    // The planner checks every 0.1 m; between two checks a straight path comes nearer by at most the sagitta.
     let clearance = route.clearance - 0.1 * 0.1 / 8.0 / route.clearance;
     let right = plan.rig().right_from_left().inverse().translation();
     let mut cameras = Vec::new();
@@ -107,7 +111,7 @@ fn looked_at(mission: &Mission) -> usize {
                     && plan.rig().sees(&seen, 0.0).is_some()
                     && plan.scene.clear(&camera.translation(), &to)
             });
-            // Looks are 0.05 s apart: one at either end may be missing.
+            // Samples are 0.05 s apart, so one may be missing at either end.
             let seen = seen.count() as f64 * 0.05;
             assert!(seen >= route.hold - 0.1, "{site}: {}/{} for {seen} s", object.id, interest.id);
         }
@@ -115,11 +119,11 @@ fn looked_at(mission: &Mission) -> usize {
     points
 }
 
-/// So it is on every built-in site, and where a roof hides what is under it from straight above: 0.3 m wide, 0.6 m above
-/// the point, it leaves it to be seen from 15° and more aside.
+/// Every point of interest is inspected on all built-in sites, and under a roof that hides it from straight above.
 ///
-/// Seen to fail when views out of the images count, when a corner of a leg is not rested at, and, under the roof, when
-/// views count that something hides.
+/// The roof is 0.3 m wide and 0.6 m above the point, so views from 15° and more to the side are clear. Regression:
+/// accepting views outside of the images, moving on without a stop at the corner of a segment, and accepting occluded
+/// views fail this test.
 #[test]
 fn every_point_is_examined_and_no_gate_is_touched() {
     for (site, _) in BUILT_IN {
@@ -142,10 +146,10 @@ fn every_point_is_examined_and_no_gate_is_touched() {
     assert_eq!(looked_at(&roof.mission(Route::default())), 1);
 }
 
-/// A shell is kept clear of where no body is too: within four posts, 4 m apart and 2.5 m high, there is room for the vehicle
-/// 2 m from the nearest body, but it may look at the gauge in their middle from above them only.
+/// A bounding box is avoided even where no body is.
 ///
-/// Seen to fail when only bodies are kept clear of.
+/// Four posts, 4 m apart and 2.5 m high, leave room for the vehicle 2 m from the nearest body. The gauge in their
+/// middle may still be viewed from above the posts only. Regression: clearance from bodies alone fails this test.
 #[test]
 fn a_gate_is_not_entered_where_it_is_empty() {
     let mut points = vec![[0.0, 0.0, 0.0], [0.0, -0.4, 0.0], [0.4, 0.0, 0.0]];
@@ -160,11 +164,15 @@ fn a_gate_is_not_entered_where_it_is_empty() {
     let posts = Written::new("posts", &points, [0.2, -0.2, 0.0], 0.1, &bodies);
     let at = |stand_off| posts.mission(Route { stand_off, altitude: 5.0, ..Route::default() });
     let near = at(1.5).plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
-    assert!(near.contains("no clear view of `posts/gauge`") && near.contains("are within 0.5 m of a shell"), "{near}");
+    assert!(
+        near.contains("no clear view of `posts/gauge`") && near.contains("are within 0.5 m of a bounding box"),
+        "{near}"
+    );
     assert_eq!(looked_at(&at(4.0)), 1);
 }
 
-/// What cannot be looked at is refused with its place and a remedy; so is a site or an object without points of interest.
+/// An inspection without a clear view is rejected with place and remedy; so is a site or an object without points of
+/// interest.
 #[test]
 fn what_cannot_be_examined_is_refused() {
     let said = |mission: &Mission| mission.plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
@@ -175,10 +183,10 @@ fn what_cannot_be_examined_is_refused() {
         "{far}"
     );
     let none = said(&mission("random", Route::default()));
-    assert!(none.contains("the site has no point to inspect"), "{none}");
+    assert!(none.contains("the site has no point of interest"), "{none}");
     let unknown = said(&mission("drill-centre", Route { object: "tree-z".into(), ..Route::default() }));
     assert!(unknown.contains("route.object = `tree-z`; give one of "), "{unknown}");
-    // One object alone is a shorter way.
+    // A single object needs a shorter route.
     let full = planned(&mission("drill-centre", Route::default()));
     let one = planned(&mission("drill-centre", Route { object: "plet".into(), ..Route::default() }));
     assert!(one.times.last() < full.times.last());

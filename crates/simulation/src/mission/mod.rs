@@ -1,4 +1,4 @@
-//! A mission: one vehicle's passage over one site, with everything that may go wrong as a number.
+//! A mission: one simulated dive of a vehicle over a site, with every disturbance as a setting.
 
 mod capture;
 mod frame;

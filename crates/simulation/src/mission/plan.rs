@@ -1,4 +1,4 @@
-//! A mission whose site is built and whose way is gone; frames are made when asked for, in any order.
+//! A mission with its site and its trajectory; frames are computed on demand, in any order.
 
 use std::sync::Mutex;
 
@@ -18,14 +18,14 @@ use crate::{
     vehicle::{Looker, PlannedRoute, RouteKind, Track},
 };
 
-/// The first stamp: some time in 2023, so that stamps look like those of a real log.
+/// Stamp of the start of a dive (ns since 1970): November 2023, like the stamps of a real log.
 const EPOCH_NS: u64 = 1_700_000_000_000_000_000;
-/// A vehicle farther off its route than this (m) does not dive it.
+/// Maximum distance of the camera from its route (m); a mission with more is rejected.
 const STRAY: f64 = 10.0;
-/// Seconds between two looks for collisions.
+/// Time step of the collision check (s).
 const LOOK: f64 = 0.1;
 
-/// A planned mission.
+/// A mission with its site and the vehicle's trajectory.
 #[derive(Debug)]
 pub struct PlannedMission {
     pub(super) settings: Mission,
@@ -35,14 +35,14 @@ pub struct PlannedMission {
     pub(super) cameras: Cameras,
     pub(super) studio: Studio,
     pub(super) track: Track,
-    /// How far the water has carried what floats in it, at the track's times (m).
+    /// Displacement of floating particles by the water since the start, at the track's times (m).
     drifts: Vec<Vector3<f64>>,
     pub(super) body_from_camera: Transform<Body, Camera>,
-    /// What the sensors say, and where the route leads.
+    /// Sensor readings and the poses that they give.
     navigation: SensorNavigation,
     route: PlannedRoute,
     pub(super) times: Vec<f64>,
-    /// Memories of rendering, one for each that renders at once.
+    /// Idle rendering workspaces, one for each concurrent renderer.
     memories: Mutex<Vec<Workspace>>,
 }
 
@@ -58,7 +58,7 @@ impl PlannedMission {
             body_from_camera,
             parts: parts(&cameras, &studio).into_iter().map(|(_, at)| at).collect(),
         };
-        // An inspection is planned by the site as it was built, which the changes of the field are not known to.
+        // An inspection is planned on the site as built, because its planner does not know the later changes.
         let built = (settings.route.kind == RouteKind::Inspection).then(|| {
             let exact = SurveyErrors { model: 0.0, survey: 0.0 };
             Scene::new(plan, &Changes::default(), exact, seed)
@@ -72,7 +72,8 @@ impl PlannedMission {
             };
         if last > 7200.0 {
             return Err(format!(
-                "route.speed = {}; the way takes {last:.0} s, two hours are the most",
+                "route.speed = {}; the route takes {last:.0} s, the limit is 7200 s; raise the speed or shorten the \
+                 route",
                 settings.route.speed
             ));
         }
@@ -109,56 +110,56 @@ impl PlannedMission {
         Ok(planned)
     }
 
-    /// The site as a method knows it.
+    /// The site as a method receives it, with the errors of its survey.
     pub fn site(&self) -> &Site {
         &self.scene.nominal
     }
 
-    /// The rig that a method is told.
+    /// The rig as a method receives it, with its calibration errors.
     pub fn rig(&self) -> &StereoRig {
         &self.cameras.nominal
     }
 
-    /// The settings it was planned with.
+    /// The settings of the mission.
     pub fn settings(&self) -> &Mission {
         &self.settings
     }
 
-    /// Truth: where each object of the told site is.
+    /// The true pose of each object of [`site`](Self::site).
     pub fn world_from_object(&self) -> &[Transform<World, Object>] {
         &self.scene.world_from_object
     }
 
-    /// Where the left camera sits in the vehicle.
+    /// The left camera's pose in the vehicle.
     pub fn body_from_camera(&self) -> Transform<Body, Camera> {
         self.body_from_camera
     }
 
-    /// What the navigation sensors say during the whole dive, faults included; no truth is in it.
+    /// All readings of the navigation sensors during the dive, with noise and faults, without truth.
     pub fn readings(&self) -> Readings {
         self.navigation.readings()
     }
 
-    /// The rough pose of the vehicle that the sensors give at a time (s).
+    /// The vehicle's prior pose from the sensors at a time (s).
     pub(super) fn integrated(&self, time: f64) -> Option<SensorPrior> {
         self.navigation.at(time)
     }
 
-    /// The stamp of a time of the dive (s): ns since 1970.
+    /// The stamp of a time of the dive (s), in ns since 1970.
     pub fn stamp(&self, time: f64) -> u64 {
         EPOCH_NS + (time * 1e9).round() as u64
     }
 
-    /// The places that the route leads through: north, east, height above the mean bed (m), as
-    /// [`Route::waypoints`](crate::vehicle::Route::waypoints) has them.
+    /// The route's vertices: north, east, height above the mean seabed (m), as in
+    /// [`Route::waypoints`](crate::vehicle::Route::waypoints).
     pub fn waypoints(&self) -> Vec<[f64; 3]> {
         let depth = self.scene.seabed.depth();
         self.route.places().iter().map(|p| [p.x, p.y, depth - p.z]).collect()
     }
 
-    /// Where the feature points truly are, in the order of the site: object, point, place in the world (m).
+    /// The true positions of the feature points, in the site's order: object, point, world position (m).
     ///
-    /// The site has them as they were surveyed, in the frames of their objects.
+    /// [`site`](Self::site) holds their surveyed positions instead, in the frames of the objects.
     pub fn true_points(&self) -> impl Iterator<Item = (&str, &str, [f64; 3])> {
         let objects = self.scene.nominal.objects.iter().zip(&self.scene.objects);
         objects.flat_map(|(nominal, object)| {
@@ -167,12 +168,12 @@ impl PlannedMission {
         })
     }
 
-    /// How many frames it has.
+    /// The number of frames.
     pub fn len(&self) -> usize {
         self.times.len()
     }
 
-    /// Whether it has no frame.
+    /// Whether there is no frame.
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
@@ -196,23 +197,23 @@ impl PlannedMission {
         Stream::new(self.seed, self.dive, frame as u64, purpose)
     }
 
-    /// The left camera in the world at a time (s).
+    /// The left camera's pose at a time (s).
     pub(super) fn camera(&self, time: f64) -> Transform<World, Camera> {
         self.track.at(time).world_from_body * self.body_from_camera
     }
 
-    /// The motion of the left camera at a time, in its own frame (rad/s, m/s).
+    /// The left camera's twist at a time, in its own frame (rad/s, m/s).
     pub(super) fn motion(&self, time: f64) -> Vector6<f64> {
         self.body_from_camera.inverse().adjoint() * self.track.at(time).motion
     }
 
-    /// How far the water has carried what floats in it by a time (s).
+    /// Displacement of floating particles by the water up to a time (s), in metres.
     pub(super) fn drift(&self, time: f64) -> Vector3<f64> {
         let index = (time * Track::RATE).round().max(0.0) as usize;
         self.drifts[index.min(self.drifts.len() - 1)]
     }
 
-    /// Lends a memory to `work` and takes it back.
+    /// Runs `work` with a workspace from the pool and returns the workspace to the pool.
     pub(super) fn with_memory<T>(&self, threads: Threads, work: impl FnOnce(&mut Workspace) -> T) -> T {
         let kept = self.memories.lock().ok().and_then(|mut all| {
             let fits = all.iter().position(|memory| memory.threads() == threads);
@@ -226,22 +227,22 @@ impl PlannedMission {
         result
     }
 
-    /// Whether the vehicle is near the place where its route has it: thrusters too weak for the current or for the speed let it go.
+    /// Checks that the vehicle follows its route: the thrusters may be too weak for the current or for the speed.
     fn in_transit(&self, time: f64) -> Result<(), String> {
         let (camera, goal) = (self.camera(time).translation(), self.route.at(time).at);
         let off = (camera - goal).norm();
-        // Written so that a NaN is refused too.
+        // A NaN fails this comparison too.
         if off <= STRAY {
             return Ok(());
         }
         Err(format!(
-            "vehicle: {off:.1} m off its route after {time:.1} s, at north {:.2}, east {:.2}, depth {:.2} m: its thrusters do not hold \
-             it; lower current.speed or route.speed",
+            "vehicle: {off:.1} m off its route after {time:.1} s, at north {:.2}, east {:.2}, depth {:.2} m: its \
+             thrusters do not hold it; lower current.speed or route.speed",
             camera.x, camera.y, camera.z
         ))
     }
 
-    /// Whether the vehicle, its cameras or its lamps come too near to anything.
+    /// Checks that vehicle, cameras and lamps keep their clearance.
     fn collision(&self, last: f64) -> Result<(), String> {
         let clearance = self.settings.clearance;
         let mut parts = parts(&self.cameras, &self.studio);
@@ -256,10 +257,10 @@ impl PlannedMission {
             let now = places(time);
             self.in_transit(time)?;
             for (i, place) in now.iter().enumerate() {
-                // In the middle of a large body no surface is near.
+                // A place deep inside a large body has no surface nearby, so the start is also tested for enclosure.
                 let near =
                     self.scene.distance(place, clearance.max(1e-6)).is_some() || (k == 0 && self.scene.encloses(place));
-                // Below the bed, or through a thin body between two looks.
+                // The path below the seabed or through a thin body between two time steps.
                 let along = before.as_ref().map(|all| place - all[i]);
                 let through = along.zip(before.as_ref()).is_some_and(|(along, all)| {
                     along.norm() > 0.0 && self.scene.bvh.hit(&self.scene.mesh.triangles, &all[i], &along, 1.0).is_some()
@@ -288,7 +289,7 @@ impl PlannedMission {
     }
 }
 
-/// What must not touch anything, in the left camera's frame: both cameras, then the lamps.
+/// The parts that need clearance, in the left camera's frame: both cameras, then the lamps.
 fn parts(cameras: &Cameras, studio: &Studio) -> Vec<(String, Vector3<f64>)> {
     let lamps = studio.left.lamps.iter().enumerate();
     let right = cameras.right_from_left.inverse().translation();
@@ -298,7 +299,8 @@ fn parts(cameras: &Cameras, studio: &Studio) -> Vec<(String, Vector3<f64>)> {
         .collect()
 }
 
-/// The cameras look down and `ahead` degrees forward: right in the image is starboard, its lower edge is aft.
+/// The pose of a camera that looks down and `ahead` degrees forward: right in the image is starboard, its lower edge is
+/// aft.
 fn mount(ahead: f64, at: [f64; 3]) -> Transform<Body, Camera> {
     let (sine, cosine) = libm::sincos(ahead.to_radians());
     let forward = Vector3::new(sine, 0.0, cosine);

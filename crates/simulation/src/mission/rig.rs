@@ -1,4 +1,4 @@
-//! Two cameras as they are, and as the method is told they are.
+//! The true stereo rig, and the rig that a method receives.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_component::in_range;
@@ -10,38 +10,40 @@ use crate::optics::{Lens, Port, PortKind};
 /// The distance at which cameras behind ports are calibrated (m).
 pub const CALIBRATION_RANGE: f64 = 3.0;
 
-/// What a focal length is that of.
+/// The medium in which the focal length is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FocalIn {
-    /// The camera in the air.
+    /// Air: the lens alone, without its port.
     #[default]
     Air,
-    /// What the camera behind its flat port shall have in the water.
+    /// Water: the effective focal length behind the flat port.
     Water,
 }
 
-/// Two equal cameras side by side, looking down and somewhat ahead. The defaults are the paper's camera.
+/// Two equal cameras side by side, tilted forward from straight down. The defaults are the paper's virtual camera; the
+/// paper gives no baseline.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigPlan {
-    /// Width and height of the images (px).
+    /// Width and height of the images (px), from 16 to 8192 each.
     pub size: [u32; 2],
-    /// Focal length (px).
+    /// Focal length (px), from 1 to 100 000.
     pub focal: f64,
-    /// Whether that is in the air or behind a flat port in the water.
+    /// Medium of `focal`: `air`, or `water` for a camera behind a flat port.
     pub focal_in: FocalIn,
-    /// Distance between the cameras (m).
+    /// Distance between the cameras (m), from 0.001 to 100.
     pub baseline: f64,
-    /// Brown's distortion, k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
+    /// Brown's distortion coefficients: k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
     pub distortion: Vec<f64>,
-    /// Where the left camera is in the vehicle, whose origin is its centre of gravity: ahead, to starboard, down (m).
+    /// Position of the left camera in the body frame, whose origin is the centre of gravity: forward, starboard, down
+    /// (m), from −10 to 10 each.
     pub at: [f64; 3],
-    /// By how much the cameras look ahead of straight down (degrees).
+    /// Angle by which the cameras look forward of straight down (degrees), from −60 to 60.
     pub ahead_deg: f64,
-    /// The port of each camera.
+    /// The port of both cameras.
     pub port: Port,
-    /// What the calibration, which the method is told, has wrong.
+    /// Errors of the calibration that a method receives.
     pub error: CalibrationError,
 }
 
@@ -61,21 +63,21 @@ impl Default for RigPlan {
     }
 }
 
-/// By how much the rig that the method is told differs from the true one.
+/// Calibration errors: differences between the rig that a method receives and the true rig.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CalibrationError {
-    /// Focal lengths of both cameras (relative: 0.001 is 0.1 %).
+    /// Relative error of both focal lengths (0.001 is 0.1 %), from −0.5 to 0.5.
     pub focal: f64,
-    /// Principal point of the right camera (px).
+    /// Error of the right camera's principal point (px), from −100 to 100 each.
     pub principal: [f64; 2],
-    /// Length of the baseline (m).
+    /// Error of the baseline (m), up to half of the baseline either way.
     pub baseline: f64,
-    /// Turn of the right camera about its x, y, z axes (degrees): pitch, vergence, roll.
+    /// Rotation error of the right camera about its x, y, z axes (degrees): pitch, vergence, roll; from −10 to 10 each.
     pub turn_deg: [f64; 3],
 }
 
-/// The true cameras and the told rig.
+/// The true cameras and the nominal rig, which a method receives.
 #[derive(Debug, Clone)]
 pub(crate) struct Cameras {
     pub(crate) lens: Lens,
@@ -107,16 +109,16 @@ impl RigPlan {
         self.build().map(|_| ())
     }
 
-    /// The cameras.
+    /// Builds the true cameras and the nominal rig.
     pub(crate) fn build(&self) -> Result<Cameras, String> {
         let principal = self.size.map(|n| 0.5 * (f64::from(n) - 1.0));
         let flat = self.port.kind == PortKind::Flat;
         let in_water = flat && self.focal_in == FocalIn::Water;
         if in_water {
-            // An angle in the water that no angle in the air gives.
+            // Behind a flat port no ray in the water exceeds the critical angle.
             let angle = libm::atan(principal[0].hypot(principal[1]) / self.focal).to_degrees();
             let critical = libm::asin(1.0 / self.port.water).to_degrees();
-            let remedy = format!("a field of less than {critical:.1} degrees from the axis to the corner, or a dome");
+            let remedy = format!("a half field of view of less than {critical:.1} degrees, or a dome");
             in_range(angle < critical, "rig.focal", format!("{} ({angle:.1} degrees)", self.focal), &remedy)?;
         }
         let focal = if in_water { self.focal / self.port.water } else { self.focal };
@@ -124,14 +126,15 @@ impl RigPlan {
             .map_err(|error| format!("rig: {error}"))?;
         let lens = Lens::new(camera, self.port.clone());
         if let Some(pixel) = lens.blind() {
-            // A distortion that turns back before the image's side, or a port that reflects all light there.
+            // A distortion model can fold back before the image border, and a port can reflect all light there.
             let what = match self.distortion.as_slice() {
                 [] => format!("rig.port = {:?}", self.port),
                 numbers => format!("rig.distortion = {numbers:?}"),
             };
             let (u, v) = (pixel.u, pixel.v);
             return Err(format!(
-                "{what} (no ray at pixel ({u:.0}, {v:.0})); give what lets the middle of each side see"
+                "{what} (no ray at pixel ({u:.0}, {v:.0})); give a lens and a port that pass light to the \
+                 middle of each side"
             ));
         }
         let angle = lens.half_diagonal().to_degrees();
@@ -177,7 +180,8 @@ mod tests {
         let truth = nominal(CalibrationError::default());
         let place = Point::<Camera>::new(0.125, 0.0, 3.0);
         let v = |rig: &StereoRig| rig.project(&place).unwrap().right;
-        // A pitch of 0.01° is 0.087 px of vertical disparity in the middle; a vergence is as much of disparity.
+        // A pitch of 0.01° gives 0.087 px of vertical disparity at the image centre; an equal vergence gives as much
+        // horizontal disparity.
         let pitched = nominal(CalibrationError { turn_deg: [0.01, 0.0, 0.0], ..CalibrationError::default() });
         assert!(((v(&pitched).v - v(&truth).v).abs() - 0.0873).abs() < 1e-3);
         let verged = nominal(CalibrationError { turn_deg: [0.0, 0.01, 0.0], ..CalibrationError::default() });
@@ -190,7 +194,10 @@ mod tests {
         let flat = Port { kind: PortKind::Flat, ..Port::default() };
         let plan = RigPlan { port: flat, focal_in: FocalIn::Water, ..RigPlan::default() };
         let message = plan.check().unwrap_err();
-        assert!(message.starts_with("rig.focal = 500 (52.0 degrees); give a field of less than 48.3"), "{message}");
+        assert!(
+            message.starts_with("rig.focal = 500 (52.0 degrees); give a half field of view of less than 48.3"),
+            "{message}"
+        );
         assert!(RigPlan { focal: 700.0, ..plan.clone() }.check().is_ok());
         assert!(RigPlan { focal_in: FocalIn::Air, ..plan }.check().is_ok());
     }

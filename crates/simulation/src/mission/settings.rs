@@ -15,71 +15,74 @@ use crate::{
     vehicle::{Current, Route, Vehicle},
 };
 
-/// The longest mission (s).
+/// Maximum duration of a mission (s).
 const LONGEST: f64 = 7200.0;
 
-/// Where the rough pose of a frame comes from.
+/// Source of the prior pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PriorKind {
-    /// The truth with an error of the given standard deviations.
+    /// The true pose plus normally distributed errors, independent in each frame.
     #[default]
     Sampled,
-    /// The navigation sensors: acoustic fixes, Doppler log, attitude, depth.
+    /// Dead reckoning from the navigation sensors: acoustic positions, Doppler log, attitude, depth.
     Sensors,
 }
 
-/// A mission's settings. Every factor at magnitude 0 is the same, bit for bit, as the factor left out.
+/// The settings of a mission. A factor of magnitude 0 gives the same bits as no factor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mission {
-    /// `drill-centre`, `karmin2`, `random`, or the path of a NAME.site.toml with NAME.geometry.toml beside it.
+    /// The site: `drill-centre`, `karmin2`, `random`, or the path of NAME.site.toml with NAME.geometry.toml beside it.
     pub site: String,
-    /// Whether the method gets clouds of noisy points instead of images.
+    /// Whether frames hold clouds of noisy points instead of images.
     pub as_points: bool,
-    /// Stereo pairs.
+    /// Number of stereo pairs, from 1 to 1 000 000.
     pub frames: usize,
-    /// Stereo pairs a second; 0 spreads them evenly over the whole way.
+    /// Frame rate (Hz), from 0 to 10 000; 0 spaces the pairs evenly over the complete route. The default is the
+    /// paper's.
     pub rate: f64,
-    /// When the first is taken (s).
+    /// Time of the first pair after the start of the dive (s), from 0 to 7200.
     pub start: f64,
-    /// Where the rough pose comes from.
+    /// Source of the prior pose.
     pub prior: PriorKind,
-    /// Standard deviation of the drawn rough pose's position, each world axis (m).
+    /// Standard deviation of the sampled prior position on each world axis (m), from 0 to 100. Applies to `sampled`
+    /// priors.
     pub prior_position: f64,
-    /// Standard deviation of the rough pose's attitude, each camera axis (degrees).
+    /// Standard deviation of the sampled prior attitude about each camera axis (degrees), from 0 to 180. Applies to
+    /// `sampled` priors.
     pub prior_attitude_deg: f64,
-    /// Standard deviation of each coordinate of the model's points (m).
+    /// Standard deviation of each coordinate of a model point (m), from 0 to 0.05.
     pub model_sigma: f64,
-    /// Standard deviation of each surveyed world coordinate of base points (m).
+    /// Standard deviation of each surveyed world coordinate of a base point (m), from 0 to 1.
     pub survey_sigma: f64,
-    /// No part of the vehicle may come nearer to anything than this (m).
+    /// Minimum distance of cameras, lamps and vehicle from every surface (m), from 0 to 10; a nearer route is rejected.
     pub clearance: f64,
-    /// Whether lamps throw shadows.
+    /// Whether lamps cast shadows; at most four lamps do.
     pub shadows: bool,
-    /// The site that `random` draws.
+    /// Parameters of the site `random`.
     pub random: RandomSite,
-    /// What has changed since the survey.
+    /// Changes of the site since its survey.
     pub changes: Changes,
-    /// The cameras.
+    /// The stereo rig.
     pub rig: RigPlan,
-    /// The image sensors.
+    /// The image sensor of both cameras.
     pub imager: Imager,
-    /// The water.
+    /// Optical properties of the water.
     pub water: Water,
-    /// The lamps; none given is the usual pair.
+    /// The lamps, at most 16; an empty list stands for [`Lamp::pair`].
     pub lamps: Vec<Lamp>,
-    /// The way.
+    /// The planned route.
     pub route: Route,
-    /// The vehicle.
+    /// The vehicle and its controller.
     pub vehicle: Vehicle,
     /// The current.
     pub current: Current,
     /// The navigation sensors.
     pub sensors: Sensors,
-    /// Devices that fail.
+    /// Faults of cameras and navigation sensors.
     pub faults: Vec<DeviceFault>,
-    /// The same mission as points.
+    /// Measurement noise of frames that hold points.
     pub points: PointNoise,
 }
 
@@ -115,7 +118,7 @@ impl Default for Mission {
 }
 
 impl Mission {
-    /// Whether the settings describe a mission.
+    /// Checks that every setting lies in its range.
     ///
     /// # Errors
     /// The first setting outside its range: `name = value; give range`.
@@ -128,7 +131,7 @@ impl Mission {
         within("start", self.start, 0.0, LONGEST)?;
         let end = self.start + if self.rate > 0.0 { self.frames as f64 / self.rate } else { 0.0 };
         in_range(end <= LONGEST, "frames / rate", format!("{end} s"), "a mission of two hours at most")?;
-        in_range(self.rate > 0.0 || self.route.speed > 0.0, "rate", 0.0, "frames a second, or the route a speed")?;
+        in_range(self.rate > 0.0 || self.route.speed > 0.0, "rate", 0.0, "a rate or a route.speed above 0")?;
         within("prior-position", self.prior_position, 0.0, 100.0)?;
         within("prior-attitude-deg", self.prior_attitude_deg, 0.0, 180.0)?;
         within("model-sigma", self.model_sigma, 0.0, 0.05)?;
@@ -141,7 +144,7 @@ impl Mission {
         self.rig.check()?;
         self.imager.check()?;
         self.water.check()?;
-        in_range(self.lamps.len() <= 16, "lamps", self.lamps.len(), "16 at most")?;
+        in_range(self.lamps.len() <= 16, "lamps", self.lamps.len(), "at most 16 lamps")?;
         self.lamps.iter().enumerate().try_for_each(|(k, lamp)| lamp.check(k))?;
         self.route.check()?;
         self.vehicle.check()?;
@@ -150,7 +153,7 @@ impl Mission {
         self.faults.iter().enumerate().try_for_each(|(k, fault)| fault.check(k))
     }
 
-    /// The site; a relative path starts from `folder`.
+    /// Loads the site; a relative path starts at `folder`.
     fn site_plan(&self, folder: &Path) -> Result<SitePlan, Vec<Fault>> {
         if let Some(plan) = built_in(&self.site) {
             return Ok(plan);
@@ -160,25 +163,27 @@ impl Mission {
         }
         if !self.site.ends_with(".toml") {
             let names: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
-            let remedy = format!("there are {}, random, and files NAME.site.toml", names.join(", "));
+            let remedy = format!("give {}, random, or a file NAME.site.toml", names.join(", "));
             return Err(vec![
-                Fault::new(format!("no site is called `{}`", self.site), Path::new("source.site")).remedy(remedy),
+                Fault::new(format!("unknown site `{}`", self.site), Path::new("source.site")).remedy(remedy),
             ]);
         }
         SitePlan::read(&folder.join(&self.site))
     }
 
-    /// The mission number `dive` of the experiment with this seed.
+    /// Plans dive number `dive` of an experiment with this seed. `folder` is the base of relative paths.
     ///
     /// # Errors
-    /// Everything that is wrong with the site, or the first thing that is wrong with the settings or
-    /// the way: a route through an object is refused with place and time.
+    /// All faults of the site, or else the first fault of the settings or of the route. The message of a collision
+    /// names the object, the place and the time.
     pub fn plan(&self, seed: u64, dive: u64, folder: &Path) -> Result<PlannedMission, Vec<Fault>> {
         let wrong = |message: String| vec![Fault::new(message, Path::new("the source's settings"))];
         self.check().map_err(wrong)?;
         let site = self.site_plan(folder)?;
         if let Some(name) = self.changes.stranger(&site.site) {
-            return Err(wrong(format!("changes.objects = `{name}`; the site has no such object")));
+            return Err(wrong(format!(
+                "changes.objects = `{name}`; the site has no such object; give the ids of its objects"
+            )));
         }
         PlannedMission::new(self, &site, seed, dive).map_err(wrong)
     }

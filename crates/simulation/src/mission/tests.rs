@@ -12,13 +12,13 @@ use crate::{
     vehicle::{Current, Route, RouteKind, Vehicle, VehicleKind},
 };
 
-/// A small, quick mission that still sees objects.
+/// A small, fast mission with objects in view.
 fn small() -> Mission {
     let rig = RigPlan { size: [256, 192], focal: 125.0, ..RigPlan::default() };
     Mission { frames: 6, rate: 0.5, rig, ..Mission::default() }
 }
 
-/// Keeps the looks of surfaces of seed 5 for all tests: to make them takes longer than to draw with them.
+/// Keeps the surface textures of seed 5 for all tests, because computing them takes longer than rendering.
 static KEPT: LazyLock<PlannedMission> = LazyLock::new(|| small().plan(5, 0, Path::new("")).unwrap());
 
 pub(super) fn planned(mission: &Mission) -> PlannedMission {
@@ -28,7 +28,7 @@ pub(super) fn planned(mission: &Mission) -> PlannedMission {
 
 #[test]
 fn epipolar_geometry_is_exact_in_the_ideal_rig() {
-    // Seen to fail with a baseline longer by 1e-4 of itself.
+    // Regression: a baseline longer by 1e-4 fails this test.
     let mission = Mission { survey_sigma: 0.0, model_sigma: 0.0, ..small() };
     let plan = planned(&mission);
     let mut seen = 0;
@@ -84,7 +84,7 @@ fn what_is_switched_on_at_nothing_changes_nothing() {
 
 #[test]
 fn a_right_image_taken_late_shifts_by_speed_times_delay() {
-    // Sideways along the baseline: depth errs by Z v dt / b, disparity by f v dt / Z.
+    // Motion along the baseline: the depth has an error of Z v dt / b, the disparity of f v dt / Z.
     let along = Route {
         kind: RouteKind::Waypoints,
         speed: 0.5,
@@ -102,7 +102,7 @@ fn a_right_image_taken_late_shifts_by_speed_times_delay() {
             continue;
         };
         assert_eq!(seen.pixels.left, other.pixels.left);
-        // The vehicle flies north, ahead in the image is up: what is seen later lies lower.
+        // The vehicle moves north and forward is up in the image, so a later exposure shows a point lower.
         let at = a.truth().world_from_camera.inverse()
             * Point::from(on_time.scene.objects[seen.object].points[seen.point].at);
         let expected = 125.0 * 0.5 * 0.02 / at.coords.z;
@@ -138,13 +138,14 @@ fn a_path_through_an_object_is_refused_with_place_and_time() {
     let line = faults[0].to_string();
     assert!(line.contains("camera comes within 0.3 m of something near `manifold` after 0.0 s, at north"), "{line}");
     assert!(!line.contains('\n'));
-    // A lamp that hangs too low is named.
+    // The message names a lamp that hangs too low.
     let lamp = crate::optics::Lamp { at: [0.0, 0.0, 2.6], aim: [0.0, 0.0, 4.0], ..Default::default() };
     let line = Mission { lamps: vec![lamp], ..small() }.plan(1, 0, Path::new("")).unwrap_err()[0].to_string();
     assert!(line.contains("route: lamp 0 comes within 0.3 m of something near `"), "{line}");
 }
 
-/// Frames of points a second: `cargo test --release -p seafix-simulation frames_of_points -- --ignored --nocapture`
+/// Measures frames of points per second: `cargo test --release -p seafix-simulation frames_of_points -- --ignored
+/// --nocapture`
 #[test]
 #[ignore = "table"]
 fn frames_of_points() {
@@ -162,7 +163,7 @@ fn frames_of_points() {
 
 #[test]
 fn a_lamp_in_the_middle_of_a_large_body_is_refused() {
-    // A block of 4 m around the first lamp: no surface within 1.5 m of it.
+    // A block of 4 m around the first lamp leaves no surface within 1.5 m of it.
     let mut plan = crate::scene::built_in("drill-centre").unwrap();
     let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
     let free = Mission { vehicle: rail, clearance: 0.0, frames: 1, ..small() };
@@ -201,7 +202,7 @@ fn routes_are_waypoints() {
             assert!((a.translation() - b.translation()).norm() < 1e-9 && turn < 1e-9, "{kind:?} {time}");
         }
     }
-    // The paper's: 200 m over seven objects, from one to the next 15 m at most.
+    // The paper's route: 200 m over seven objects, at most 15 m from one to the next.
     let tour = planned(&Mission { vehicle: rail, ..small() }).waypoints();
     let steps: Vec<f64> = tour.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).collect();
     assert!(steps.iter().all(|step| *step <= 15.0), "{steps:?}");
@@ -250,7 +251,7 @@ fn numbers_that_make_no_mission_are_refused() {
     assert!(message(Mission { water: water(-1.0), ..small() }).starts_with("water.attenuation = -1; give a number"));
     assert!(message(Mission { frames: 0, ..small() }).starts_with("frames = 0; give"));
     assert!(message(Mission { rate: f64::NAN, ..small() }).starts_with("rate = NaN; give"));
-    assert!(message(Mission { site: "atlantis".into(), ..small() }).starts_with("no site is called `atlantis`"));
+    assert!(message(Mission { site: "atlantis".into(), ..small() }).starts_with("unknown site `atlantis`"));
     let route = Route { object: "tree-z".into(), kind: RouteKind::Orbit, ..Route::default() };
     assert!(message(Mission { route, ..small() }).starts_with("route.object = `tree-z`; give one of "));
     let flat = Port { kind: PortKind::Flat, water: 0.5, ..Port::default() };

@@ -1,17 +1,17 @@
-//! The light that the water throws back into a camera: a table over its view and the range.
+//! Backscatter of the lamps' light into a camera, tabulated over view and range.
 
 use nalgebra::Vector3;
 use seafix_geometry::Pixel;
 
 use super::{Lens, Water, lamp::Lamp};
 
-/// Between nodes of the table in the image: tangent of the angle.
+/// Distance of table nodes in the image (tangent of the angle).
 const STEP: f64 = 0.08;
-/// Ranges of the table.
+/// Number of ranges in the table.
 const RANGES: usize = 48;
-/// The last of them (m); what lies behind adds nothing that is seen.
+/// Last range of the table (m); farther water adds no visible light.
 const REACH: f64 = 16.0;
-/// Abscissae and weights of Gauss's quadrature of four points on −1 to 1.
+/// Abscissae and weights of four-point Gauss quadrature on −1 to 1.
 const GAUSS: [(f64, f64); 4] = [
     (-0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
     (-0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
@@ -19,31 +19,31 @@ const GAUSS: [(f64, f64); 4] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
-/// B(u, v, r) = Σ lamps ∫₀ʳ I(θ)/r_l² · b · p(ψ) · exp(−c (r_l + s)) ds for the pixels of one camera, whose
-/// lamps move with it. (Jaffe 1990; tabulated as Song et al. 2020.)
+/// The backscatter B(u, v, r) in the pixels of one camera (Jaffe 1990; tabulated as in Song et al. 2020).
 ///
-/// Bilinear between nodes of the image, linear between ranges, which lie densest near the camera.
+/// B = Σ lamps ∫₀ʳ I(θ)/r_l² · b · p(ψ) · exp(−c (r_l + s)) ds, for lamps that move with the camera. Interpolation is
+/// bilinear between nodes of the image and linear between ranges, which lie densest near the camera.
 #[derive(Debug, Clone)]
 pub(crate) struct Backscatter {
     columns: usize,
     rows: usize,
-    /// Nodes a pixel.
+    /// Number of nodes per pixel.
     nodes: f32,
-    /// (row, column, range).
+    /// Values in the order (row, column, range).
     values: Vec<f32>,
-    /// Daylight scattered along the way, for a long one.
+    /// Scattered daylight over an infinite path.
     veil: f32,
-    /// Nothing scatters.
+    /// Whether nothing scatters.
     pub(crate) none: bool,
 }
 
-/// Range of a node (m).
+/// Range of node `k` (m).
 fn range(k: usize) -> f64 {
     let t = k as f64 / (RANGES - 1) as f64;
     REACH * t * t
 }
 
-/// The integral up to each range of the table along one ray: from `from`, unit direction `unit`.
+/// The integral along a ray up to each range of the table; `unit` is the unit direction.
 pub(crate) fn backscatter(water: &Water, lamps: &[Lamp], from: &Vector3<f64>, unit: &Vector3<f64>) -> [f64; RANGES] {
     let (b, c) = (water.b(), water.c());
     let lamps: Vec<_> = lamps.iter().map(|l| (Vector3::from(l.at), l.axis(), l.exponent(), l.power)).collect();
@@ -58,7 +58,7 @@ pub(crate) fn backscatter(water: &Water, lamps: &[Lamp], from: &Vector3<f64>, un
             }
             let r2 = offset.norm_squared().max(1e-6);
             let r = r2.sqrt();
-            // From the lamp's way into that towards the camera.
+            // Cosine of the scattering angle, from the lamp's ray into the direction of the camera.
             let angle = -offset.dot(unit) / r;
             sum += power * libm::pow(ahead / r, *exponent) / r2 * b * water.phase(angle) * libm::exp(-c * (r + s));
         }
@@ -74,7 +74,7 @@ pub(crate) fn backscatter(water: &Water, lamps: &[Lamp], from: &Vector3<f64>, un
 }
 
 impl Backscatter {
-    /// The table for a camera; the lamps are given in its frame.
+    /// Computes the table for a camera; the lamps are given in its frame.
     pub(crate) fn new(water: &Water, lamps: &[Lamp], lens: &Lens) -> Self {
         let [width, height] = lens.camera().size().map(|n| n as usize);
         let step = ((STEP * lens.camera().focal()[0]) as usize).max(4);
@@ -88,7 +88,7 @@ impl Backscatter {
             for row in 0..rows {
                 for column in 0..columns {
                     let pixel = Pixel { u: (column * step) as f64, v: (row * step) as f64 };
-                    // Nodes beyond the border may lie beyond the lens: the nearest pixel serves.
+                    // Nodes beyond the border may lie outside of the lens model; the nearest pixel replaces them.
                     let inside = Pixel { u: pixel.u.min(width as f64 - 1.0), v: pixel.v.min(height as f64 - 1.0) };
                     let ray = lens.ray(&pixel).or_else(|| lens.ray(&inside));
                     let sums =
@@ -100,7 +100,7 @@ impl Backscatter {
         Self { columns, rows, nodes: 1.0 / step as f32, values, veil, none }
     }
 
-    /// The table along one row of the image, into the memory of `row`.
+    /// Interpolates the table along one row of the image into `row`.
     pub(crate) fn along_row(&self, v: f32, row: &mut Vec<f32>) {
         row.clear();
         if self.none {
@@ -114,8 +114,8 @@ impl Backscatter {
         row.extend(above.iter().zip(below).map(|(a, b)| a + f * (b - a)));
     }
 
-    /// The light from the water up to the ranges `r` (m) at places `u` of the row that
-    /// [`along_row`](Self::along_row) has prepared; `through` is exp(−c r).
+    /// The backscatter up to the ranges `r` (m) at columns `u` of the row that [`along_row`](Self::along_row) has
+    /// prepared; `through` is exp(−c r).
     pub(crate) fn at(&self, row: &[f32], u: &[f32], r: &[f32], through: &[f32], out: &mut Vec<f32>) {
         out.clear();
         out.resize(u.len(), 0.0);
@@ -125,7 +125,7 @@ impl Backscatter {
     }
 }
 
-/// Places that are looked up at once.
+/// Number of places looked up in one pass.
 const CHUNK: usize = 64;
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
@@ -144,7 +144,7 @@ fn textured(backscatter_table: &Backscatter, row: &[f32], u: &[f32], r: &[f32], 
             across[i] = x - column as f32;
             let t = (s[i] * (1.0 / REACH as f32)).min(1.0).sqrt() * (RANGES - 1) as f32;
             let k = (t as i32).min(RANGES as i32 - 2);
-            // Linear in the range itself: between its two nodes.
+            // Linear in the range itself, between its two nodes.
             let low = k as f32 * k as f32;
             along[i] = ((t * t - low) / (2 * k + 1) as f32).min(1.0);
             place[i] = (column * RANGES as i32 + k) as u32;
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn light_grows_with_range_to_a_limit_and_vanishes_with_scattering() {
-        // Seen to fail with light of 1e-6 left in clear water.
+        // Regression: a residual of 1e-6 in clear water fails this test.
         let lamps = Lamp::pair(0.25);
         let water = Water { attenuation: 1.0, ..Water::default() };
         let sums = backscatter(&water, &lamps, &Vector3::zeros(), &Vector3::z());

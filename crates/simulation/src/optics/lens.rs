@@ -1,11 +1,11 @@
-//! One camera as it truly is: a pinhole with distortion, behind a port.
+//! The true camera: a pinhole with distortion behind a port.
 
 use nalgebra::{DMatrix, DVector, Vector2, Vector3};
 use seafix_geometry::{BadCamera, Camera, Pinhole, Pixel, Point};
 
 use super::port::{Port, PortKind, Ray};
 
-/// A camera behind its port. Its frame is that of the camera in the air: origin in the pupil.
+/// A camera behind its port. Its frame is that of the camera in air, with the origin in the pupil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
     camera: Pinhole,
@@ -13,12 +13,12 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// The camera behind the port.
+    /// Places a camera behind a port.
     pub fn new(camera: Pinhole, port: Port) -> Self {
         Self { camera, port }
     }
 
-    /// The camera in the air.
+    /// The camera in air.
     pub fn camera(&self) -> &Pinhole {
         &self.camera
     }
@@ -28,30 +28,30 @@ impl Lens {
         &self.port
     }
 
-    /// Whether it is an ideal pinhole: straight lines stay straight.
+    /// Whether it is an ideal pinhole, which maps lines to lines.
     pub fn is_straight(&self) -> bool {
         self.port.kind == PortKind::None && self.camera.distortion().shortest().is_empty()
     }
 
-    /// The ray in the water that a pixel sees.
+    /// The ray in the water of a pixel.
     pub fn ray(&self, pixel: &Pixel) -> Option<Ray> {
         self.port.refract(&self.camera.normalize(pixel)?)
     }
 
-    /// Where a point of the camera's frame is seen; in the image or not.
+    /// The projection of a point of the camera's frame, inside the image or not.
     pub fn project(&self, point: &Vector3<f64>) -> Option<Pixel> {
         let n = self.port.trace(point)?;
         self.camera.project(&Point::<Camera>::from(n.push(1.0)))
     }
 
-    /// What a calibration in the water at a distance of `range` (m) makes of it: the pinhole with
-    /// Brown's distortion (k1 k2 p1 p2 k3) that fits best over the image, its origin in the pupil.
+    /// The pinhole camera that a calibration in water at the distance `range` (m) gives.
     ///
-    /// Linear least squares for (cx, cy, f, f k1, f k2, f k3, f p1, f p2) over a grid of pixels. Without a
-    /// port it is the camera itself.
+    /// Its Brown distortion (k1 k2 p1 p2 k3) fits best over the image; its origin is the pupil. Linear least squares
+    /// over a grid of pixels solves for (cx, cy, f, f k1, f k2, f k3, f p1, f p2). Without a port the result is the
+    /// camera itself.
     ///
     /// # Errors
-    /// The fit is no camera, as for a port that no such camera describes.
+    /// The fit is no camera, because no pinhole describes the port.
     pub fn calibrated(&self, range: f64) -> Result<Pinhole, BadCamera> {
         if self.port.kind == PortKind::None {
             return Ok(self.camera);
@@ -85,15 +85,14 @@ impl Lens {
         Pinhole::new(size, [f, f], [fit[0], fit[1]], &distortion)
     }
 
-    /// The middle of a side of the image that sees along no ray. Dark corners a lens may have.
+    /// The middle of an image side without a ray, if there is one. Corners may be dark, as with real lenses.
     pub(crate) fn blind(&self) -> Option<Pixel> {
         let [w, h] = self.camera.size().map(|n| f64::from(n - 1));
         let middles = [[0.0, 0.5 * h], [w, 0.5 * h], [0.5 * w, 0.0], [0.5 * w, h]];
         middles.map(|[u, v]| Pixel { u, v }).into_iter().find(|pixel| self.ray(pixel).is_none())
     }
 
-    /// The angle to the optical axis of the farthest corner of the image (rad): in the air, and in the
-    /// water where a flat port lets it through.
+    /// The angle between optical axis and farthest image corner (rad): in air, and in water behind a flat port.
     pub(crate) fn half_diagonal(&self) -> f64 {
         let [w, h] = self.camera.size().map(|n| f64::from(n - 1));
         [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]]
@@ -154,7 +153,7 @@ mod tests {
     fn a_flat_port_is_good_at_its_calibration_distance_and_bad_near() {
         let lens = Lens::new(camera(500.0, &[]), Port { kind: PortKind::Flat, ..Port::default() });
         let nominal = lens.calibrated(3.0).unwrap();
-        // The effective focal length in the water is about n times that in the air.
+        // The effective focal length in water is about n times that in air.
         assert!((nominal.focal()[0] - 668.0).abs() < 4.0, "{:?}", nominal.focal());
         let max = |depth| errors(&lens, depth).into_iter().fold(0.0, f64::max);
         assert!(max(3.0) < 0.2, "{}", max(3.0));

@@ -1,4 +1,4 @@
-//! Light on its way: lamps, water, ports, lenses.
+//! Propagation of light: lamps, water, ports, lenses.
 
 mod backscatter;
 mod lamp;

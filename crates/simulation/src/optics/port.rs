@@ -1,18 +1,18 @@
-//! What is between the camera and the water: nothing, a dome, or a flat port.
+//! The port between camera and water: none, a dome, or a flat plate.
 
 use nalgebra::{Vector2, Vector3};
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
-/// Tangent of the angle beyond which a flat port passes nothing that matters.
+/// Tangent of the angle beyond which a flat port transmits nearly nothing.
 const GRAZING: f64 = 12.0;
 
 /// A ray in the water, in the camera's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it enters the water; the pupil where there is no port.
+    /// Point of entry into the water; the pupil without a port.
     pub from: Vector3<f64>,
-    /// Its direction, with z = 1.
+    /// Direction, with z = 1.
     pub along: Vector3<f64>,
 }
 
@@ -20,32 +20,32 @@ pub struct Ray {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PortKind {
-    /// None: the ideal camera of the paper.
+    /// No port: the ideal camera of the paper.
     #[default]
     None,
-    /// A spherical shell.
+    /// A spherical dome.
     Dome,
-    /// A plane-parallel plate across the optical axis.
+    /// A plane-parallel plate perpendicular to the optical axis.
     Flat,
 }
 
-/// A port, with exact refraction at both of its surfaces (Snell's law).
+/// A port with exact refraction at both surfaces (Snell's law).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Port {
-    /// Its kind.
+    /// Kind of the port.
     pub kind: PortKind,
-    /// From the pupil to a flat port (m).
+    /// Distance from the pupil to a flat port (m), from 0 to 1.
     pub distance: f64,
-    /// Thickness of the glass (m).
+    /// Thickness of the glass (m), from 0 to 0.2.
     pub thickness: f64,
-    /// Inner radius of a dome (m).
+    /// Inner radius of a dome (m), from 0.01 to 1.
     pub radius: f64,
-    /// A dome's centre in the camera's frame (m): zero is centred.
+    /// Centre of a dome in the camera's frame (m); zero is centred. It lies within 0.9 of the radius from the pupil.
     pub offset: [f64; 3],
-    /// Refractive index of the glass.
+    /// Refractive index of the glass, from 1 to 3. The default is crown glass.
     pub glass: f64,
-    /// Refractive index of the water.
+    /// Refractive index of the water, from 1 to 2. The default is sea water.
     pub water: f64,
 }
 
@@ -64,7 +64,7 @@ impl Default for Port {
 }
 
 impl Port {
-    /// Whether its numbers are those of a port.
+    /// Checks that every setting lies in its range.
     ///
     /// # Errors
     /// The first number outside its range: `name = value; give range`.
@@ -82,7 +82,7 @@ impl Port {
         in_range(off < 0.9 * self.radius, "port.offset", format!("{:?}", self.offset), &range)
     }
 
-    /// The ray in the water of the direction (x, y, 1) in the air; `None` where it does not pass.
+    /// The ray in the water for the direction (x, y, 1) in air; `None` under total reflection.
     pub fn refract(&self, direction: &Vector2<f64>) -> Option<Ray> {
         let air = direction.push(1.0);
         match self.kind {
@@ -107,8 +107,9 @@ impl Port {
         }
     }
 
-    /// The direction (x, y, 1) in the air from which a point in the water is seen: the inverse of
-    /// [`refract`](Self::refract), by Newton's iteration to 1e-14.
+    /// The direction (x, y, 1) in air of a point in the water, the inverse of [`refract`](Self::refract).
+    ///
+    /// Newton's iteration with a damped step, to 1e-14.
     pub fn trace(&self, point: &Vector3<f64>) -> Option<Vector2<f64>> {
         if !(point.z > 0.0) {
             return None;
@@ -117,7 +118,7 @@ impl Port {
         if self.kind == PortKind::None {
             return Some(straight);
         }
-        // Where the ray passes the plane of the point, from where it should.
+        // Offset of the ray from the point, in the plane of the point.
         let miss = |n: &Vector2<f64>| {
             let ray = self.refract(n)?;
             let depth = point.z - ray.from.z;
@@ -131,7 +132,7 @@ impl Port {
             let jacobian =
                 nalgebra::Matrix2::from_columns(&[column(Vector2::new(H, 0.0))?, column(Vector2::new(0.0, H))?]);
             let mut step = jacobian.try_inverse()? * -error;
-            // Half the step until it helps: near the last angle that passes, a full one leaps away.
+            // The step is halved until it helps: near the critical angle a full step overshoots.
             let mut better = None;
             for _ in 0..30 {
                 if let Some(there) = miss(&(n + step)).filter(|there| there.norm() < error.norm()) {
@@ -150,13 +151,13 @@ impl Port {
     }
 }
 
-/// A unit direction in the medium of index `n` behind planes across z, entered from the air.
+/// The refracted direction in a medium of index `n` behind planes across z.
 fn bent(unit: &Vector3<f64>, n: f64) -> Vector3<f64> {
     let (x, y) = (unit.x / n, unit.y / n);
     Vector3::new(x, y, (1.0 - x * x - y * y).sqrt())
 }
 
-/// Where a ray from within a ball leaves it.
+/// The exit point of a ray from inside a ball.
 fn leave(from: &Vector3<f64>, unit: &Vector3<f64>, centre: &Vector3<f64>, radius: f64) -> Option<Vector3<f64>> {
     let to = from - centre;
     let half = to.dot(unit);
@@ -199,12 +200,12 @@ mod tests {
 
     #[test]
     fn refraction_keeps_n_sine() {
-        // Seen to fail with indices off by 1e-9.
+        // Regression: indices off by 1e-9 fail this test.
         for n in directions() {
             let sine = |d: Vector3<f64>| d.xy().norm() / d.norm();
             let ray = flat().refract(&n).unwrap();
             assert!((1.34 * sine(ray.along) - sine(n.push(1.0))).abs() < 1e-15);
-            // At a sphere: n times the distance of the ray from the centre is kept.
+            // A sphere conserves n times the distance of the ray from the centre.
             let port = dome([0.004, -0.002, 0.005]);
             let ray = port.refract(&n).unwrap();
             let centre = Vector3::from(port.offset);
@@ -236,7 +237,7 @@ mod tests {
                 }
             }
         }
-        // Beyond the critical angle nothing is seen through a flat port.
+        // No ray beyond the critical angle passes a flat port.
         assert_eq!(flat().trace(&Vector3::new(3.0, 0.0, 1.0)), None);
     }
 }

@@ -1,9 +1,9 @@
-//! The water: what it takes from the light and what it throws back.
+//! Optical properties of the water: attenuation and scattering.
 
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
-/// Attenuation coefficients at 530 nm (1/m) by name.
+/// Names of waters and their attenuation coefficients at 530 nm (1/m).
 pub const WATERS: [(&str, f64); 7] = [
     ("none", 0.0),
     ("deep-clear", 0.05),
@@ -14,33 +14,34 @@ pub const WATERS: [(&str, f64); 7] = [
     ("turbid", 1.5),
 ];
 
-/// Water in single scattering, for one wavelength.
+/// The water in the single-scattering model, for one wavelength.
 ///
-/// Light on its way loses exp(−c r), c = a + b: absorbed and scattered. Of the scattered part the share
-/// `1 − isotropic` goes by Henyey and Greenstein (1941) with mean cosine `forwardness`, the rest evenly
-/// in all directions, since that function alone throws too little back.
+/// Light is attenuated by exp(−c r), with c = a + b for absorption and scattering. The fraction `1 − isotropic` of the
+/// scattered light follows Henyey and Greenstein (1941) with mean cosine `forwardness`; the rest is isotropic, because
+/// the Henyey–Greenstein function alone underestimates backscatter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Water {
-    /// Beam attenuation coefficient c (1/m).
+    /// Beam attenuation coefficient c (1/m), from 0 to 20. The default is the water `clear`.
     pub attenuation: f64,
-    /// A name for c instead: `deep-clear`, `clear`, `shelf`, `coastal`, `harbour`, `turbid`; empty is none.
+    /// Name of a water, which overrides `attenuation`: `none`, `deep-clear`, `clear`, `shelf`, `coastal`, `harbour`,
+    /// `turbid`. An empty name overrides nothing.
     pub level: String,
-    /// Single-scattering albedo b/c.
+    /// Single-scattering albedo b/c, from 0 to 1.
     pub albedo: f64,
-    /// Mean cosine of the scattering angle, g.
+    /// Mean cosine g of the scattering angle, from −0.99 to 0.99.
     pub forwardness: f64,
-    /// Share of the scattering that goes evenly in all directions.
+    /// Fraction of the scattered light that is isotropic, from 0 to 1.
     pub isotropic: f64,
-    /// Share of the scattering at angles so small that the camera still gets the light, blurred.
+    /// Fraction of the light scattered at small angles, from 0 to 1; the camera receives it blurred.
     pub small_angle: f64,
-    /// Standard deviation of that blur (px) for each unit of c·range.
+    /// Standard deviation of the small-angle blur (px) per unit of c·range, from 0 to 5.
     pub blur: f64,
-    /// Daylight that is left on the bed, in units of a lamp's irradiance at 1 m.
+    /// Daylight at the seabed, in units of a lamp's irradiance at 1 m, from 0 to 1000.
     pub ambient: f64,
-    /// Particles of marine snow in a cubic metre.
+    /// Number of marine snow particles per cubic metre, from 0 to 5000.
     pub snow: f64,
-    /// Least and greatest radius of a particle (m).
+    /// Minimum and maximum radius of a particle (m), from 0.00001 to 0.01.
     pub snow_radius: [f64; 2],
 }
 
@@ -81,7 +82,7 @@ impl Water {
         in_range(known, "water.level", format!("`{}`", self.level), &format!("one of {}", names.join(", ")))
     }
 
-    /// c (1/m).
+    /// The beam attenuation coefficient c (1/m).
     pub fn c(&self) -> f64 {
         let named = WATERS.iter().find(|(name, _)| *name == self.level);
         named.map_or(self.attenuation, |(_, c)| *c)
@@ -92,7 +93,7 @@ impl Water {
         self.albedo * self.c()
     }
 
-    /// The phase function at the scattering angle of this cosine (1/sr); its integral over the sphere is 1.
+    /// The phase function (1/sr) at the scattering angle with this cosine; its integral over the sphere is 1.
     pub fn phase(&self, cosine: f64) -> f64 {
         let g = self.forwardness;
         let root = (1.0 + g * g - 2.0 * g * cosine).max(1e-12).sqrt();
@@ -107,7 +108,7 @@ mod tests {
 
     #[test]
     fn the_phase_function_integrates_to_one() {
-        // Seen to fail with a tenth of the isotropic share lost.
+        // Regression: losing a tenth of the isotropic fraction fails this test.
         for (g, isotropic) in [(0.924, 0.02), (0.0, 0.0), (-0.5, 0.3), (0.9, 0.0)] {
             let water = Water { forwardness: g, isotropic, ..Water::default() };
             let n = 200_000;

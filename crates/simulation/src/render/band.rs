@@ -1,4 +1,4 @@
-//! The light of the pixels of a band of rows, step by step over whole rows.
+//! Shading of a band of rows, each step over complete rows.
 
 use nalgebra::Vector3;
 
@@ -14,16 +14,16 @@ use super::{
 };
 use crate::scene::{Skin, Texture};
 
-/// Share of the light that growth returns.
+/// Albedo of growth.
 const GROWTH: f32 = 0.16;
 
-/// What lights a row.
+/// Light sources and water of a row.
 pub(super) struct Light<'a> {
     lit: &'a Lit<'a>,
     camera_model: &'a RenderCamera,
     beams: Vec<Beam>,
     c: f32,
-    /// Away from the centre of the earth, in the camera's frame.
+    /// The upward direction in the camera's frame.
     up: [f32; 3],
 }
 
@@ -34,7 +34,7 @@ impl<'a> Light<'a> {
     }
 }
 
-/// The memory of one band of rows.
+/// Buffers of one band of rows.
 #[derive(Debug, Default)]
 pub(super) struct Band {
     pub(super) strip: Strip,
@@ -45,12 +45,13 @@ pub(super) struct Band {
     through: Vec<f32>,
     light: Vec<f32>,
     lamp: Vec<f32>,
-    /// The table of the water's light along the row, and what it gives for each part.
+    /// The backscatter table along the row.
     row: Vec<f32>,
+    /// The backscatter of each part.
     backscatter: Vec<f32>,
 }
 
-/// Places in a texture, and what it says there.
+/// Places in a texture, and the texture's values there.
 #[derive(Debug, Default)]
 struct TextureSample {
     u: Vec<f32>,
@@ -61,7 +62,7 @@ struct TextureSample {
 }
 
 impl Band {
-    /// One row of pixels: light from surfaces, light from the water, Z, range.
+    /// Shades one row of pixels: light from surfaces, light from the water, Z, range.
     pub(super) fn shade(
         &mut self,
         row: &Row,
@@ -91,7 +92,7 @@ impl Band {
         self.compose(pixels);
     }
 
-    /// The light that the lamps send to each part.
+    /// The irradiance of each part by the lamps.
     fn shine(&mut self, light: &Light<'_>) {
         self.light.clear();
         self.light.resize(self.spots.x.len(), 0.0);
@@ -104,7 +105,7 @@ impl Band {
         }
     }
 
-    /// The share of the light that each part returns.
+    /// The albedo of each part.
     fn paint(&mut self, facets: &[Facet], skins: &[Skin], light: &Light<'_>) {
         self.albedo.clear();
         let skin = |facet: u32| if facet == NONE { NONE } else { facets[facet as usize].skin };
@@ -117,7 +118,7 @@ impl Band {
         }
     }
 
-    /// Adds up the parts of each pixel.
+    /// Sums the parts of each pixel.
     fn compose(&self, pixels: &mut [[f32; 4]]) {
         let Self { parts, spots, albedo, light, through, backscatter, .. } = self;
         let n = parts.columns.len();
@@ -135,7 +136,7 @@ impl Band {
 }
 
 impl TextureSample {
-    /// Adds the albedo of parts of one skin.
+    /// Adds the albedo of the parts with one skin.
     fn albedo(
         &mut self,
         skin: &Skin,
@@ -146,7 +147,7 @@ impl TextureSample {
     ) {
         let textures = light.lit.textures;
         let footprint = &spots.footprint[span.clone()];
-        // Each body lies elsewhere in the texture.
+        // Each body has an offset of its own in the texture.
         let (du, dv) = ((skin.seed & 0xFFF) as f32 * 0.01, (skin.seed >> 20) as f32 * 0.01);
         let shift = |list: &mut Vec<f32>, from: &[f32], step: f32| {
             list.clear();
@@ -156,7 +157,7 @@ impl TextureSample {
         shift(&mut self.v, &spots.v[span], dv);
         textures.at(skin.texture, &self.u, &self.v, footprint, &mut self.own);
         if skin.growth <= 0.0 {
-            // A bright grain of a bright surface returns all light, never more.
+            // The albedo of a bright grain on a bright surface is limited to 1.
             out.extend(self.own.iter().map(|own| (skin.albedo * own).min(1.0)));
             return;
         }

@@ -1,11 +1,11 @@
-//! What spreads light over pixels: the lens, scattering at small angles, motion during the exposure.
+//! Blur by the lens, by small-angle scattering and by motion during the exposure.
 
 use seafix_vision::Threads;
 
-/// Rows that one piece of work has.
+/// Number of rows in one unit of work.
 const ROWS: usize = 64;
 
-/// Memory of a blur.
+/// Buffers of a blur.
 #[derive(Debug, Default)]
 pub(super) struct BlurScratch {
     across: Vec<f32>,
@@ -14,7 +14,7 @@ pub(super) struct BlurScratch {
     none: Vec<()>,
 }
 
-/// Convolves an image with a Gaussian of `sigma` pixels; at the border the nearest pixel continues.
+/// Convolves an image with a Gaussian of `sigma` pixels; border pixels are replicated.
 pub(super) fn gaussian(image: &mut [f32], width: usize, sigma: f64, threads: Threads, work: &mut BlurScratch) {
     if !(sigma > 0.0) {
         return;
@@ -78,18 +78,18 @@ fn weigh(out: &mut [f32], from: &[f32], stride: usize, weights: &[f32]) {
     }
 }
 
-/// No depth is taken to be less (m).
+/// Minimum depth for motion blur (m).
 const NEAREST: f32 = 0.05;
-/// Pixels that are spread at once.
+/// Number of pixels blurred in one pass.
 const CHUNK: usize = 64;
 
-/// A row of an image with the one above and the one below.
+/// A row of an image with its upper and lower neighbours.
 fn neighbours(image: &[f32], width: usize, row: usize) -> [&[f32]; 3] {
     [row - 1, row, row + 1].map(|row| &image[row * width..][..width])
 }
 
-/// The motion of a camera during the exposure: its step in its own frame (rotation φ, translation ρ), and
-/// focal length and principal point.
+/// The camera's motion during the exposure: displacement in its own frame (rotation φ, translation ρ), focal length and
+/// principal point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Smear {
     pub(super) turn: [f32; 3],
@@ -99,18 +99,20 @@ pub(super) struct Smear {
 }
 
 impl Smear {
-    /// How far the image of a place at depth `z` moves (px).
+    /// The displacement of the image of a place at depth `z` (px).
     #[inline(always)]
     fn flow(&self, column: f32, row: f32, z: f32) -> [f32; 2] {
         let (x, y) = ((column - self.principal[0]) / self.focal[0], (row - self.principal[1]) / self.focal[1]);
         let ([a, b, c], [p, q, r]) = (self.turn, self.step);
-        // ẋ of a resting point: −ρ/Z − φ × (x, y, 1), on the plane z = 1. (Longuet-Higgins and Prazdny, 1980.)
+        // The motion field of a static point, ẋ = −ρ/Z − φ × (x, y, 1), on the plane z = 1 (Longuet-Higgins and
+        // Prazdny, 1980).
         let du = (-p + x * r) / z + a * x * y - b * (1.0 + x * x) + c * y;
         let dv = (-q + y * r) / z + a * (1.0 + y * y) - b * x * y - c * x;
         [du * self.focal[0], dv * self.focal[1]]
     }
 
-    /// Spreads every pixel along its way; `depths` are Z (m) of the pixels. Nothing moves, nothing changes.
+    /// Blurs every pixel along its displacement; `depths` holds Z (m) of the pixels. Without motion the image stays
+    /// unchanged.
     pub(super) fn apply(
         &self,
         image: &mut Vec<f32>,
@@ -165,9 +167,10 @@ impl Smear {
     }
 }
 
-/// Spreads the pixels from column `from` to the end of `out`, at most a chunk and none at the border, where all
-/// move by a pixel or less: then three samples, at thirds of the way, lie among the pixel and its neighbours.
-/// Otherwise nothing is done, and the answer is no.
+/// Blurs the pixels from column `from` to the end of `out`, if all of them move by a pixel or less.
+///
+/// At most one chunk without border pixels is accepted. Three samples at thirds of the path then lie among the pixel
+/// and its neighbours. The result is `false`, and nothing changes, if a pixel moves farther.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn short(smear: &Smear, from: usize, row: usize, depths: &[f32], near: &[&[f32]; 3], out: &mut [f32]) -> bool {
     let n = out.len() - from;
@@ -195,7 +198,7 @@ fn short(smear: &Smear, from: usize, row: usize, depths: &[f32], near: &[&[f32];
     for i in 0..CHUNK {
         let (tu, tv) = (across[i].abs(), down[i].abs());
         let (right, below) = (across[i] >= 0.0, down[i] >= 0.0);
-        // Each row a way to the right and a way to the left, then between the rows.
+        // Each row is interpolated horizontally, then the rows vertically.
         let ahead = |row: &[[f32; CHUNK]; 3]| row[1][i] + tu * (if right { row[2][i] } else { row[0][i] } - row[1][i]);
         let back = |row: &[[f32; CHUNK]; 3]| row[1][i] + tu * (if right { row[0][i] } else { row[2][i] } - row[1][i]);
         let first = |a: f32, b: f32| if below { b } else { a };
@@ -229,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_short_path_is_spread_as_a_long_one() {
-        // Between neighbours the image is bilinear: a plane stays, a pyramid is smoothed by what it bends.
+        // Bilinear interpolation keeps a plane and smooths a pyramid by its curvature.
         let (width, height) = (150, 9);
         let plane: Vec<f32> =
             (0..width * height).map(|k| 3.0 * (k % width) as f32 - 2.0 * (k / width) as f32).collect();
@@ -245,7 +248,7 @@ mod tests {
                 }
             }
         }
-        // One bright pixel, moved by 0.6 px to the right: thirds of it at −0.2, 0 and 0.2 px.
+        // One bright pixel, moved by 0.6 px to the right: a third of it each at −0.2, 0 and 0.2 px.
         let smear = Smear { turn: [0.0; 3], step: [-0.012, 0.0, 0.0], focal: [100.0; 2], principal: [74.5, 4.0] };
         let mut image = vec![0.0; width * height];
         image[4 * width + 70] = 3.0;
@@ -265,7 +268,7 @@ mod tests {
         let still = image.clone();
         smear(0.0).apply(&mut image, &depths, width, Threads::One, &mut BlurScratch::default());
         assert_eq!(image, still);
-        // 0.16 m at 2 m: 8 px; a line becomes a band of that width.
+        // 0.16 m at 2 m give 8 px; a line becomes a band of that width.
         smear(0.16).apply(&mut image, &depths, width, Threads::One, &mut BlurScratch::default());
         let row = &image[20 * width..21 * width];
         let (sum, mean) = (row.iter().sum::<f32>(), row.iter().enumerate().map(|(x, v)| x as f32 * v).sum::<f32>());

@@ -1,4 +1,4 @@
-//! One camera as the renderer needs it: its rays at every pixel, its lamps and haze, its rows in time.
+//! A camera for rendering: the ray of every pixel, lamps, backscatter, and the readout of rows.
 
 use std::sync::OnceLock;
 
@@ -7,42 +7,43 @@ use seafix_geometry::{Camera, Pixel, Transform};
 
 use crate::optics::{Backscatter, Lamp, Lens, Water};
 
-/// Steps of the search for the row that sees a point through a rolling shutter.
+/// Number of iterations for the row in which a rolling shutter sees a point.
 const ROLLING_STEPS: usize = 4;
 
-/// A camera with what does not change from frame to frame.
+/// A camera with its constant tables.
 #[derive(Debug, Clone)]
 pub(crate) struct RenderCamera {
     pub(crate) lens: Lens,
-    /// The lamps in its frame.
+    /// The lamps in the camera's frame.
     pub(crate) lamps: Vec<Lamp>,
     backscatter: OnceLock<Backscatter>,
     water: Water,
     /// Rays of every pixel (direction x, y with z = 1; origin); empty for an ideal pinhole.
     rays: Vec<[f32; 5]>,
-    /// Direction x of every column and y of every row of an ideal pinhole.
+    /// Direction x of every column of an ideal pinhole; empty for other cameras.
     columns: Vec<f32>,
+    /// Direction y of every row of an ideal pinhole; empty for other cameras.
     rows: Vec<f32>,
-    /// Tangent of the greatest angle to the axis at which it sees.
+    /// Tangent of the maximum angle between optical axis and a ray.
     pub(crate) reach: f64,
 }
 
-/// How the camera moves while its rows are read: the motion over the whole readout, and its middle row.
+/// The camera's motion during the readout, for a rolling shutter.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rolling {
-    /// The camera's step in its own frame (rotation, translation) from the first row to the last.
+    /// The camera's displacement in its own frame (rotation, translation) from the first row to the last.
     pub(crate) step: Vector6<f64>,
     pub(crate) rows: f64,
 }
 
 impl Rolling {
-    /// Where the camera is while row `v` is read, in its frame at the middle of the readout.
+    /// The pose of the camera at the readout of row `v`, in its frame at the middle of the readout.
     pub(crate) fn at(&self, v: f64) -> Transform<Camera, Camera> {
         Transform::exp(&(self.step * ((v + 0.5) / self.rows - 0.5)))
     }
 }
 
-/// A ray in f32: origin, and direction with z = 1.
+/// A ray in single precision: origin, and direction with z = 1.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Line {
     pub(super) from: [f32; 3],
@@ -58,7 +59,7 @@ impl RenderCamera {
             for v in 0..height {
                 for u in 0..width {
                     let ray = lens.ray(&Pixel { u: f64::from(u), v: f64::from(v) });
-                    // A pixel beyond the lens model sees nothing: a ray that goes nowhere.
+                    // A pixel outside of the lens model gets a ray that meets nothing.
                     let (from, along) =
                         ray.map_or((Vector3::zeros(), Vector3::repeat(f64::NAN)), |r| (r.from, r.along));
                     rays.push([along.x, along.y, from.x, from.y, from.z].map(|x| x as f32));
@@ -77,12 +78,12 @@ impl RenderCamera {
         Self { lens, lamps, backscatter: OnceLock::new(), water: water.clone(), rays, columns, rows, reach }
     }
 
-    /// The light that the water throws back; tabulated when it is first asked for.
+    /// The backscatter table, computed at the first call.
     pub(super) fn backscatter(&self) -> &Backscatter {
         self.backscatter.get_or_init(|| Backscatter::new(&self.water, &self.lamps, &self.lens))
     }
 
-    /// Where a point of the camera's frame (at the middle of the readout) is seen.
+    /// The projection of a point of the camera's frame at the middle of the readout.
     pub(crate) fn project(&self, point: &Vector3<f64>, rolling: Option<&Rolling>) -> Option<Pixel> {
         let mut pixel = self.lens.project(point)?;
         if let Some(rolling) = rolling {
@@ -94,12 +95,12 @@ impl RenderCamera {
         Some(pixel)
     }
 
-    /// Directions (x, y, 1) of the pixels of a row of an ideal pinhole: x of each, y of all.
+    /// Directions (x, y, 1) of the pixels in a row of an ideal pinhole: x of each, y of all.
     pub(super) fn straight(&self, row: usize) -> (&[f32], f32) {
         (&self.columns, self.rows[row])
     }
 
-    /// The ray of a place within half a pixel of the pixel (column, row).
+    /// The ray of an image point within half a pixel of the pixel (column, row).
     #[inline]
     pub(super) fn line(&self, column: usize, row: usize, du: f32, dv: f32) -> Line {
         let camera = self.lens.camera();
@@ -113,7 +114,7 @@ impl RenderCamera {
         let here = &self.rays[row * width + column];
         let mut ray = *here;
         if du != 0.0 || dv != 0.0 {
-            // Along the difference to a neighbour; at the border to the one on the other side.
+            // The ray is interpolated towards the next pixel, or extrapolated from the previous one at the border.
             let place = row * width + column;
             let (i, tu) = if column + 1 < width { (place + 1, du) } else { (place - 1, -du) };
             let (j, tv) = if row + 1 < height { (place + width, dv) } else { (place - width, -dv) };
@@ -125,7 +126,7 @@ impl RenderCamera {
     }
 }
 
-/// The camera of one row: a turn and a step of its rays.
+/// The pose of the camera for one row: a rotation and a translation of its rays.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RowPose {
     turn: [[f32; 3]; 3],

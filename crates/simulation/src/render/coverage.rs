@@ -1,10 +1,12 @@
-//! How much of a pixel lies within straight sides.
+//! The area of a pixel inside straight sides.
 
-/// Corners of a square that four lines have cut, at most.
+/// Maximum number of corners of a square that four lines have clipped.
 const MAX: usize = 8;
 
-/// The area of the unit square about the origin on which a·x + b·y + c ≥ 0 for every side [a, b, c] (at most four).
-/// (Clipping: Sutherland and Hodgman, 1974; area: the shoelace formula.)
+/// The area of a pixel inside its sides.
+///
+/// The pixel is the unit square about the origin. The inside of a side [a, b, c] is a·x + b·y + c ≥ 0; at most four
+/// sides are given. The square is clipped by Sutherland and Hodgman (1974), and the shoelace formula gives the area.
 pub(super) fn area(sides: &[[f64; 3]]) -> f64 {
     let mut corners = [[0.0; 2]; MAX];
     corners[..4].copy_from_slice(&[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]);
@@ -51,7 +53,7 @@ mod tests {
         assert!((area(&[[1.0, 0.0, 0.2]]) - 0.7).abs() < 1e-15);
         // A corner cut off: legs of 0.4 and 0.8.
         assert!((area(&[[2.0, 1.0, 0.5 + 1.0 - 0.8]]) - (1.0 - 0.5 * 0.4 * 0.8)).abs() < 1e-15);
-        // A triangle within the pixel, and a strip across it.
+        // A triangle inside the pixel, and a strip across it.
         let triangle = [[0.0, 1.0, 0.2], [1.0, -1.0, 0.2], [-1.0, -1.0, 0.2]];
         assert!((area(&triangle) - 0.16).abs() < 1e-15);
         assert!((area(&[[0.6, 0.8, 0.1], [-0.6, -0.8, 0.1]]) - 0.2 / 0.8).abs() < 1e-12);

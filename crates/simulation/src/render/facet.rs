@@ -1,4 +1,4 @@
-//! A triangle before one camera: what shading needs of it.
+//! A triangle in a camera's frame, prepared for shading.
 
 use nalgebra::{Matrix3, Vector3};
 use smallvec::SmallVec;
@@ -11,43 +11,44 @@ use super::{
     visibility::NONE,
 };
 
-/// Places are computed in whole vectors of this length.
+/// Length of the vectors in which places are computed.
 pub(super) const LANES: usize = 16;
-/// A pixel's footprint is drawn out by no more than the inverse of this where a surface is seen edge-on.
+/// Minimum cosine for the extension of a footprint on a surface seen edge-on.
 const FLATTEST: f32 = 0.2;
 
 /// A triangle in a camera's frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Facet {
-    /// Its plane: normal·p = offset; the normal has unit length.
+    /// Unit normal of the plane normal·p = offset.
     normal: [f32; 3],
     offset: f32,
-    /// A corner, and what weights the second and third corner have at p − corner.
+    /// First corner. The barycentric weights of the other corners are `second`·(p − corner) and `third`·(p − corner).
     corner: [f32; 3],
     second: [f32; 3],
     third: [f32; 3],
-    /// Texture coordinates and normals at the corner, and their steps to the second and the third.
+    /// Texture coordinates at the first corner, and the differences to the second and the third.
     uv: [[f32; 2]; 3],
+    /// Shading normal at the first corner, and the differences to the second and the third.
     normals: [[f32; 3]; 3],
     pub(super) skin: u32,
 }
 
-/// Places on surfaces in one camera's frame, each number a list.
+/// Surface points in one camera's frame, as a structure of arrays.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Spots {
     pub(super) x: Vec<f32>,
     pub(super) y: Vec<f32>,
     pub(super) z: Vec<f32>,
-    /// The shading normal, unit length.
+    /// Shading normal of unit length.
     pub(super) nx: Vec<f32>,
     pub(super) ny: Vec<f32>,
     pub(super) nz: Vec<f32>,
-    /// The texture's coordinates (m).
+    /// Texture coordinates (m).
     pub(super) u: Vec<f32>,
     pub(super) v: Vec<f32>,
-    /// Width of a pixel on the surface (m).
+    /// Footprint of a pixel on the surface (m).
     pub(super) footprint: Vec<f32>,
-    /// The distance from where its ray enters the water (m).
+    /// Range from the ray's entry into the water (m).
     pub(super) range: Vec<f32>,
 }
 
@@ -60,7 +61,7 @@ fn single(v: &Vector3<f64>) -> [f32; 3] {
 }
 
 impl Facet {
-    /// The triangle with its corners at `at` (camera frame); `turn` leads from the world into it.
+    /// The triangle with its corners at `at` (camera frame); `turn` rotates the world into that frame.
     pub(super) fn new(triangle: &Triangle, at: &[Vector3<f64>; 3], turn: &Matrix3<f64>) -> Self {
         let (e, f) = (at[1] - at[0], at[2] - at[0]);
         let normal = e.cross(&f);
@@ -71,8 +72,8 @@ impl Facet {
         let normals = triangle.normals.map(|n| single(&(turn * n)));
         let step = |k: usize| std::array::from_fn(|i| normals[k][i] - normals[0][i]);
         let uv = triangle.uv;
-        // Far from the origin single precision would lose the texture's finest detail: whole tiles do not matter,
-        // but they are not known here, so the first corner is rounded and the steps stay exact.
+        // Far from the origin single precision would lose the finest detail of a texture. The first corner is rounded
+        // and the differences stay exact; the tile size, which could be subtracted, is unknown here.
         let uv_step = |k: usize| [(uv[k][0] - uv[0][0]) as f32, (uv[k][1] - uv[0][1]) as f32];
         Self {
             normal: single(&unit),
@@ -86,16 +87,18 @@ impl Facet {
         }
     }
 
-    /// Depth Z and range at which a ray meets its plane.
+    /// Depth Z and range of a ray's intersection with the plane.
     pub(super) fn spot(&self, line: &Line) -> (f32, f32) {
         let t = (self.offset - dot(&self.normal, &line.from)) / dot(&self.normal, &line.along);
         (line.from[2] + t * line.along[2], t * dot(&line.along, &line.along).sqrt())
     }
 
-    /// Its sides in a pixel where lines bend: a·u + b·v + c ≥ 0 inside at the offset (u, v) from the pixel's centre, (a, b)
-    /// of unit length; `line` gives the ray of an offset. None where the facet is seen edge-on.
+    /// The sides of the facet in a pixel where lines bend; `None` if the facet is seen edge-on.
+    ///
+    /// The inside is a·u + b·v + c ≥ 0 at the offset (u, v) from the pixel's centre, (a, b) of unit length; `line`
+    /// gives the ray of an offset.
     pub(super) fn sides(&self, line: impl Fn([f32; 2]) -> Line) -> SmallVec<[[f64; 3]; 4]> {
-        // The weights of the corners at a ray's place are zero on the sides, and nearly linear within a pixel.
+        // The barycentric weights at a ray's intersection are zero on the sides, and nearly linear within a pixel.
         let weights = |at| {
             let line = line(at);
             let t = (self.offset - dot(&self.normal, &line.from)) / dot(&self.normal, &line.along);
@@ -115,8 +118,8 @@ impl Facet {
         if sides.iter().flatten().all(|x| x.is_finite()) { sides.into_iter().collect() } else { SmallVec::new() }
     }
 
-    /// Where rays meet its plane; `BENT` rays have directions and origins of their own.
-    #[expect(clippy::too_many_arguments, reason = "a slice of its own each: the compiler knows that none overlap")]
+    /// The intersections of rays with the plane; with `BENT`, each ray has its own direction and origin.
+    #[expect(clippy::too_many_arguments, reason = "separate slices, which the compiler knows not to overlap")]
     #[inline(always)]
     fn spots<const BENT: bool>(
         &self,
@@ -163,7 +166,7 @@ impl Facet {
     }
 }
 
-/// Where all parts lie. A run is computed in whole vectors; what stands beyond its end is the next run's to write.
+/// The surface points of all parts. Runs are computed in whole vectors; the next run overwrites the excess.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(super) fn spots(runs: &[Run], count: usize, facets: &[Facet], lines: &Lines, per_focal: f32, out: &mut Spots) {
     let Spots { x, y, z, nx, ny, nz, u, v, footprint, range } = out;

@@ -1,4 +1,4 @@
-//! What the lamps send to places: Lambert's cosine, the beam, 1/r², and what the water takes.
+//! Irradiance from the lamps: Lambert's cosine, the beam, 1/r², and attenuation.
 
 use super::{
     facet::Spots,
@@ -6,7 +6,7 @@ use super::{
 };
 use crate::optics::Lamp;
 
-/// A lamp in f32.
+/// A lamp in single precision.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Beam {
     pub(super) at: [f32; 3],
@@ -26,7 +26,7 @@ impl Beam {
         }
     }
 
-    /// The irradiance at a place without a surface, of light that lost exp(−c r) on its way.
+    /// The irradiance at a place without a surface, after the attenuation exp(−c r).
     #[inline(always)]
     pub(super) fn flux(&self, x: f32, y: f32, z: f32, c: f32) -> f32 {
         let (dx, dy, dz) = (x - self.at[0], y - self.at[1], z - self.at[2]);
@@ -39,7 +39,7 @@ impl Beam {
     }
 }
 
-/// The irradiance E (W/m² for an intensity in W/sr) of each place.
+/// The irradiance E (W/m² for an intensity in W/sr) at each place.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(super) fn irradiance(spots: &Spots, beam: &Beam, c: f32, out: &mut Vec<f32>) {
     let n = spots.x.len();
@@ -60,7 +60,7 @@ pub(super) fn irradiance(spots: &Spots, beam: &Beam, c: f32, out: &mut Vec<f32>)
     }
 }
 
-/// exp(−c r) of each range.
+/// exp(−c r) for each range.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(super) fn through(ranges: &[f32], c: f32, out: &mut Vec<f32>) {
     out.clear();

@@ -1,13 +1,13 @@
-//! Elementary functions in plain f32 arithmetic: the same bits on every machine, and loops that vectorise.
+//! Elementary functions in plain f32 arithmetic: the same bits on every machine, in loops that vectorise.
 
-/// 2ˣ for |x| ≤ 126, relative error below 2e-7; exactly 1 at 0.
+/// 2ˣ for |x| ≤ 126, with a relative error below 2e-7; exactly 1 at 0.
 #[inline(always)]
 pub(super) fn exp2(x: f32) -> f32 {
-    const MAGIC: f32 = 12_582_912.0; // 1.5·2²³: adding and subtracting it rounds to a whole number
+    const MAGIC: f32 = 12_582_912.0; // 1.5·2²³: adding and subtracting it rounds to an integer
     let x = x.clamp(-126.0, 126.0);
     let full = (x + MAGIC) - MAGIC;
     let f = x - full;
-    // Taylor of exp(f ln 2) on |f| ≤ 1/2.
+    // Taylor series of exp(f ln 2) on |f| ≤ 1/2.
     let y = f * std::f32::consts::LN_2;
     let p = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0 + y * (1.0 / 720.0))))));
     p * f32::from_bits(((full as i32 + 127) as u32) << 23)
@@ -19,7 +19,7 @@ pub(super) fn exp(x: f32) -> f32 {
     exp2(x * std::f32::consts::LOG2_E)
 }
 
-/// log₂ x for positive, normal x, absolute error below 1e-6.
+/// log₂ x for positive, normal x, with an absolute error below 1e-6.
 #[inline(always)]
 pub(super) fn log2(x: f32) -> f32 {
     // x = m·2ᵉ with m in [√½, √2).
@@ -34,7 +34,7 @@ pub(super) fn log2(x: f32) -> f32 {
     e as f32 + ln * std::f32::consts::LOG2_E
 }
 
-/// 32 well-mixed bits of three numbers.
+/// A hash of three numbers to 32 bits.
 #[inline(always)]
 pub(super) fn mix(a: u32, b: u32, seed: u32) -> u32 {
     let mut h = seed ^ a.wrapping_mul(0x9E37_79B1) ^ b.wrapping_mul(0x85EB_CA77).rotate_left(15);

@@ -1,10 +1,10 @@
-//! From the field to two images.
+//! Rendering of the scene to a stereo pair.
 //!
-//! A software rasteriser with a visibility buffer: every pixel's centre, and 32 places of each pixel
-//! that an edge crosses, are assigned to a triangle; each triangle is shaded once in a pixel, at the
-//! exact place where the pixel's ray meets its plane, and counts by the area of the pixel that it covers. Lines bend behind ports and with distortion;
-//! there, triangles are cut until they are straight to a fiftieth of a pixel, and only visibility
-//! depends on the cuts. Work is shared by rows in bands of fixed size: the same bytes on any number of threads.
+//! A software rasteriser with a visibility buffer assigns the centre of every pixel, and 32 samples of each pixel that
+//! an edge crosses, to a triangle. Each visible triangle is shaded once in a pixel, at the exact intersection of the
+//! pixel's ray with its plane, and weighted by the area of the pixel that it covers. Lines bend behind ports and with
+//! distortion; there, triangles are subdivided until their sides are straight to 1/50 px, and only visibility depends
+//! on the subdivision. Rows are processed in bands of fixed size, so the bytes do not depend on the number of threads.
 
 mod band;
 mod blur;

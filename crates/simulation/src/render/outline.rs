@@ -1,31 +1,31 @@
-//! A triangle in the image: its edges as lines, and its depth as a plane.
+//! A triangle in the image: its sides as lines, and its inverse depth as a plane.
 
 use nalgebra::Vector3;
 use seafix_geometry::Pixel;
 
 use super::camera::{RenderCamera, Rolling};
 
-/// Nothing nearer than this is drawn (m).
+/// Distance of the near plane (m).
 const NEAR: f64 = 0.05;
-/// A higher layer wins although it is this much (relative) deeper: paint lies *in* its plate.
+/// Relative depth by which a higher layer may be deeper and still win: paint lies *in* its plate.
 const LAYER_STEP: f64 = 2e-4;
-/// Where lines bend, edges longer than this (px) are cut.
+/// Maximum length (px) of an edge where lines bend; longer edges are subdivided.
 const LONGEST: f64 = 8.0;
-/// Cuts of one triangle at most, one after another.
+/// Maximum depth of the subdivision of a triangle.
 const DEEPEST: u32 = 12;
 
 /// One side: a·u + b·v + c ≥ 0 inside, (a, b) of unit length.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Side {
     pub(super) line: [f64; 3],
-    /// Half the width of a pixel across it.
+    /// Half the width of a pixel across the side.
     half: f64,
-    /// Where it crosses row v: column step·v + start; nothing for a side along the rows.
+    /// Slope of the intersection with row v, which lies at column step·v + start; 0 for a side along the rows.
     step: f64,
     start: f64,
     /// Half the width of a pixel along the row.
     reach: f64,
-    /// Whether it is an edge of the body, not a seam.
+    /// Whether it is an edge of the body; otherwise it is a seam.
     pub(super) edge: bool,
 }
 
@@ -33,13 +33,13 @@ impl Side {
     fn new(line: [f64; 3], edge: bool) -> Self {
         let [a, b, c] = line;
         let half = 0.5 * (a.abs() + b.abs());
-        // Both triangles of a seam have the same numbers with other signs, and so the same crossings.
+        // Both triangles of a seam have the same numbers with opposite signs, and so the same intersections.
         let per = if a.abs() > LEVEL { 1.0 / a } else { 0.0 };
         Self { line, half, step: -b * per, start: -c * per, reach: half * per.abs(), edge }
     }
 }
 
-/// Sides with less of a slope lie along the rows.
+/// Minimum slope of a side; sides with less are parallel to the rows.
 const LEVEL: f64 = 1e-12;
 
 /// A convex piece of a triangle in the image.
@@ -47,22 +47,22 @@ const LEVEL: f64 = 1e-12;
 pub(super) struct Outline {
     sides: [Side; 4],
     count: u8,
-    /// Index of the triangle that it shows.
+    /// Index of its triangle.
     pub(super) facet: u32,
-    /// The body that the triangle belongs to.
+    /// Body to which the triangle belongs.
     pub(super) body: u32,
     /// 1/Z = p·(u, v, 1).
     plane: [f64; 3],
-    /// By what 1/Z is multiplied when depths are compared.
+    /// Factor of 1/Z in comparisons of depth.
     pub(super) layer: f64,
-    /// The rows that it reaches over.
+    /// First and last row, fractional.
     pub(super) rows: [f64; 2],
 }
 
-/// Corners and whether the side that follows each is an edge.
+/// Corners, and whether the side that follows each is an edge.
 type Corner = (Vector3<f64>, bool);
 
-/// What a piece belongs to.
+/// The triangle and the body of a piece.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     pub(super) facet: u32,
@@ -70,7 +70,7 @@ pub(super) struct Origin {
     pub(super) layer: u8,
 }
 
-/// Adds what `camera_model` sees of a triangle (its frame) to `out`.
+/// Appends the visible pieces of a triangle (frame of `camera_model`) to `out`.
 pub(super) fn outline(
     corners: [Vector3<f64>; 3],
     edges: [bool; 3],
@@ -79,7 +79,7 @@ pub(super) fn outline(
     rolling: Option<&Rolling>,
     out: &mut Vec<Outline>,
 ) {
-    // Turned away, or wholly behind.
+    // Back faces, and triangles entirely behind the camera.
     let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
     if normal.dot(&corners[0]) >= 0.0 && camera_model.lens.is_straight() && rolling.is_none()
         || corners.iter().all(|p| p.z < NEAR)
@@ -123,7 +123,7 @@ fn straight(
     polygon(&places[..count], &flags, plane, origin, camera.size(), out);
 }
 
-/// The part of a triangle in front of the near plane. (Sutherland and Hodgman, 1974.)
+/// The part of a triangle in front of the near plane (Sutherland and Hodgman, 1974).
 fn clip(corners: [Vector3<f64>; 3], edges: [bool; 3], kept: &mut [Corner; 4]) -> usize {
     let mut count = 0;
     for k in 0..3 {
@@ -134,7 +134,7 @@ fn clip(corners: [Vector3<f64>; 3], edges: [bool; 3], kept: &mut [Corner; 4]) ->
             count += 1;
         }
         if here != there {
-            // The cut itself is no edge; what comes back in goes on along the side it came by.
+            // The cut is no edge; the side that re-enters keeps its own flag.
             kept[count] = (p + (q - p) * ((NEAR - p.z) / (q.z - p.z)), there && edges[k]);
             count += 1;
         }
@@ -142,9 +142,9 @@ fn clip(corners: [Vector3<f64>; 3], edges: [bool; 3], kept: &mut [Corner; 4]) ->
     count
 }
 
-/// A triangle whose sides may bend: cut until they are straight to a fiftieth of a pixel. A side is cut
-/// for its own length alone, so that the triangles on both of its sides stay joined.
-#[expect(clippy::too_many_arguments, reason = "a recursion hands on what it was given")]
+/// A triangle whose sides may bend, subdivided until they are straight to 1/50 px. A side is divided by its own length
+/// alone, so that the triangles on both of its sides stay joined.
+#[expect(clippy::too_many_arguments, reason = "a recursion passes its arguments on")]
 fn curved(
     corners: [Vector3<f64>; 3],
     places: [Option<Pixel>; 3],
@@ -185,7 +185,7 @@ fn curved(
             .map(|m| m * Vector3::from_fn(|i, _| 1.0 / corners[i].z));
         if let Some(plane) = plane {
             let flags = [edges[0], edges[1], edges[2], false];
-            // Turned away: its corners go the other way round.
+            // A back face has the opposite orientation.
             let area = (at[1][0] - at[0][0]) * (at[2][1] - at[0][1]) - (at[1][1] - at[0][1]) * (at[2][0] - at[0][0]);
             if area < 0.0 {
                 polygon(&at, &flags, plane.into(), origin, size, out);
@@ -213,7 +213,7 @@ fn curved(
             part(ab, bc, ca, [false; 3]);
         }
         2 => {
-            // Begin with the side that stays whole.
+            // Begins with a side that is not divided.
             let k = cut.iter().position(|c| !c).unwrap_or(0);
             let (a, b, c, e) = turned(k);
             let (bc, ca) = (middle((k + 1) % 3, (k + 2) % 3), middle((k + 2) % 3, k));
@@ -231,7 +231,7 @@ fn curved(
     }
 }
 
-/// Adds a convex polygon of the image.
+/// Appends a convex polygon of the image.
 fn polygon(
     places: &[[f64; 2]],
     edges: &[bool; 4],
@@ -280,20 +280,20 @@ impl Outline {
         &self.sides[..usize::from(self.count)]
     }
 
-    /// 1/Z at a place of the image.
+    /// 1/Z at an image point.
     #[inline]
     pub(super) fn inverse_depth(&self, u: f64, v: f64) -> f64 {
         self.plane[0] * u + self.plane[1] * v + self.plane[2]
     }
 
-    /// The step of 1/Z from one column to the next.
+    /// The step of 1/Z from one column to the next, and from one row to the next.
     #[inline]
     pub(super) fn slope(&self) -> [f64; 2] {
         [self.plane[0], self.plane[1]]
     }
 
-    /// The columns of row `v` at which every side exceeds −`slack` half pixels, as a half-open range; with
-    /// `edges_only` the seams are not asked.
+    /// The columns of row `v` at which every side exceeds −`slack` half pixels, as a half-open range. With `edges_only`
+    /// seams are ignored.
     pub(super) fn span(&self, v: f64, slack: f64, width: usize, edges_only: bool) -> (usize, usize) {
         let (mut low, mut high) = (0.0, width as f64 - 1.0);
         for side in self.sides().iter().filter(|side| side.edge || !edges_only) {
@@ -312,12 +312,12 @@ impl Outline {
         if low > high || high < 0.0 { (0, 0) } else { (first, (high as usize + 1).max(first)) }
     }
 
-    /// Whether it has an edge that is no seam.
+    /// Whether any side is an edge of the body.
     pub(super) fn has_edges(&self) -> bool {
         self.sides().iter().any(|side| side.edge)
     }
 
-    /// The rows of the image that it touches, pixels being squares.
+    /// The rows of the image that it touches; pixels are squares.
     pub(super) fn touched(&self, height: usize) -> std::ops::Range<usize> {
         let first = (self.rows[0] - 0.5).ceil().max(0.0) as usize;
         let end = ((self.rows[1] + 0.5).floor() + 1.0).clamp(0.0, height as f64) as usize;

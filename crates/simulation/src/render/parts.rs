@@ -1,4 +1,4 @@
-//! The parts of a row's pixels: which facet each of them shows, where, and how much of the pixel it is.
+//! The parts of a row's pixels: facet, position and fraction of the pixel.
 
 use smallvec::SmallVec;
 
@@ -10,7 +10,7 @@ use super::{
     visibility::{NONE, SAMPLES, Strip, places},
 };
 
-/// The range that a pixel has which sees nothing (m).
+/// Range of a pixel that sees nothing (m).
 pub(super) const NOWHERE: f32 = 1e3;
 
 /// One row of the image.
@@ -27,7 +27,7 @@ impl Row {
     }
 }
 
-/// Parts one after the other that show the same facet.
+/// Consecutive parts that show the same facet.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
     pub(super) facet: u32,
@@ -35,7 +35,7 @@ pub(super) struct Run {
     pub(super) to: usize,
 }
 
-/// Rays of parts, each number a list; `z` and `from` stay empty where all are (x, y, 1) from the pupil.
+/// Rays of parts, as a structure of arrays; `z` and `from` stay empty if all rays are (x, y, 1) from the pupil.
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     pub(super) x: Vec<f32>,
@@ -44,10 +44,10 @@ pub(super) struct Lines {
     pub(super) from: [Vec<f32>; 3],
 }
 
-/// The samples of a pixel that see one facet: how many, the sum of their offsets, and the share of the pixel.
+/// The samples of a pixel that see one facet: number, sum of their offsets, fraction of the pixel.
 #[derive(Debug, Clone, Copy)]
 struct Group {
-    /// An outline of the facet.
+    /// Index of an outline of the facet.
     outline: u32,
     facet: u32,
     count: f32,
@@ -55,20 +55,20 @@ struct Group {
     fraction: f64,
 }
 
-/// The sides of a facet in a pixel, from its centre: a·u + b·v + c ≥ 0 inside, (a, b) of unit length.
+/// The sides of a facet in a pixel, relative to its centre: a·u + b·v + c ≥ 0 inside, (a, b) of unit length.
 type Sides = SmallVec<[[f64; 3]; 4]>;
 
-/// All parts of a row, each number a list.
+/// All parts of a row, as a structure of arrays.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
     pub(super) columns: Vec<u32>,
-    /// Share of the pixel.
+    /// Fraction of the pixel.
     pub(super) fractions: Vec<f32>,
-    /// Where in the row.
+    /// Column position in the row; fractional.
     pub(super) u: Vec<f32>,
     pub(super) lines: Lines,
     pub(super) runs: Vec<Run>,
-    /// Column, Z and range of the centres of pixels that edges cross.
+    /// Column, Z and range at the centre of each pixel that edges cross.
     pub(super) centres: Vec<(u32, f32, f32)>,
     groups: Vec<Group>,
 }
@@ -88,14 +88,14 @@ impl Lines {
         }
     }
 
-    /// Whether each has a direction and an origin of its own.
+    /// Whether each ray has its own direction and origin.
     pub(super) fn bent(&self) -> bool {
         !self.z.is_empty()
     }
 }
 
 impl Parts {
-    /// The parts of a row as the strip saw it.
+    /// Finds the parts of a row of a strip.
     pub(super) fn find(
         &mut self,
         row: &Row,
@@ -120,7 +120,7 @@ impl Parts {
             column = next as usize + 1;
         }
         self.full(column..seen.len(), seen, row, outlines, camera_model, bent);
-        // Work on whole vectors reads beyond the end.
+        // Vectorised work reads beyond the end.
         let padded = self.columns.len() + LANES;
         let [a, b, c] = &mut self.lines.from;
         for list in [&mut self.lines.x, &mut self.lines.y] {
@@ -133,7 +133,7 @@ impl Parts {
         }
     }
 
-    /// Pixels that no edge crosses.
+    /// Adds the pixels that no edge crosses.
     fn full(
         &mut self,
         columns: std::ops::Range<usize>,
@@ -167,7 +167,7 @@ impl Parts {
         }
     }
 
-    /// A pixel that an edge crosses: one part for each facet that its samples see.
+    /// Adds a pixel that an edge crosses: one part for each facet of its samples.
     #[expect(clippy::too_many_arguments, reason = "an inner step, called in one place")]
     fn crossed(
         &mut self,
@@ -215,7 +215,7 @@ impl Parts {
         }
     }
 
-    /// Where all parts lie; those that see nothing lie far away, facing the camera.
+    /// The surface points of all parts; parts that see nothing lie far away, facing the camera.
     pub(super) fn spots(&self, facets: &[Facet], focal: f32, out: &mut Spots) {
         super::facet::spots(&self.runs, self.columns.len(), facets, &self.lines, 1.0 / focal, out);
     }
@@ -225,8 +225,8 @@ fn facet_of(outlines: &[Outline], index: u32) -> u32 {
     if index == NONE { NONE } else { outlines[index as usize].facet }
 }
 
-/// The samples of a pixel by what they see. Triangles of one smooth surface stay apart: each has its
-/// own plane.
+/// Groups the samples of a pixel by facet. Triangles of one smooth surface stay separate, because each has its own
+/// plane.
 fn group(samples: &[u32; SAMPLES], outlines: &[Outline], offsets: &[[f32; SAMPLES]; 2], groups: &mut Vec<Group>) {
     groups.clear();
     let mut here = 0;
@@ -244,15 +244,16 @@ fn group(samples: &[u32; SAMPLES], outlines: &[Outline], offsets: &[[f32; SAMPLE
     }
 }
 
-/// The sides of an outline about a pixel.
+/// The sides of an outline relative to a pixel.
 fn straight(outline: &Outline, column: usize, row: usize) -> Sides {
     let (u, v) = (column as f64, row as f64);
     outline.sides().iter().map(|side| side.line).map(|[a, b, c]| [a, b, a * u + b * v + c]).collect()
 }
 
-/// The share of the pixel that each group has. A facet that nothing hides there, which is one that all samples within it
-/// see, has the area of the pixel within its sides: samples alone would make its edges stairs. What such facets leave is
-/// divided among the others by their samples.
+/// The pixel fraction of each group.
+///
+/// A facet that nothing hides in the pixel (all samples inside of it see it) gets the exact area inside its sides;
+/// samples alone would give its edges steps. The other facets share the rest by their samples.
 fn fraction(groups: &mut [Group], sides: impl Fn(&Group) -> Sides, places: &[[f32; SAMPLES]; 2]) {
     if let [only] = groups {
         only.fraction = 1.0;
@@ -265,7 +266,7 @@ fn fraction(groups: &mut [Group], sides: impl Fn(&Group) -> Sides, places: &[[f3
         group.fraction = if full { area(&sides) } else { -1.0 };
         if full { free += group.fraction } else { hidden += group.count }
     }
-    // Slivers that no sample saw are nobody's: the shares add up to one all the same.
+    // Slivers without a sample belong to no group; the fractions add up to 1 nevertheless.
     let scale = if free > 1.0 || hidden == 0.0 && free > 0.0 { 1.0 / free } else { 1.0 };
     let left = if hidden > 0.0 { (1.0 - free).max(0.0) / f64::from(hidden) } else { 0.0 };
     for group in groups {
@@ -273,7 +274,7 @@ fn fraction(groups: &mut [Group], sides: impl Fn(&Group) -> Sides, places: &[[f3
     }
 }
 
-/// How many samples lie within all sides, and not right beside one: bent sides are cut to a fiftieth of a pixel.
+/// The number of samples inside all sides with a margin, because bent sides are approximated to 1/50 px.
 fn within(sides: &Sides, places: &[[f32; SAMPLES]; 2]) -> f32 {
     const BESIDE: f32 = 0.03;
     let mut min = [f32::MAX; SAMPLES];

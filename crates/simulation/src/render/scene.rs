@@ -1,4 +1,4 @@
-//! One stereo pair: shadows, the two views, exposure, noise.
+//! Rendering of one stereo pair: shadows, both views, exposure, noise.
 
 use std::sync::Arc;
 
@@ -18,12 +18,12 @@ use crate::{
     scene::Scene,
 };
 
-/// What lies beyond this is not drawn (m).
+/// Maximum distance at which bodies are drawn (m).
 const FAR: f64 = 25.0;
-/// The most lamps that throw shadows.
+/// Maximum number of lamps that cast shadows.
 const MAX_SHADOWS: usize = 4;
 
-/// Everything that stays the same from frame to frame.
+/// The constant part of all frames.
 #[derive(Debug)]
 pub(crate) struct Studio {
     pub(crate) left: RenderCamera,
@@ -37,16 +37,16 @@ pub(crate) struct Studio {
     lamp_view: RenderCamera,
 }
 
-/// One instant.
+/// Poses, motion and seeds of one stereo pair.
 #[derive(Debug, Clone)]
 pub(crate) struct Shot {
     pub(crate) world_from_left: Transform<World, Camera>,
     pub(crate) world_from_right: Transform<World, RightCamera>,
-    /// How the cameras move: rotation (rad/s) and translation (m/s) in the frame of each.
+    /// Twist of each camera in its own frame: rotation (rad/s) and translation (m/s).
     pub(crate) motion: [Vector6<f64>; 2],
-    /// How far the water has carried what floats in it (m).
+    /// Displacement of floating particles by the water (m).
     pub(crate) drift: Vector3<f64>,
-    /// Noise of the left and the right image.
+    /// Seeds of the noise in the left and the right image.
     pub(crate) seeds: [u32; 2],
 }
 
@@ -57,7 +57,7 @@ struct Scratch {
     maps: Vec<ShadowMap>,
 }
 
-/// The memory of one side.
+/// Buffers of one camera.
 #[derive(Debug, Default)]
 struct Side {
     view: ViewScratch,
@@ -70,7 +70,7 @@ struct Side {
 }
 
 impl Studio {
-    #[expect(clippy::too_many_arguments, reason = "each is one thing that does not change")]
+    #[expect(clippy::too_many_arguments, reason = "each is a constant part of the studio")]
     pub(crate) fn new(
         left: RenderCamera,
         right: RenderCamera,
@@ -89,7 +89,7 @@ impl Studio {
         Self { left, right, water, imager, patterns, textures, shadows, snow_seed, lamp_view }
     }
 
-    /// The left and the right image, and how they were exposed.
+    /// Renders the left and the right image, with their exposure.
     pub(crate) fn render(&self, scene: &Scene, shot: &Shot, work: &mut Workspace) -> (Image, Image, Exposure) {
         let threads = work.threads();
         let scratch: &mut Scratch = work.get();
@@ -124,7 +124,7 @@ impl Studio {
         (a, b, exposure)
     }
 
-    /// Depth maps of the lamps, which move with the left camera.
+    /// Renders the depth maps of the lamps, which move with the left camera.
     fn draw_shadows(&self, scene: &Scene, shot: &Shot, lamps: &[Lamp], threads: Threads, scratch: &mut Scratch) {
         if lamps.is_empty() {
             return;
@@ -165,7 +165,7 @@ impl Studio {
         let view = View { scene, camera_model, rolling: rolling.as_ref(), far: FAR };
         view.draw(world_from_view, &lit, threads, &mut scratch.view);
 
-        // Light scattered at small angles arrives too, blurred.
+        // Light scattered at small angles reaches the camera blurred.
         let [width, _] = camera_model.lens.camera().size().map(|n| n as usize);
         let Side { view: ViewScratch { pixels, .. }, image, depths, ranges, scattered, blur, .. } = scratch;
         let plane = |list: &mut Vec<f32>, k: usize| {
@@ -195,7 +195,7 @@ impl Studio {
         fall(&scratch.flakes, width, &mut scratch.image, &scratch.ranges);
     }
 
-    /// Motion, lens and sensor.
+    /// Applies motion blur, lens blur and the sensor.
     fn image(
         &self,
         camera_model: &RenderCamera,

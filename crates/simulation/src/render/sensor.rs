@@ -1,4 +1,4 @@
-//! From radiance to grey levels: exposure, gain, noise, bits.
+//! The image sensor: exposure, gain, noise and quantisation.
 
 use seafix_component::in_range;
 use seafix_vision::Threads;
@@ -6,45 +6,48 @@ use serde::{Deserialize, Serialize};
 
 use super::math::mix;
 
-/// Share of the full well that a radiance of 1 fills in a millisecond. (One lamp of power 1 gives a white
-/// plate at 1 m the radiance 1/π.)
+/// Fraction of the full well that a radiance of 1 fills in a millisecond. One lamp of power 1 gives a white plate at 1
+/// m the radiance 1/π.
 const SENSITIVITY: f64 = 5.5;
-/// The greatest gain.
+/// Maximum gain.
 const MAX_GAIN: f64 = 16.0;
-/// Which share of the pixels the automatic exposure leaves brighter than its target.
+/// Fraction of the pixels that automatic exposure leaves brighter than its target.
 const BRIGHTEST: f64 = 0.02;
 
-/// The image sensor, after EMVA 1288: μ = K·n + black, σ² = K²(σ_read² + n) + quantisation, with n electrons.
+/// The image sensor after EMVA 1288.
+///
+/// The mean is μ = K·n + black and the variance σ² = K²(σ_read² + n) + quantisation, with n electrons and the gain K in
+/// grey levels per electron. The defaults are those of a usual industrial CMOS sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Imager {
-    /// Exposure time (ms); with automatic exposure the longest.
+    /// Exposure time (ms), from 0.001 to 1000; the maximum with automatic exposure.
     pub exposure_ms: f64,
-    /// Gain; with automatic exposure the least.
+    /// Gain, from 0.01 to 16; the minimum with automatic exposure.
     pub gain: f64,
-    /// Whether exposure and gain follow the brightness of each pair.
+    /// Whether exposure time and gain follow the brightness of each pair.
     pub automatic: bool,
-    /// Share of white that the brightest fiftieth of the pixels gets from automatic exposure.
+    /// Target brightness of automatic exposure as a fraction of white, from 0.01 to 1; 2 % of the pixels exceed it.
     pub target: f64,
-    /// Electrons that a pixel holds.
+    /// Full well capacity (electrons), from 100 to 1 000 000.
     pub full_well: f64,
-    /// Standard deviation of the read noise (electrons).
+    /// Standard deviation of the read noise (electrons), from 0 to 10 000.
     pub read_noise: f64,
-    /// Whether light comes in whole electrons: shot noise.
+    /// Whether the image has shot noise.
     pub shot_noise: bool,
-    /// Photo response non-uniformity: standard deviation of the pixels' sensitivity.
+    /// Photo response non-uniformity: relative standard deviation of the pixels' sensitivity, from 0 to 0.5.
     pub prnu: f64,
-    /// Dark signal non-uniformity: standard deviation (electrons).
+    /// Dark signal non-uniformity: standard deviation (electrons), from 0 to 10 000.
     pub dsnu: f64,
-    /// Grey level of darkness (of 255).
+    /// Black level (grey levels of 255), from 0 to 100.
     pub black: f64,
     /// Bits of a pixel: 8 or 12.
     pub bits: u8,
-    /// Standard deviation of the lens's blur (px).
+    /// Standard deviation of the lens blur (px), from 0 to 20.
     pub blur: f64,
-    /// Time in which a rolling shutter reads all rows (ms); 0 is a global shutter.
+    /// Readout time of a rolling shutter over all rows (ms), from 0 to 1000; 0 is a global shutter.
     pub readout_ms: f64,
-    /// How much later the right image is taken than the left (ms).
+    /// Delay of the right image after the left (ms), from −1000 to 1000; 0 is perfect synchronisation.
     pub sync_ms: f64,
 }
 
@@ -88,7 +91,7 @@ impl Imager {
         in_range(matches!(self.bits, 8 | 12), "imager.bits", self.bits, "8 or 12")
     }
 
-    /// Exposure (ms) and gain for these radiances.
+    /// Exposure time (ms) and gain for the radiances of a pair.
     pub(super) fn exposed(&self, images: [&[f32]; 2]) -> Exposure {
         let fixed = Exposure { ms: self.exposure_ms, gain: self.gain };
         if !self.automatic {
@@ -106,7 +109,7 @@ impl Imager {
         }
     }
 
-    /// What the pixels of one camera keep for the whole dive.
+    /// The fixed pattern of one camera for a complete dive.
     pub(crate) fn pattern(&self, size: [u32; 2], seed: u32) -> Pattern {
         let normal = Normal::new();
         let pixels = size[0] * size[1];
@@ -117,7 +120,7 @@ impl Imager {
         Pattern { response: list(self.prnu, 1, 1.0), dark: list(self.dsnu, 2, 0.0), normal }
     }
 
-    /// Turns radiances into grey levels, 0 to 255, in steps of the bits.
+    /// Converts radiances to grey levels from 0 to 255, quantised to the bits.
     pub(super) fn develop(
         &self,
         image: &mut [f32],
@@ -129,7 +132,7 @@ impl Imager {
         const PIECE: usize = 1 << 16;
         let electrons = (SENSITIVITY * exposure.ms * self.full_well) as f32;
         let levels = f32::from((1_u16 << self.bits) - 1);
-        // Grey levels an electron.
+        // Grey levels per electron.
         let k = (f64::from(levels) * exposure.gain / self.full_well) as f32;
         let black = self.black as f32 * levels / 255.0;
         let (read2, back) = ((self.read_noise * self.read_noise) as f32, 255.0 / levels);
@@ -151,31 +154,36 @@ impl Imager {
     }
 }
 
-/// What turns radiances into grey levels, in single precision.
+/// Parameters of the conversion from radiance to grey levels, in single precision.
 #[derive(Debug, Clone, Copy)]
 struct Numbers {
-    /// Electrons a radiance, and how many a pixel holds.
+    /// Electrons per unit of radiance.
     electrons: f32,
+    /// Full well capacity (electrons).
     well: f32,
-    /// Variance of the read noise, and that of each electron.
+    /// Variance of the read noise (electrons²).
     read2: f32,
+    /// Variance of each electron: 1 with shot noise, 0 without.
     shot: f32,
-    /// Grey levels an electron, of darkness, of white, and what they are of 255.
+    /// Grey levels per electron.
     k: f32,
+    /// Black level, in levels of the bits.
     black: f32,
+    /// Level of white.
     levels: f32,
+    /// Factor from levels of the bits to grey levels of 255.
     back: f32,
     seed: u32,
 }
 
 impl Numbers {
-    /// Develops the pixels from number `first` of the image on.
+    /// Develops pixels whose index in the image starts at `first`.
     fn develop(&self, pixels: &mut [f32], first: usize, pattern: &Pattern) {
         developed(self, pixels, first, pattern);
     }
 }
 
-/// Pixels that are developed at once.
+/// Number of pixels developed in one pass.
 const CHUNK: usize = 64;
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
@@ -208,7 +216,7 @@ fn developed(numbers: &Numbers, pixels: &mut [f32], first: usize, pattern: &Patt
     }
 }
 
-/// Exposure time (ms) and gain of one pair.
+/// Exposure time and gain of one pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exposure {
     /// Exposure time (ms).
@@ -217,7 +225,7 @@ pub struct Exposure {
     pub gain: f64,
 }
 
-/// What the pixels of one camera keep: their sensitivity, their dark signal (electrons).
+/// The fixed pattern of one camera: sensitivity and dark signal (electrons) of each pixel.
 #[derive(Debug, Clone)]
 pub(crate) struct Pattern {
     response: Vec<f32>,
@@ -225,7 +233,7 @@ pub(crate) struct Pattern {
     normal: Normal,
 }
 
-/// Normal numbers from random bits, by a table of quantiles and their steps with linear interpolation; ends at ±4.1.
+/// Normal numbers from random bits by a linearly interpolated quantile table, limited to ±4.1.
 #[derive(Debug, Clone)]
 pub(super) struct Normal(Vec<[f32; 2]>);
 
@@ -235,27 +243,27 @@ impl Normal {
     fn new() -> Self {
         let n = Self::CELLS;
         let mut table: Vec<f64> = (0..=n).map(|k| quantile((k as f64 / n as f64).clamp(2e-5, 1.0 - 2e-5))).collect();
-        // The polygon of the quantiles has a slightly different variance: scale it to 1.
+        // The interpolated quantiles have a slightly different variance, which is scaled to 1.
         let variance: f64 =
             table.windows(2).map(|w| (w[0] * w[0] + w[0] * w[1] + w[1] * w[1]) / 3.0).sum::<f64>() / n as f64;
         table.iter_mut().for_each(|x| *x /= variance.sqrt());
         Self(table.windows(2).map(|w| [w[0] as f32, w[1] as f32 - w[0] as f32]).collect())
     }
 
-    /// The number of these bits.
+    /// The normal number of these bits.
     #[inline]
     pub(super) fn at(&self, bits: u32) -> f32 {
         Self::between(self.0[(bits >> 20) as usize], bits)
     }
 
-    /// The number of these bits, whose cell is this.
+    /// The normal number of these bits, given their table cell.
     #[inline(always)]
     fn between([low, step]: [f32; 2], bits: u32) -> f32 {
         low + (bits & 0xF_FFFF) as i32 as f32 * (1.0 / (1 << 20) as f32) * step
     }
 }
 
-/// The standard normal quantile, by bisection-free Newton steps on the distribution function.
+/// The standard normal quantile, by Newton's iteration on the distribution function.
 fn quantile(p: f64) -> f64 {
     let mut x = 0.0;
     for _ in 0..100 {
@@ -288,8 +296,8 @@ mod tests {
 
     #[test]
     fn the_photon_transfer_curve_gives_back_gain_and_read_noise() {
-        // Seen to fail with a gain 3 % too high.
-        // σ² = K (μ − black) + K² σ_read² + 1/12, in steps of 12 bits.
+        // Regression: a gain 3 % too high fails this test.
+        // σ² = K (μ − black) + K² σ_read² + 1/12, quantised to 12 bits.
         let imager = Imager { bits: 12, gain: 4.0, read_noise: 6.0, black: 10.0, ..quiet() };
         let scale = 4095.0 / 255.0;
         let k = 4095.0 * 4.0 / imager.full_well;
@@ -309,7 +317,7 @@ mod tests {
 
     #[test]
     fn a_dark_frame_has_the_read_noise_and_the_dark_signal() {
-        // Without light the variance is K²(σ_read² + σ_dsnu²) + 1/12, and the mean is black; too much light is white,
+        // The variance without light is K²(σ_read² + σ_dsnu²) + 1/12, and the mean is black. Overexposure gives white
         // without noise.
         let imager = Imager { bits: 12, gain: 8.0, read_noise: 5.0, dsnu: 3.0, black: 20.0, ..quiet() };
         let (width, height) = (400, 250);

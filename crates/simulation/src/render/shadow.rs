@@ -1,4 +1,4 @@
-//! Which places a lamp reaches: depth maps seen from the lamps.
+//! Shadow maps: depth maps seen from the lamps.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Transform};
@@ -10,39 +10,43 @@ use super::{
 };
 use crate::optics::{Lamp, Lens, Port, Water};
 
-/// Side of a map (px) and its focal length: 100° across.
+/// Side of a map (px).
 const SIDE: u32 = 1024;
+/// Focal length of a map (px), for a field of view of 100°.
 const FOCAL: f64 = 430.0;
-/// A body begins to throw shadow when it is nearer than a place by this share of its depth: the map's own rounding.
+/// Relative depth bias of the shadow test, which absorbs the rounding of the map.
 const BIAS: f32 = 1.002;
-/// Steepest surface that is followed from pixel to pixel of the map: relative step of its 1/Z.
+/// Maximum relative step of a surface's 1/Z between pixels of the map.
 const STEEPEST: f32 = 0.02;
-/// Pixels of a map that are summed up as one block, and what lies around it that its places ask too.
+/// Side of a block of map pixels that are summarised together (px).
 const BLOCK: usize = 8;
+/// Number of map pixels before a block with which its places compare.
 const BEFORE: usize = 1;
+/// Number of map pixels after a block with which its places compare.
 const AFTER: usize = 2;
+/// Number of blocks along a side of a map.
 const BLOCKS: usize = SIDE as usize / BLOCK;
 
 /// The depth map of one lamp.
 #[derive(Debug, Default)]
 pub(super) struct ShadowMap {
-    /// Greatest 1/Z of each pixel, 0 where nothing is.
+    /// Maximum 1/Z of each pixel; 0 for an empty pixel.
     depths: Vec<f32>,
-    /// The least and the greatest of all pixels that places in a block ask.
+    /// Minimum and maximum over all pixels that places in a block compare with.
     blocks: Vec<[f32; 2]>,
-    /// The same of each column of a row of blocks.
+    /// Minimum and maximum of each column in a row of blocks.
     columns: Vec<[f32; 2]>,
     outlines: Vec<Outline>,
 }
 
-/// From a camera's frame into that of a lamp's map.
+/// The transform from a camera's frame to that of a lamp's map.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShadowView {
     turn: [[f32; 3]; 3],
     step: [f32; 3],
 }
 
-/// A camera in the place of a lamp.
+/// A camera at the position of a lamp.
 pub(super) fn shadow_camera() -> RenderCamera {
     let middle = 0.5 * (f64::from(SIDE) - 1.0);
     let camera = seafix_geometry::Pinhole::new([SIDE; 2], [FOCAL; 2], [middle; 2], &[]).expect("constants");
@@ -50,7 +54,7 @@ pub(super) fn shadow_camera() -> RenderCamera {
     RenderCamera::new(Lens::new(camera, Port::default()), Vec::new(), &clear)
 }
 
-/// The turn and step from the frame that a lamp is given in, into its map's frame: z along its axis.
+/// Rotation and translation from the frame of the lamps to the map's frame, whose z is the lamp's axis.
 fn into_map(lamp: &Lamp) -> (Matrix3<f64>, Vector3<f64>) {
     let z = lamp.axis();
     let x = Vector3::y().cross(&z);
@@ -60,7 +64,7 @@ fn into_map(lamp: &Lamp) -> (Matrix3<f64>, Vector3<f64>) {
 }
 
 impl ShadowView {
-    /// For places in the frame of an eye, which `left_from_view` leads into the frame of the lamp.
+    /// The transform for places in a camera's frame; `left_from_view` maps that frame to the lamps'.
     pub(super) fn new(lamp: &Lamp, left_from_view: &Transform<Camera, Camera>) -> Self {
         let (turn, step) = into_map(lamp);
         let step = turn * left_from_view.translation() + step;
@@ -73,7 +77,7 @@ impl ShadowView {
 }
 
 impl ShadowMap {
-    /// Draws the bodies, given in the frame that the lamp is given in.
+    /// Renders the bodies, given in the frame of the lamps.
     pub(super) fn draw(&mut self, bodies: &[[Vector3<f64>; 3]], lamp: &Lamp, camera_model: &RenderCamera) {
         let (turn, step) = into_map(lamp);
         self.outlines.clear();
@@ -97,7 +101,7 @@ impl ShadowMap {
         self.sum_up();
     }
 
-    /// The least and the greatest depth about each block.
+    /// Minimum and maximum depth about each block.
     fn sum_up(&mut self) {
         const WIDE: usize = SIDE as usize;
         let about = |k: usize| (k * BLOCK).saturating_sub(BEFORE)..((k + 1) * BLOCK + AFTER).min(WIDE);
@@ -118,16 +122,16 @@ impl ShadowMap {
     }
 }
 
-/// Widens a range to take in another.
+/// Extends a range to include another.
 #[inline(always)]
 fn join(sum: &mut [f32; 2], here: [f32; 2]) {
     *sum = [if here[0] < sum[0] { here[0] } else { sum[0] }, if here[1] > sum[1] { here[1] } else { sum[1] }];
 }
 
-/// Places that are looked up at once.
+/// Number of places tested in one pass.
 const CHUNK: usize = 64;
 
-/// A place before a map: where it is in pixels, its 1/Z, and the step of its surface's 1/Z a pixel.
+/// A place in a map: its pixel, its 1/Z, and the steps of its surface's 1/Z per pixel.
 #[derive(Clone, Copy)]
 struct MapPosition {
     u: f32,
@@ -136,10 +140,11 @@ struct MapPosition {
     step: [f32; 2],
 }
 
-/// Multiplies the light of a lamp at places by the share that reaches each, 0 to 1: the mean over a square of three
-/// pixels of its map, as if the lamp had some centimetres of width. Each pixel is held against the plane of the place's
-/// own surface (Isidoro, Shadow mapping: GPU-based tips and techniques, 2006). Where the block of the map about a place is
-/// wholly behind it, or wholly before it, nothing more is asked.
+/// Multiplies a lamp's light at places by the unoccluded fraction, from 0 to 1.
+///
+/// Percentage-closer filtering over 3 × 3 pixels of the map, as if the lamp were some centimetres wide. Each pixel is
+/// compared with the plane of the place's own surface (receiver plane depth bias; Isidoro, *Shadow mapping: GPU-based
+/// tips and techniques*, 2006). A block of the map that is entirely behind or before the place decides at once.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 pub(super) fn cast(map: &ShadowMap, view: &ShadowView, spots: &Spots, light: &mut [f32]) {
     const MIDDLE: f32 = 0.5 * (SIDE as f32 - 1.0);
@@ -157,7 +162,7 @@ pub(super) fn cast(map: &ShadowMap, view: &ShadowView, spots: &Spots, light: &mu
             at[..n].copy_from_slice(&list[k * CHUNK..][..n]);
         }
         let [xs, ys, zs, nxs, nys, nzs] = &at;
-        // Written out: closures would be called here, not inlined.
+        // Written out, because closures would be called here instead of inlined.
         let ([a, b, c], [su, sv, sz]) = (&view.turn, &view.step);
         for i in 0..CHUNK {
             let (x, y, z) = (xs[i], ys[i], zs[i]);
@@ -172,7 +177,7 @@ pub(super) fn cast(map: &ShadowMap, view: &ShadowView, spots: &Spots, light: &mu
             let depth = p[2];
             let scale = 1.0 / depth.max(0.05);
             let (here_u, here_v) = (p[0] * scale * FOCAL as f32 + MIDDLE, p[1] * scale * FOCAL as f32 + MIDDLE);
-            // Outside the map counts as lit; behind the lamp its beam has nothing anyway.
+            // A place outside of the map counts as lit; behind the lamp the beam has no light anyway.
             let inside = (depth > 0.05) & (here_u >= FIRST) & (here_v >= FIRST) & (here_u < LAST) & (here_v < LAST);
             (u[i], v[i]) = (if inside { here_u } else { FIRST }, if inside { here_v } else { FIRST });
             own[i] = if inside { scale * BIAS } else { f32::INFINITY };
@@ -182,7 +187,7 @@ pub(super) fn cast(map: &ShadowMap, view: &ShadowView, spots: &Spots, light: &mu
             let max = STEEPEST * scale;
             step_u[i] = (normal[0] * per).max(-max).min(max);
             step_v[i] = (normal[1] * per).max(-max).min(max);
-            // No pixel that is asked lies farther than two from the place.
+            // No compared pixel is farther than two pixels from the place.
             slack[i] = 2.0 * (step_u[i].abs() + step_v[i].abs());
             block[i] = (v[i] as i32 / BLOCK as i32 * BLOCKS as i32 + u[i] as i32 / BLOCK as i32) as u32;
         }
@@ -197,7 +202,7 @@ pub(super) fn cast(map: &ShadowMap, view: &ShadowView, spots: &Spots, light: &mu
     }
 }
 
-/// The share of three by three pixels about a place that is not nearer to the lamp than its surface.
+/// The fraction of the 3 × 3 pixels about a place that are no nearer to the lamp than its surface.
 #[inline(always)]
 fn fraction(depths: &[f32], place: &MapPosition) -> f32 {
     const WIDE: usize = SIDE as usize;

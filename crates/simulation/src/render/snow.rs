@@ -1,4 +1,4 @@
-//! Marine snow: particles in the water, the same ones for both cameras and from frame to frame.
+//! Marine snow: persistent particles in the water, common to both cameras.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Frame, Transform, World};
@@ -8,14 +8,15 @@ use crate::optics::Water;
 
 /// Side of a cell of space (m).
 const CELL: f64 = 0.4;
-/// Particles farther than this are lost in the haze (m).
+/// Maximum distance of visible particles (m); backscatter hides farther ones.
 const FAR: f64 = 3.5;
-/// Nothing nearer than this (m).
+/// Minimum distance of a particle (m).
 const NEAR: f64 = 0.12;
-/// Share of the light that a particle returns.
+/// Albedo of a particle.
 const ALBEDO: f32 = 0.55;
-/// Diameter of the pupil (m), and the distance in focus (m).
+/// Diameter of the pupil (m).
 const APERTURE: f64 = 0.0015;
+/// Distance in focus (m).
 const FOCUS: f64 = 3.0;
 
 /// A particle before one camera.
@@ -25,15 +26,15 @@ pub(super) struct Flake {
     pub(super) v: f32,
     /// Standard deviation of its image (px).
     pub(super) sigma: f32,
-    /// Pixels that it covers.
+    /// Area of its image (px²).
     pub(super) area: f32,
-    /// Its distance (m).
+    /// Range (m).
     pub(super) range: f32,
-    /// Its radiance before the camera.
+    /// Radiance before defocus.
     pub(super) radiance: f32,
 }
 
-/// The particles that `camera_model` sees, far ones first. The cells of space drift with the water by `drift` (m).
+/// The particles in view of `camera_model`, far ones first. The cells of space drift with the water by `drift` (m).
 pub(super) fn flakes<F: Frame>(
     water: &Water,
     camera_model: &RenderCamera,
@@ -52,7 +53,7 @@ pub(super) fn flakes<F: Frame>(
     let centre = world_from_view.translation() - drift;
     let low = centre.map(|x| ((x - FAR) / CELL).floor() as i64);
     let high = centre.map(|x| ((x + FAR) / CELL).floor() as i64);
-    // The number in a cell: Poisson by inversion; cells draw from their own place alone.
+    // The number in a cell follows a Poisson distribution, by inversion; each cell has its own stream.
     let mean = water.snow * CELL * CELL * CELL;
     let none = libm::exp(-mean);
     let [width, height] = camera_model.lens.camera().size().map(f64::from);
@@ -84,7 +85,7 @@ pub(super) fn flakes<F: Frame>(
                     if !(pixel.u > -20.0 && pixel.v > -20.0 && pixel.u < width + 20.0 && pixel.v < height + 20.0) {
                         continue;
                     }
-                    // Small ones are many: radii fall as a power law between the two bounds.
+                    // The radii follow a power law between the two bounds, so small particles prevail.
                     let [small, large] = water.snow_radius;
                     let fraction = draw(4 * n + 4);
                     let radius = small * large / (large - fraction * (large - small));
@@ -109,7 +110,7 @@ pub(super) fn flakes<F: Frame>(
     out.sort_by(|a, b| b.range.total_cmp(&a.range).then(a.u.total_cmp(&b.u)).then(a.v.total_cmp(&b.v)));
 }
 
-/// Puts the particles before what lies behind them.
+/// Blends the particles in front of the image.
 pub(super) fn fall(flakes: &[Flake], width: usize, image: &mut [f32], ranges: &[f32]) {
     let height = image.len() / width;
     for flake in flakes {

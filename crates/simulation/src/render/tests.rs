@@ -21,7 +21,7 @@ pub(super) fn scene(plan: &SitePlan) -> Scene {
     Scene::new(plan, &Changes::default(), SurveyErrors { model: 0.0, survey: 0.0 }, 3)
 }
 
-/// Kept for all tests: to make looks takes longer than to draw with them.
+/// Keeps the textures for all tests, because computing them takes longer than rendering.
 static TEXTURES: LazyLock<Arc<SurfaceTextures>> = LazyLock::new(|| SurfaceTextures::shared(5));
 
 pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, distortion: &[f64]) -> Studio {
@@ -43,7 +43,7 @@ pub(super) fn studio(scale: f64, water: Water, imager: Imager, port: Port, disto
     Studio::new(left, right, water, imager, textures, true, 1, 2)
 }
 
-/// The camera `height` above a place, looking down with the top of the image to the north, tilted by `tilt`.
+/// A camera at `height` above a place, looking down with north at the top of the image, tilted by `tilt`.
 pub(super) fn above(place: Vector3<f64>, height: f64, tilt: f64) -> Transform<World, Camera> {
     let down = seafix_geometry::so3::exp(&(Vector3::z() * std::f64::consts::FRAC_PI_2))
         * seafix_geometry::so3::exp(&(Vector3::x() * tilt));
@@ -68,7 +68,7 @@ fn save(name: &str, image: &Image) {
     std::fs::write(std::env::temp_dir().join(format!("seafix-{name}.pgm")), bytes).unwrap();
 }
 
-/// The time that pairs take: `cargo test --release -p seafix-simulation pace -- --ignored --nocapture`
+/// Measures the rendering time of pairs: `cargo test --release -p seafix-simulation pace -- --ignored --nocapture`
 #[test]
 #[ignore = "table"]
 fn pace() {
@@ -90,14 +90,14 @@ fn pace() {
     }
 }
 
-/// A studio of a quarter of the size: quick, and still an image.
+/// A studio at a quarter of the size, for speed.
 fn small(water: Water) -> Studio {
     studio(0.25, water, Imager::default(), Port::default(), &[])
 }
 
 #[test]
 fn the_rasteriser_sees_what_a_ray_meets() {
-    // Straight, with distortion, and through ports: depth against the bounding-volume hierarchy.
+    // Pinhole, distortion and ports: the depths agree with those of ray casting.
     let scene = scene(&built_in("drill-centre").unwrap());
     let flat = Port { kind: PortKind::Flat, ..Port::default() };
     let dome = Port { kind: PortKind::Dome, offset: [0.002, 0.001, 0.004], ..Port::default() };
@@ -128,7 +128,7 @@ fn the_rasteriser_sees_what_a_ray_meets() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_bytes() {
-    // Seen to fail with noise seeded by the number of threads.
+    // Regression: noise seeded by the number of threads fails this test.
     let scene = scene(&built_in("drill-centre").unwrap());
     let studio = small(Water { attenuation: 0.4, ..Water::default() });
     let mut shot = shot(above(scene.objects[1].centroid(), 2.5, 0.2));
@@ -154,10 +154,10 @@ fn factors_of_magnitude_zero_are_factors_left_out() {
     };
     let clear = Water { attenuation: 0.0, snow: 0.0, small_angle: 0.0, albedo: 0.0, ..Water::default() };
     let base = image(clear.clone(), quiet.clone());
-    // Without attenuation nothing else of the water shows.
+    // Without attenuation, no other property of the water has an effect.
     assert_eq!(image(Water { attenuation: 0.0, snow: 0.0, ..Water::default() }, quiet.clone()), base);
     assert_eq!(image(Water { level: "none".into(), snow: 0.0, ..Water::default() }, quiet.clone()), base);
-    // A rolling shutter and an exposure show nothing while nothing moves.
+    // A rolling shutter and the exposure time have no effect without motion.
     assert_eq!(image(clear.clone(), Imager { readout_ms: 20.0, ..quiet.clone() }), base);
     assert_ne!(image(Water { attenuation: 0.1, snow: 0.0, ..Water::default() }, quiet), base);
 }
@@ -175,7 +175,7 @@ fn a_refused_port_of_water_is_the_pinhole() {
         let far = ideal.iter().zip(&other).filter(|(a, b)| (*a - *b).abs() > 0.02 * a.max(1e-3)).count();
         assert!(far * 200 < ideal.len(), "{far} of {} pixels differ", ideal.len());
     };
-    // The rays begin at the port instead of in the pupil: a few centimetres less of water.
+    // The rays begin at the port instead of the pupil, which removes a few centimetres of water.
     same(radiance(Port {
         kind: PortKind::Flat,
         glass: 1.0,
@@ -187,7 +187,7 @@ fn a_refused_port_of_water_is_the_pinhole() {
     same(radiance(Port { kind: PortKind::Dome, radius: 0.01, thickness: 0.0, ..Port::default() }));
 }
 
-/// A flat, grey bed at 40 m and nothing else.
+/// A flat, grey seabed at 40 m without objects.
 fn plain() -> Scene {
     scene(&plain_plan())
 }
@@ -214,7 +214,7 @@ fn plain_plan() -> SitePlan {
     SitePlan::parse((site, path), (geometry, path)).unwrap()
 }
 
-/// The radiance in the middle of a view straight down from `height`, with one lamp in the pupil.
+/// The radiance at the centre of a view straight down from `height`, with one lamp in the pupil.
 fn middle(scene: &Scene, water: Water, height: f64, lamp: Lamp) -> f64 {
     let camera = Pinhole::new([33, 33], [40.0; 2], [16.0; 2], &[]).unwrap();
     let lens = Lens::new(camera, Port::default());
@@ -229,7 +229,7 @@ fn middle(scene: &Scene, water: Water, height: f64, lamp: Lamp) -> f64 {
 
 #[test]
 fn a_plate_has_lamberts_brightness_and_beers_slope() {
-    // Seen to fail with 0.98 c on the way from the lamp.
+    // Regression: 0.98 c on the path from the lamp fails this test.
     let scene = plain();
     let lamp = Lamp { at: [0.0; 3], aim: [0.0, 0.0, 1.0], power: 2.0, beam_deg: 120.0 };
     let clear = Water { attenuation: 0.0, snow: 0.0, ..Water::default() };
@@ -237,12 +237,12 @@ fn a_plate_has_lamberts_brightness_and_beers_slope() {
         let exact = 0.5 / std::f64::consts::PI * 2.0 / (height * height);
         assert!((middle(&scene, clear.clone(), height, lamp.clone()) / exact - 1.0).abs() < 1e-5);
     }
-    // A lamp aside: cosine of the plate, cosine of the beam, the longer way.
+    // A lamp to the side: the cosine at the plate, the cosine of the beam, the longer path.
     let aside = Lamp { at: [1.5, 0.0, 0.0], aim: [1.5, 0.0, 1.0], ..lamp.clone() };
     let range = (1.5_f64 * 1.5 + 4.0).sqrt();
     let exact = 0.5 / std::f64::consts::PI * aside.intensity(2.0 / range) * (2.0 / range) / (range * range);
     assert!((middle(&scene, clear, 2.0, aside) / exact - 1.0).abs() < 1e-5);
-    // ln(I r²) falls with 2c.
+    // ln(I r²) decreases with 2c.
     let murky = Water { attenuation: 0.4, albedo: 0.0, snow: 0.0, small_angle: 0.0, ..Water::default() };
     let log = |h: f64| libm::log(middle(&scene, murky.clone(), h, lamp.clone()) * h * h);
     let slope = (log(5.0) - log(1.0)) / 4.0;
@@ -262,10 +262,10 @@ fn far_away_only_the_water_is_left() {
     assert!((far / farther - 1.0).abs() < 1e-3 && near > far && far > 0.0, "{near} {far} {farther}");
 }
 
-/// Where an edge between dark and bright lies on a line of pixels: the place of half the step.
+/// The position of an edge between dark and bright on a line of pixels: half of the step.
 #[test]
 fn edges_are_generated_where_the_geometry_has_them() {
-    // A dark panel over the plain bed, turned so that its edges cross pixels everywhere.
+    // A dark panel over the plain seabed, rotated so that its edges cross pixels everywhere.
     let mut plan = built_in("karmin2").unwrap();
     plan.geometry.objects[0].cylinders.clear();
     let scene = scene(&plan);
@@ -273,7 +273,7 @@ fn edges_are_generated_where_the_geometry_has_them() {
     let studio = studio(1.0, water, Imager { blur: 0.0, ..Imager::default() }, Port::default(), &[]);
     let shot = shot(above(scene.objects[0].centroid(), 2.0, 0.1));
     let image = studio.left_radiance(&scene, &shot, &mut Workspace::default());
-    // Box tops are bright against the floor: the top edge of box A from corner A1 to A2, A2 to A3, …
+    // Box tops are brighter than the floor: the top edges of box A from corner A1 to A2, A2 to A3, …
     let names = &scene.nominal.objects[0].points;
     let corner = |id: &str| {
         let k = names.iter().position(|p| p.id == id).unwrap();
@@ -298,7 +298,7 @@ fn edges_are_generated_where_the_geometry_has_them() {
             if !(u > 12.0 && v > 12.0 && u < 1010.0 && v < 755.0) {
                 continue;
             }
-            // The area under the profile between plateaus gives the place of the step.
+            // The area under the profile between the plateaus gives the position of the step.
             let profile = |s: f64| grey(u + s * nu, v + s * nv);
             let (inside, outside) = (0.5 * (profile(-3.5) + profile(-3.0)), 0.5 * (profile(3.0) + profile(3.5)));
             if (inside - outside).abs() < 0.3 * inside.max(outside) {
@@ -313,7 +313,7 @@ fn edges_are_generated_where_the_geometry_has_them() {
     errors.sort_by(f64::total_cmp);
     let n = errors.len();
     assert!(n > 40, "{n}");
-    // Textures and labels disturb some profiles: the median is the place, the middle half its spread.
+    // Textures and labels disturb some profiles, so the median and the interquartile range are tested.
     let (median, spread) = (errors[n / 2], errors[3 * n / 4] - errors[n / 4]);
     assert!(median.abs() < 0.03 && spread < 0.15, "{median} {spread}");
 }

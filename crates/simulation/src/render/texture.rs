@@ -1,48 +1,48 @@
-//! How surfaces look up close: tiles with mean 1, as pyramids.
+//! Surface textures: tiles with mean 1, as image pyramids.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError, Weak};
 
 use super::math::mix;
 use crate::scene::Texture;
 
-/// Side of a tile (texels); a power of two.
+/// Side of a tile (texels), a power of two.
 const SIDE: usize = 1024;
 
-/// Places that are looked up at once.
+/// Number of places looked up in one pass.
 pub(super) const CHUNK: usize = 32;
 
-/// A tile that repeats, with coarser and coarser versions of it.
+/// A periodic tile with its pyramid of coarser levels.
 #[derive(Debug, Clone)]
 pub(super) struct Tile {
-    /// All levels one after the other, finest first, each half the side of the one before. A texel comes
-    /// with its neighbours to the right, below, and both: one look-up instead of four.
+    /// All levels, finest first, each with half the side of the previous one. A texel is stored with its neighbours to
+    /// the right, below, and diagonal, which gives one look-up instead of four.
     texels: Vec<[u16; 4]>,
-    /// Texels a metre.
+    /// Texels per metre.
     scale: f32,
 }
 
-/// A surface's look: the product of a fine and a coarse tile, whose periods have no common multiple
-/// within sight, so that nothing repeats.
+/// A surface texture: the product of a fine and a coarse tile. Their periods have no common multiple within sight, so
+/// that no repetition is visible.
 #[derive(Debug, Clone)]
 pub(super) struct SurfaceTexture {
     fine: Tile,
     coarse: Tile,
 }
 
-/// All looks, each made when it is first seen.
+/// All textures, each computed at its first use.
 #[derive(Debug, Clone)]
 pub(crate) struct SurfaceTextures {
     surfaces: [OnceLock<Box<SurfaceTexture>>; 7],
-    /// Values of the pattern that growth follows, at places everywhere, in order.
+    /// Sorted values of the growth pattern at places everywhere.
     slow: OnceLock<Vec<f32>>,
     seed: u32,
 }
 
-/// One octave of a tile: wavelengths across it, and amplitude.
+/// One octave of a tile: number of wavelengths across it, and amplitude.
 type Octave = (u32, f32);
 
 impl Tile {
-    /// The tile of `value` at every texel, `texel` metres wide.
+    /// The tile with `value` at every texel, `texel` metres wide.
     fn new(texel: f64, value: impl Fn(usize, usize) -> f32) -> Self {
         let mut finest: Vec<f32> = (0..SIDE * SIDE).map(|i| value(i % SIDE, i / SIDE)).collect();
         let mean = finest.iter().map(|&x| f64::from(x)).sum::<f64>() / finest.len() as f64;
@@ -71,8 +71,8 @@ impl Tile {
         Self { texels, scale: (1.0 / texel) as f32 }
     }
 
-    /// The values at (u, v) metres for pixels as wide as `footprint` metres: bilinear in two levels, linear
-    /// between them. Of the answer the first `count` mean something.
+    /// The values at (u, v) metres for pixels with a footprint of `footprint` metres, by trilinear interpolation. Only
+    /// the first `count` results are valid.
     #[inline(always)]
     fn at(&self, count: usize, u: &[f32; CHUNK], v: &[f32; CHUNK], footprint: &[f32; CHUNK], out: &mut [f32; CHUNK]) {
         let mut between = [0.0; CHUNK];
@@ -80,13 +80,13 @@ impl Tile {
         for i in 0..CHUNK {
             let (x, y) = (u[i] * self.scale, v[i] * self.scale);
             let texels = (footprint[i] * self.scale).max(1.0);
-            // log2 of the width, from the float's own exponent, linear between powers of two.
+            // log2 of the width from the float's own exponent, linear between powers of two.
             let level = ((texels.to_bits() >> 23) - 127).min(COARSEST - 1);
             between[i] = (texels * f32::from_bits((127 - level) << 23) - 1.0).clamp(0.0, 1.0);
             (fine.place[i], fine.across[i], fine.down[i]) = cell(level, x, y);
             (coarse.place[i], coarse.across[i], coarse.down[i]) = cell(level + 1, x, y);
         }
-        // The look-ups by themselves, so that what is around them works on whole vectors.
+        // A separate look-up loop leaves whole vectors to the loops around it.
         let (mut near, mut far) = ([0; CHUNK], [0; CHUNK]);
         for i in 0..count.min(CHUNK) {
             near[i] = packed(self.texels[fine.place[i] as usize]);
@@ -99,10 +99,10 @@ impl Tile {
     }
 }
 
-/// The coarsest level: one texel.
+/// The coarsest level, of one texel.
 const COARSEST: u32 = SIDE.trailing_zeros();
 
-/// Texels and where between them.
+/// Texel indices, and the positions between them.
 #[derive(Default)]
 struct Cells {
     place: [u32; CHUNK],
@@ -110,16 +110,17 @@ struct Cells {
     down: [f32; CHUNK],
 }
 
-/// The texel of a level whose centre lies before (x, y), given in texels of the finest, and how far before.
+/// The texel of a level whose centre precedes (x, y), given in texels of the finest level, and the distances to it.
 #[inline(always)]
 fn cell(level: u32, x: f32, y: f32) -> (u32, f32, f32) {
     const ALL: u32 = (SIDE * SIDE) as u32;
     let shift = COARSEST - level;
     let side = 1_u32 << shift;
-    // Finer levels have S² + S²/4 + … = 4 (S² − s²)/3 texels; a multiple of 3 is divided by its inverse mod 2³².
+    // The finer levels have S² + S²/4 + … = 4 (S² − s²)/3 texels; the division by 3 is a multiplication with its
+    // inverse mod 2³².
     let before = ((ALL - side * side).wrapping_mul(0xAAAA_AAAB)) * 4;
     let scale = f32::from_bits((127 - level) << 23);
-    // Texel centres at whole numbers and a half.
+    // Texel centres lie at half-integers.
     let (x, y) = (x * scale - 0.5, y * scale - 0.5);
     let (xi, yi) = (floor(x), floor(y));
     let mask = side - 1;
@@ -132,7 +133,7 @@ fn packed([a, b, c, d]: [u16; 4]) -> u64 {
     u64::from(a) | u64::from(b) << 16 | u64::from(c) << 32 | u64::from(d) << 48
 }
 
-/// Between the four values of a texel and its neighbours.
+/// Bilinear interpolation between a texel and its neighbours.
 #[inline(always)]
 fn bilinear(four: u64, across: f32, down: f32) -> f32 {
     let [a, b, c, d] = [0, 16, 32, 48].map(|shift| ((four >> shift) & 0xFFFF) as u32 as i32 as f32);
@@ -140,7 +141,7 @@ fn bilinear(four: u64, across: f32, down: f32) -> f32 {
     (above + down * (below - above)) * (1.0 / 16384.0)
 }
 
-/// The whole number below.
+/// The integer below `x`.
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     let cut = x as i32;
@@ -152,7 +153,7 @@ impl SurfaceTextures {
         Self { surfaces: Default::default(), slow: OnceLock::new(), seed }
     }
 
-    /// The looks of this seed, the same for all dives that are planned at once: a look takes 22 MB.
+    /// The textures of this seed, shared by all concurrent dives; a texture takes 22 MB.
     pub(crate) fn shared(seed: u32) -> Arc<Self> {
         static ALL: Mutex<Vec<Weak<SurfaceTextures>>> = Mutex::new(Vec::new());
         let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
@@ -165,8 +166,7 @@ impl SurfaceTextures {
         })
     }
 
-    /// By what the albedo is multiplied at places (u, v) of a surface (m), each seen by a pixel as wide as its
-    /// `footprint` (m).
+    /// Factors of the albedo at places (u, v) of a surface (m), for pixels with these footprints (m).
     pub(super) fn at(&self, texture: Texture, u: &[f32], v: &[f32], footprint: &[f32], out: &mut Vec<f32>) {
         out.clear();
         out.resize(u.len(), 1.0);
@@ -177,20 +177,20 @@ impl SurfaceTextures {
     }
 }
 
-/// Values by which it is found how low a pattern must be for growth.
+/// Number of pattern values from which the threshold of growth is taken.
 const SPREAD: usize = 4096;
-/// How steeply growth thins out at its border.
+/// Steepness of the border of growth.
 const BORDER: f32 = 12.0;
 
 impl SurfaceTextures {
-    /// The share of each place that growth covers, on a body of which it covers the share `growth`: it begins where a slow
-    /// pattern is low.
+    /// The fraction of each place that growth covers, for a body of which growth covers the fraction `growth`. Growth
+    /// starts where a slow pattern is low.
     pub(super) fn grown(&self, growth: f32, u: &mut [f32], v: &mut [f32], footprint: &[f32], out: &mut Vec<f32>) {
         if growth >= 1.0 {
             out.clear();
             return out.resize(u.len(), 1.0);
         }
-        // So low is the pattern on that share of all places. (Places: Roberts' R2 sequence, 2018.)
+        // The quantile of the pattern at the fraction `growth`, over places of Roberts' R2 sequence (2018).
         let slow = self.slow.get_or_init(|| {
             let place = |k: usize, step: f64| (30.0 * (k as f64 * step).fract()) as f32;
             let north: Vec<f32> = (0..SPREAD).map(|k| place(k, 0.754_877_666_246_692_8)).collect();
@@ -225,7 +225,7 @@ fn textured(surface: &SurfaceTexture, u: &[f32], v: &[f32], footprint: &[f32], o
         t[..n].copy_from_slice(v);
         width[..n].copy_from_slice(footprint);
         for i in 0..CHUNK {
-            // The coarse tile is turned, so that the two grids do not align.
+            // The coarse tile is rotated, so that the two grids do not align.
             (p[i], q[i]) = (0.8 * s[i] - 0.6 * t[i], 0.6 * s[i] + 0.8 * t[i]);
         }
         surface.fine.at(n, &s, &t, &width, &mut fine);
@@ -252,7 +252,7 @@ fn surface(texture: Texture, seed: u32) -> SurfaceTexture {
         Texture::Steel => SurfaceTexture {
             fine: tile(0.0017, &stained([5, 11, 24, 59, 131], 0.15), 1),
             coarse: Tile::new(0.0059, |x, y| {
-                // Anodes keep it from rusting: what runs down is faint.
+                // Anodes prevent rust, so stains are faint.
                 let rust = sum(&stained([7, 17, 41], 0.71), x, y, seed ^ 2);
                 1.0 - 0.2 * ((rust - 0.25) * 3.0).clamp(0.0, 1.0) + sum(&[(9, 0.08)], x, y, seed ^ 3)
             }),
@@ -260,7 +260,7 @@ fn surface(texture: Texture, seed: u32) -> SurfaceTexture {
         Texture::Paint => SurfaceTexture {
             fine: tile(0.0017, &stained([7, 19, 47, 113, 241], 0.09), 1),
             coarse: Tile::new(0.0047, |x, y| {
-                // Where yellow (0.58) is worn off, the grey of the primer (0.4) shows.
+                // The grey primer (0.4) shows where yellow (0.58) is worn off.
                 let worn = sum(&stained([9, 21, 53, 127], 0.81), x, y, seed ^ 2);
                 1.0 - 0.3 * ((worn - 0.48) * 4.0).clamp(0.0, 1.0) + sum(&[(5, 0.07), (13, 0.05)], x, y, seed ^ 3)
             }),
@@ -286,15 +286,17 @@ fn surface(texture: Texture, seed: u32) -> SurfaceTexture {
     }
 }
 
-/// Octaves of a coat that stains, films and wear have marked: Brownian, each amplitude with the root of its wavelength
-/// (Hurst exponent ½; Pentland, Fractal-based description of natural scenes, 1984), `rms` that of all together. A coat
-/// with as much contrast at a centimetre as at a decimetre would be bare, pitted metal.
+/// Octaves of a coat marked by stains, films and wear.
+///
+/// Brownian noise: each amplitude is proportional to the root of its wavelength (Hurst exponent ½; Pentland,
+/// *Fractal-based description of natural scenes*, 1984), and `rms` is that of the sum. Equal contrast at a centimetre
+/// and at a decimetre would be bare, pitted metal.
 fn stained<const N: usize>(waves: [u32; N], rms: f32) -> [Octave; N] {
     let all: f32 = waves.iter().map(|w| 1.0 / *w as f32).sum();
     waves.map(|w| (w, rms * (1.0 / (w as f32 * all)).sqrt()))
 }
 
-/// The sum of octaves of gradient noise that repeats with the tile. (Perlin 2002.)
+/// The sum of octaves of gradient noise with the period of the tile (Perlin 2002).
 fn sum(octaves: &[Octave], x: usize, y: usize, seed: u32) -> f32 {
     let mut sum = 0.0;
     for &(waves, amplitude) in octaves {
@@ -341,7 +343,7 @@ const DIRECTIONS: [(f32, f32); 16] = {
     ]
 };
 
-/// Pebbles and shells: in each of `cells`² cells at most one.
+/// Pebbles and shells: at most one in each of `cells`² cells.
 fn pebbles(x: usize, y: usize, cells: u32, seed: u32) -> f32 {
     let scale = cells as f32 / SIDE as f32;
     let (u, v) = ((x as f32 + 0.5) * scale, (y as f32 + 0.5) * scale);
@@ -365,7 +367,7 @@ fn pebbles(x: usize, y: usize, cells: u32, seed: u32) -> f32 {
 mod tests {
     use super::*;
 
-    /// One place of a tile.
+    /// The value at one place of a tile.
     fn at(tile: &Tile, u: f32, v: f32, footprint: f32) -> f32 {
         let mut out = [0.0; CHUNK];
         tile.at(1, &[u; CHUNK], &[v; CHUNK], &[footprint; CHUNK], &mut out);
@@ -395,7 +397,7 @@ mod tests {
 
     #[test]
     fn stains_of_a_coat_differ_with_the_distance() {
-        // Of Brownian noise the mean square difference doubles with the distance.
+        // The mean square difference of Brownian noise doubles with the distance.
         for waves in [[5, 11, 24, 59, 131], [7, 19, 47, 113, 241]] {
             let octaves = stained(waves, 0.2);
             let value = |x: usize, y: usize| f64::from(sum(&octaves, x, y, 7));
@@ -410,7 +412,7 @@ mod tests {
 
     #[test]
     fn growth_covers_its_fraction() {
-        // Held against fixed levels, growth of a quarter hardly showed.
+        // Regression: with fixed thresholds a growth of one quarter was hardly visible.
         let surfaces = SurfaceTextures::new(9);
         for growth in [0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98, 1.0] {
             let mut u: Vec<f32> = (0..20_000).map(|k| (k % 141) as f32 * 0.31).collect();

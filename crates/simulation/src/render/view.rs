@@ -1,4 +1,4 @@
-//! The radiance that one camera sees: what is where, then how bright it is.
+//! The radiance of one camera's view: visibility, then shading.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Frame, Pixel, Transform, World};
@@ -18,11 +18,12 @@ use crate::{
     scene::{Scene, Triangle},
 };
 
-/// Rows that are drawn at once, and rows that one piece of work has.
+/// Number of rows rasterised together.
 const STRIP: usize = 8;
+/// Number of rows in one unit of work.
 const BAND: usize = 64;
 
-/// A camera before the field.
+/// A camera in the scene.
 pub(super) struct View<'a> {
     pub(super) scene: &'a Scene,
     pub(super) camera_model: &'a RenderCamera,
@@ -30,7 +31,7 @@ pub(super) struct View<'a> {
     pub(super) far: f64,
 }
 
-/// What lights it.
+/// Water, textures and shadow maps for shading.
 pub(super) struct Lit<'a> {
     pub(super) water: &'a Water,
     pub(super) textures: &'a SurfaceTextures,
@@ -38,7 +39,7 @@ pub(super) struct Lit<'a> {
     pub(super) views: &'a [ShadowView],
 }
 
-/// The memory of a view. A pixel is (light from surfaces, light from the water, Z, range).
+/// Buffers of a view. A pixel is (light from surfaces, light from the water, Z, range).
 #[derive(Debug, Default)]
 pub(super) struct ViewScratch {
     pub(super) pixels: Vec<[f32; 4]>,
@@ -50,7 +51,7 @@ pub(super) struct ViewScratch {
 }
 
 impl View<'_> {
-    /// Fills `scratch.pixels`.
+    /// Renders into `scratch.pixels`.
     pub(super) fn draw<F: Frame>(
         &self,
         world_from_view: &Transform<World, F>,
@@ -89,7 +90,7 @@ impl View<'_> {
         });
     }
 
-    /// The skin that the centre of every pixel shows.
+    /// The skin at the centre of every pixel.
     #[cfg(test)]
     pub(super) fn skins<F: Frame>(&self, world_from_view: &Transform<World, F>) -> Vec<Option<u32>> {
         use super::visibility::{NONE, Strip};
@@ -103,7 +104,7 @@ impl View<'_> {
         (0..height).flat_map(|row| strip.row(row).0.iter().map(skin).collect::<Vec<_>>()).collect()
     }
 
-    /// The triangles within sight, before the camera.
+    /// Collects the triangles in view, in front of the camera.
     fn collect<F: Frame>(&self, world_from_view: &Transform<World, F>, scratch: &mut ViewScratch) {
         let into = world_from_view.inverse();
         let (turn, step) = (into.rotation_matrix(), into.translation());
@@ -140,7 +141,7 @@ impl View<'_> {
         }
     }
 
-    /// The rectangle (north, east) of the bed that the camera can see.
+    /// The rectangle (north, east) of the seabed that the camera can see.
     fn footprint<F: Frame>(&self, world_from_view: &Transform<World, F>) -> ([f64; 2], [f64; 2]) {
         let seabed = &self.scene.seabed;
         let lens = &self.camera_model.lens;
@@ -159,7 +160,7 @@ impl View<'_> {
                 let Some(ray) = lens.ray(&pixel).filter(|_| border) else { continue };
                 let along = world_from_view.rotation() * ray.along;
                 let level = along.xy().norm();
-                // A ray that goes up, or far away, is followed to the limit.
+                // A ray upwards or to far away ends at the limit.
                 let far = self.far / level.max(1e-9);
                 let t = if along.z > 0.0 { ((lowest - from.z) / along.z).clamp(0.0, far) } else { far };
                 for (k, x) in [from.x + along.x * t, from.y + along.y * t].into_iter().enumerate() {

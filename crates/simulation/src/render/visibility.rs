@@ -1,24 +1,24 @@
-//! Which facet each pixel of a strip of rows sees: at its centre, and at many places where edges cross it.
+//! The visible facets of the pixels in a strip of rows, at centres and samples.
 
 use std::ops::Range;
 
 use super::outline::Outline;
 
-/// Samples of a pixel that an edge crosses: a lattice so even that a straight edge in any direction is
-/// measured to about a hundredth of the pixel's area.
+/// Number of samples of a pixel that an edge crosses. The lattice is so even that a straight edge in any direction is
+/// measured to about 1/100 of the pixel's area.
 pub(super) const SAMPLES: usize = 32;
 /// The generator of the lattice, near 32 golden ratios.
 const LATTICE: usize = 19;
-/// Nothing.
+/// No facet.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The samples' places from the pixel's centre.
+/// Positions of the samples from the pixel's centre.
 pub(super) fn places() -> [[f32; SAMPLES]; 2] {
     let coordinate = |i: usize| (i as f32 + 0.5) / SAMPLES as f32 - 0.5;
     [std::array::from_fn(coordinate), std::array::from_fn(|k| coordinate(k * LATTICE % SAMPLES))]
 }
 
-/// A strip of rows: the facets seen, as places in the list of outlines.
+/// A strip of rows with its visible facets, as indices of outlines.
 #[derive(Debug, Default)]
 pub(super) struct Strip {
     width: usize,
@@ -27,7 +27,7 @@ pub(super) struct Strip {
     depths: Vec<f32>,
     seen: Vec<u32>,
     crossed: Vec<bool>,
-    /// Columns of crossed pixels, row by row, and where each row begins.
+    /// Columns of the crossed pixels, row by row.
     columns: Vec<u32>,
     starts: Vec<usize>,
     sample_depths: Vec<[f32; SAMPLES]>,
@@ -35,7 +35,7 @@ pub(super) struct Strip {
 }
 
 impl Strip {
-    /// Draws the outlines named in `order` on `rows` of an image.
+    /// Rasterises the outlines listed in `order` on `rows` of an image.
     pub(super) fn draw(&mut self, outlines: &[Outline], order: &[u32], rows: Range<usize>, width: usize) {
         (self.width, self.first_row, self.rows) = (width, rows.start, rows.len());
         let pixels = width * rows.len();
@@ -103,8 +103,7 @@ impl Strip {
         }
     }
 
-    /// Marks the pixels beside a change of facet that is no seam: where two bodies pass through each
-    /// other, no edge says so.
+    /// Marks the pixels beside a change of facet that is no seam, because bodies that intersect have no edge there.
     fn cross_borders(&mut self, outlines: &[Outline]) {
         let body = |seen: u32| if seen == NONE { NONE } else { outlines[seen as usize].body };
         let width = self.width;
@@ -128,7 +127,7 @@ impl Strip {
         }
     }
 
-    /// What a row's centres see, the columns that edges cross, and what their samples see.
+    /// The facets at a row's centres, the columns that edges cross, and the facets of their samples.
     pub(super) fn row(&self, row: usize) -> (&[u32], &[u32], &[[u32; SAMPLES]]) {
         let slots = self.starts[row]..self.starts[row + 1];
         (&self.seen[row * self.width..][..self.width], &self.columns[slots.clone()], &self.samples[slots])
@@ -168,8 +167,8 @@ impl Strip {
     }
 }
 
-/// Gives a pixel's samples within all sides to an outline where it is nearer (1/Z) than what they see. A line
-/// or plane is its value at the pixel's centre and its steps.
+/// Assigns the samples of a pixel inside all sides to an outline where it is nearer (1/Z) than the present facet. A
+/// line or plane is given by its value at the pixel's centre and its steps.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn sample(
     sides: &[[f32; 3]],
@@ -193,15 +192,15 @@ fn sample(
     }
 }
 
-/// Where two rows differ.
+/// The indices at which two rows differ.
 pub(crate) fn changes<'a>(a: &'a [u32], b: &'a [u32]) -> impl Iterator<Item = usize> + 'a {
     const PIECE: usize = 16;
-    // Most of the way nothing changes: whole pieces are compared first.
+    // Changes are rare, so whole blocks are compared first.
     let pieces = a.chunks(PIECE).zip(b.chunks(PIECE)).enumerate().filter(|(_, (a, b))| a != b);
     pieces.flat_map(|(k, (a, b))| (0..a.len()).filter(move |&i| a[i] != b[i]).map(move |i| k * PIECE + i))
 }
 
-/// Sets the depths (1/Z) that are nearer than what is there.
+/// Overwrites the depths (1/Z) that are farther than the outline's.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn fill(depths: &mut [f32], seen: &mut [u32], base: f64, slope: f64, index: u32) {
     let (base, slope) = (base as f32, slope as f32);

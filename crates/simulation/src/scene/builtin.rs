@@ -1,10 +1,10 @@
-//! The sites that come with Seafix.
+//! The built-in sites.
 
 use std::path::Path;
 
 use super::SitePlan;
 
-/// Names of the built-in sites, and what they are.
+/// Names and descriptions of the built-in sites.
 pub const BUILT_IN: [(&str, &str); 2] = [
     ("drill-centre", "a virtual production system: seven objects, fifty feature points, 50 m across"),
     ("karmin2", "a laboratory: six boxes, forty-eight corners, one object"),

@@ -1,37 +1,37 @@
-//! Rays through the triangles: a hierarchy of bounding boxes.
+//! Ray casting through triangles by a bounding volume hierarchy.
 
 use nalgebra::Vector3;
 
 use super::mesh::Triangle;
 
-/// Triangles in a leaf at most.
+/// Maximum number of triangles in a leaf.
 const LEAF: usize = 4;
 
-/// A node: its bounds, and its children or triangles.
+/// A node: its bounding box, and its children or triangles.
 #[derive(Debug, Clone)]
 struct Node {
     low: Vector3<f64>,
     high: Vector3<f64>,
-    /// First child (the second follows its subtree) or first triangle.
+    /// Index of the first child (the second follows its subtree) or of the first triangle.
     first: u32,
-    /// Triangles of a leaf; 0 of a branch.
+    /// Number of triangles of a leaf; 0 for a branch.
     count: u32,
 }
 
-/// Triangles in a tree of boxes. (Rubin and Whitted, 1980; split at the median of the longest axis.)
+/// A bounding volume hierarchy (Rubin and Whitted, 1980), split at the median of the longest axis.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bvh {
     nodes: Vec<Node>,
-    /// Triangles in the order of the leaves.
+    /// Triangle indices in the order of the leaves.
     order: Vec<u32>,
 }
 
-/// Where a ray meets a triangle.
+/// The intersection of a ray and a triangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hit {
-    /// How far, in lengths of the ray's direction.
+    /// Distance in units of the ray's direction.
     pub(crate) t: f64,
-    /// Which triangle.
+    /// Index of the triangle.
     pub(crate) triangle: usize,
 }
 
@@ -64,7 +64,7 @@ impl Bvh {
         self.split(triangles, middle, to);
     }
 
-    /// The first triangle that `from + t·along`, 0 < t < `limit`, passes through.
+    /// The first triangle that the ray `from + t·along` meets for 0 < t < `limit`.
     pub(crate) fn hit(
         &self,
         triangles: &[Triangle],
@@ -97,7 +97,7 @@ impl Bvh {
         (best.triangle != usize::MAX).then_some(best)
     }
 
-    /// The distance from `place` to the nearest triangle, where it is below `limit`.
+    /// The distance from `place` to the nearest triangle, if it is below `limit`.
     pub(crate) fn distance(&self, triangles: &[Triangle], place: &Vector3<f64>, limit: f64) -> Option<f64> {
         let mut best = limit;
         self.visit(
@@ -111,7 +111,7 @@ impl Bvh {
         (best < limit).then_some(best)
     }
 
-    /// Goes through all nodes that `enter` lets it into, and shows `leaf` their triangles.
+    /// Visits all nodes that `enter` accepts and passes their triangles to `leaf`.
     fn visit<S>(&self, enter: impl Fn(&Node, &S) -> bool, mut leaf: impl FnMut(usize, &mut S), state: &mut S) {
         let mut stack = [0_u32; 64];
         let mut depth = usize::from(!self.nodes.is_empty());
@@ -134,7 +134,7 @@ impl Bvh {
     }
 }
 
-/// The t > 0 at which the ray passes through the triangle. (Möller and Trumbore, 1997.)
+/// The t > 0 at which the ray meets the triangle (Möller and Trumbore, 1997).
 fn meets(triangle: &Triangle, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
     let [a, b, c] = &triangle.at;
     let (e, f) = (b - a, c - a);
@@ -147,13 +147,13 @@ fn meets(triangle: &Triangle, from: &Vector3<f64>, along: &Vector3<f64>) -> Opti
     let u = s.dot(&p) / determinant;
     let q = s.cross(&e);
     let v = along.dot(&q) / determinant;
-    // A hair beyond the sides, so that no ray slips between two triangles.
+    // A margin beyond the sides, so that no ray slips between two triangles.
     const HAIR: f64 = 1e-12;
     let t = f.dot(&q) / determinant;
     (u >= -HAIR && v >= -HAIR && u + v <= 1.0 + HAIR && t > 0.0).then_some(t)
 }
 
-/// The place of the triangle nearest to `place`. (Ericson, Real-time collision detection, 2005, 5.1.5.)
+/// The point of the triangle nearest to `place` (Ericson, *Real-Time Collision Detection*, 2005, 5.1.5).
 fn nearest(triangle: &Triangle, place: &Vector3<f64>) -> Vector3<f64> {
     let [a, b, c] = &triangle.at;
     let (ab, ac, ap) = (b - a, c - a, place - a);

@@ -1,4 +1,4 @@
-//! What has changed since the survey: objects moved, overgrown, silted; things in the way.
+//! Changes of the site since its survey: displaced, overgrown or silted objects, and occluders.
 
 use nalgebra::Vector3;
 use seafix_component::in_range;
@@ -8,31 +8,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::stream::{Purpose, Stream};
 
-/// What has changed since the survey. Magnitudes are exact, directions drawn from the seed; all zero
-/// is the world as surveyed.
+/// Changes of the site since its survey.
 ///
-/// Study values: shift to 0.5 m, settlement to 0.10 m, tilt to 3°, heading to 5° (usual installation
-/// tolerances), rounding to 5 cm, silt to 15 cm.
+/// Magnitudes are exact and directions are sampled from the seed. All zero is the site as surveyed. Studies use a shift
+/// up to 0.5 m, settlement up to 0.10 m, tilt up to 3°, heading up to 5° (usual installation tolerances), rounding up
+/// to 5 cm and silt up to 15 cm.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Changes {
-    /// The objects concerned; none named means all.
+    /// Ids of the changed objects; an empty list stands for all.
     pub objects: Vec<String>,
-    /// Distance over which each is displaced, level, in a drawn direction (m).
+    /// Horizontal displacement in a random direction (m), from 0 to 10.
     pub shift: f64,
-    /// How far each has sunk (m).
+    /// Depth by which an object has sunk (m), from 0 to 2.
     pub settlement: f64,
-    /// By how much each leans over, in a drawn direction (degrees).
+    /// Tilt in a random direction (degrees), from 0 to 45.
     pub tilt_deg: f64,
-    /// By how much each is turned about the vertical, either way (degrees).
+    /// Rotation about the vertical with a random sign (degrees), from 0 to 180.
     pub heading_deg: f64,
-    /// Share of the surfaces that growth covers.
+    /// Fraction of the surfaces that marine growth covers, from 0 to 1.
     pub growth: f64,
-    /// Radius to which edges of boxes are rounded (m).
+    /// Radius of the rounded edges of boxes (m), from 0 to 0.2.
     pub rounding: f64,
-    /// By how much the bed has risen around each (m).
+    /// Height of the silt around each object (m), from 0 to 1.
     pub silt: f64,
-    /// Hoses, weed and the like that stand or float around each object.
+    /// Number of occluders around each object (hoses on the seabed, floating weed), from 0 to 200.
     pub occluders: usize,
 }
 
@@ -54,17 +54,17 @@ impl Changes {
         Ok(())
     }
 
-    /// Whether the object of this name is concerned.
+    /// Whether the object of this name changes.
     pub(crate) fn concern(&self, id: &str) -> bool {
         self.objects.is_empty() || self.objects.iter().any(|name| name == id)
     }
 
-    /// A name that the site does not have.
+    /// The first of `objects` that the site does not have.
     pub(crate) fn stranger(&self, site: &Site) -> Option<&str> {
         self.objects.iter().map(String::as_str).find(|id| site.object(id).is_none())
     }
 
-    /// Where an object now stands, that stood at `pose` with its points' mean at `centre` (world).
+    /// The new pose of an object that stood at `pose` with its points' centroid at `centre` (world).
     pub(crate) fn moved(
         &self,
         pose: &Transform<World, Object>,

@@ -1,4 +1,4 @@
-//! What can be wrong with a geometry, all of it at once.
+//! Validation of a geometry, which reports all faults at once.
 
 use std::path::Path;
 
@@ -8,11 +8,11 @@ use seafix_referencing::Site;
 
 use super::plan::{Geometry, ObjectGeometry};
 
-/// Faces smaller than this (m²) have no area.
+/// Minimum area of a face (m²).
 const MIN_AREA: f64 = 1e-10;
-/// How far corners of a panel may lie off its plane (m).
+/// Maximum distance of a panel's corners from its plane (m).
 const FLAT: f64 = 1e-4;
-/// The most triangles that one mesh may have.
+/// Maximum number of triangles of a mesh.
 const MAX_TRIANGLES: usize = 2_000_000;
 
 struct Checker<'a> {
@@ -27,7 +27,7 @@ impl Checker<'_> {
         self.faults.push(Fault::new(what, self.file).on_line(line).value(value).remedy(remedy));
     }
 
-    /// Whether all numbers are finite; says so where they are not.
+    /// Whether all numbers are finite; reports a fault otherwise.
     fn finite(&mut self, of: &str, values: &[f64], path: &[&str]) -> bool {
         let fine = values.iter().all(|x| x.is_finite());
         if !fine {
@@ -43,47 +43,47 @@ impl Checker<'_> {
     }
 }
 
-/// Everything that is wrong with `geometry`, whose text is `text`, as the body of `site`.
+/// All faults of `geometry`, whose text is `text`, against `site`.
 pub(super) fn faults(geometry: &Geometry, site: &Site, text: &str, file: &Path) -> Vec<Fault> {
     let mut check = Checker { text, file, faults: Vec::new() };
-    check.within("depth of the bed", geometry.seabed.depth, [-1e5, 1e5], &["bed", "depth"], "give metres");
+    check.within("depth of the seabed", geometry.seabed.depth, [-1e5, 1e5], &["bed", "depth"], "give metres");
     check.within(
-        "relief of the bed",
+        "relief of the seabed",
         geometry.seabed.relief,
         [0.0, 3.0],
         &["bed", "relief"],
         "give a scale from 0 to 3",
     );
     check.within(
-        "albedo of the bed",
+        "albedo of the seabed",
         geometry.seabed.albedo,
         [0.0, 1.0],
         &["bed", "albedo"],
-        "give a share from 0 to 1",
+        "give a fraction from 0 to 1",
     );
     check.within(
         "rocks",
         geometry.seabed.rocks as f64,
         [0.0, 1000.0],
         &["bed", "rocks"],
-        "give at most 1000 an object",
+        "give at most 1000 rocks for an object",
     );
     for (i, material) in geometry.materials.iter().enumerate() {
         let path = ["material", &i.to_string(), "albedo"];
-        check.within("albedo of a material", material.albedo, [0.0, 1.0], &path, "give a share from 0 to 1");
+        check.within("albedo of a material", material.albedo, [0.0, 1.0], &path, "give a fraction from 0 to 1");
     }
     for (i, object) in geometry.objects.iter().enumerate() {
         if site.object(&object.id).is_none() {
             let ids: Vec<&str> = site.objects.iter().map(|o| o.id.as_str()).collect();
             let remedy = nearest(&object.id, ids.iter().copied())
-                .map_or_else(|| format!("there are {}", ids.join(", ")), |near| format!("did you mean `{near}`?"));
-            let what = "a body of an object that the site does not have".to_owned();
+                .map_or_else(|| format!("give one of {}", ids.join(", ")), |near| format!("did you mean `{near}`?"));
+            let what = "bodies of an object that the site does not have".to_owned();
             check.fault(what, &["object", &i.to_string(), "id"], format!("`{}`", object.id), &remedy);
         }
         check_object(&mut check, geometry, object, &i.to_string());
     }
     for object in site.objects.iter().filter(|o| o.world_from_object.is_none()) {
-        let what = format!("object `{}` stands nowhere", object.id);
+        let what = format!("no pose of object `{}`", object.id);
         check.faults.push(Fault::new(what, file).remedy("give `base_in_world` in the site file"));
     }
     check.faults
@@ -101,7 +101,7 @@ fn check_object(check: &mut Checker<'_>, geometry: &Geometry, object: &ObjectGeo
     let named = |check: &mut Checker<'_>, material: &str, list, k| {
         if geometry.materials.iter().all(|m| m.name != material) {
             let names: Vec<&str> = geometry.materials.iter().map(|m| m.name.as_str()).collect();
-            let remedy = format!("there are {}", names.join(", "));
+            let remedy = format!("give one of {}", names.join(", "));
             check.fault("an unknown material".to_owned(), path!(list, k, "material"), format!("`{material}`"), &remedy);
         }
     };
@@ -147,7 +147,7 @@ fn check_object(check: &mut Checker<'_>, geometry: &Geometry, object: &ObjectGeo
                     format!("{of} has no area"),
                     path!("chequer", k, "cells"),
                     value,
-                    "1 to 1000 squares a side",
+                    "give 1 to 1000 squares a side",
                 );
             }
         }
@@ -175,16 +175,16 @@ fn check_object(check: &mut Checker<'_>, geometry: &Geometry, object: &ObjectGeo
             let fault = match at {
                 [Some(a), Some(b), Some(c)] if (b - a).cross(&(c - a)).norm() * 0.5 > MIN_AREA => continue,
                 [Some(_), Some(_), Some(_)] => "a triangle without area",
-                _ => "a triangle of a vertex that is not there",
+                _ => "a triangle with an unknown vertex",
             };
             let value = format!("triangle {t} is {triangle:?}");
             check.fault(format!("{of}: {fault}"), path!("mesh", k, "triangles"), value, "remove or correct it");
-            break; // one such line a mesh: a broken export has thousands
+            break; // one fault for each mesh: a broken export has thousands
         }
     }
 }
 
-/// A flat, convex polygon with an area.
+/// Checks that a polygon is flat, convex and has an area.
 fn outline(check: &mut Checker<'_>, of: &str, outline: &[[f64; 3]], path: &[&str]) {
     let at: Vec<Vector3<f64>> = outline.iter().map(|p| Vector3::from(*p)).collect();
     let n = at.len();
@@ -203,6 +203,6 @@ fn outline(check: &mut Checker<'_>, of: &str, outline: &[[f64; 3]], path: &[&str
             "give corners of one plane",
         );
     } else if !(0..n).all(|k| turns(k) > -1e-12) {
-        check.fault(format!("{of} is not convex"), path, format!("{n} corners"), "cut it into convex ones");
+        check.fault(format!("{of} is not convex"), path, format!("{n} corners"), "divide it into convex ones");
     }
 }

@@ -1,4 +1,4 @@
-//! Things that are no part of any object: rocks, hoses, weed.
+//! Bodies beside the objects: rocks, hoses, weed.
 
 use nalgebra::Vector3;
 
@@ -8,10 +8,10 @@ use super::{
 };
 use crate::{seabed::Seabed, stream::Stream};
 
-/// Rocks lie in a ring around an object's centre (m).
+/// Inner and outer radius of the ring of rocks around an object's centre (m).
 const RING: [f64; 2] = [1.9, 4.2];
 
-/// `count` rocks around a place, sunk into the bed.
+/// Adds `count` rocks around a place, sunk into the seabed.
 pub(super) fn rocks(mesh: &mut Mesh, seabed: &Seabed, centre: &Vector3<f64>, count: usize, stream: &mut Stream) {
     for _ in 0..count {
         let away = stream.between(RING[0], RING[1]);
@@ -32,7 +32,7 @@ pub(super) fn rocks(mesh: &mut Mesh, seabed: &Seabed, centre: &Vector3<f64>, cou
     }
 }
 
-/// `count` things in the way around a place: hoses that rise from the bed, weed that floats.
+/// Adds `count` occluders around a place: hoses that rise from the seabed, and floating weed.
 pub(super) fn occluders(mesh: &mut Mesh, seabed: &Seabed, centre: &Vector3<f64>, count: usize, stream: &mut Stream) {
     for _ in 0..count {
         let away = 1.6 * stream.unit().sqrt();
@@ -52,7 +52,7 @@ pub(super) fn occluders(mesh: &mut Mesh, seabed: &Seabed, centre: &Vector3<f64>,
     }
 }
 
-/// A lumpy ball of 80 triangles with these half axes about a centre.
+/// Adds a lumpy ellipsoid of 80 triangles with these semi-axes.
 fn ball(mesh: &mut Mesh, centre: &Vector3<f64>, axes: &Vector3<f64>, lumps: f64, skin: Skin, stream: &mut Stream) {
     let number = mesh.skins.len() as u32;
     mesh.skins.push(skin);
@@ -106,7 +106,7 @@ fn ball(mesh: &mut Mesh, centre: &Vector3<f64>, axes: &Vector3<f64>, lumps: f64,
     for face in faces {
         let at = face.map(|i| centre + vertices[i].component_mul(axes) * radii[i]);
         let flat = (at[1] - at[0]).cross(&(at[2] - at[0])).normalize();
-        // Between facets and a smooth ball: worn edges.
+        // Normals between those of facets and of a smooth ball: worn edges.
         let normals = face.map(|i| (normal(i) + flat).normalize());
         let uv = face.map(|i| [vertices[i].x * axes.x + vertices[i].z * 0.3 * axes.z, vertices[i].y * axes.y]);
         mesh.triangles.push(Triangle { at, normals, uv, skin: number, edges: [true; 3], layer: 0 });

@@ -1,29 +1,29 @@
-//! Whether a place is inside of a body: what no distance to surfaces says.
+//! Point-in-body test, which distances to surfaces cannot replace.
 
 use nalgebra::Vector3;
 
 use super::Scene;
 
-/// Rays leave a place in these directions, along no edge of a box that stands upright.
+/// Ray directions, which meet no edge of an upright box lengthwise.
 const DIRECTIONS: [[f64; 3]; 3] = [[0.31, 0.23, -1.0], [-1.0, 0.37, -0.41], [0.29, 1.0, 0.53]];
-/// Surfaces that a ray is followed through.
+/// Maximum number of surfaces that a ray crosses.
 const MAX: usize = 256;
 
 impl Scene {
-    /// Whether bodies enclose a place: rays in all directions leave more of them than they enter. A sheet that is open
-    /// encloses nothing.
+    /// Whether bodies enclose a place: rays in all directions leave more bodies than they enter. An open sheet encloses
+    /// nothing.
     pub(crate) fn encloses(&self, place: &Vector3<f64>) -> bool {
         DIRECTIONS.iter().all(|along| self.left_behind(place, &Vector3::from(*along)) > 0)
     }
 
-    /// How many more bodies a ray leaves than it enters.
+    /// The number of bodies that a ray leaves, minus those that it enters.
     fn left_behind(&self, place: &Vector3<f64>, along: &Vector3<f64>) -> i32 {
         let triangles = &self.mesh.triangles;
         let (mut from, mut sum) = (*place, 0);
         for _ in 0..MAX {
             let Some(hit) = self.bvh.hit(triangles, &from, along, f64::INFINITY) else { break };
             let triangle = &triangles[hit.triangle];
-            // Paint lies on a face and is none of its own.
+            // Paint lies on a face and encloses nothing.
             if triangle.layer == 0 {
                 let [a, b, c] = triangle.at;
                 sum += if (b - a).cross(&(c - a)).dot(along) > 0.0 { 1 } else { -1 };

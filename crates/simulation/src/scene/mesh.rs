@@ -1,4 +1,4 @@
-//! From bodies to triangles in the world.
+//! Conversion of bodies to triangles in the world.
 
 use nalgebra::{Rotation3, Vector3};
 use seafix_geometry::{Object, Transform, World, so3};
@@ -6,36 +6,36 @@ use seafix_geometry::{Object, Transform, World, so3};
 use super::plan::{BoxBody, ChequerBody, CylinderBody, Geometry, MaterialPlan, ObjectGeometry, Texture};
 use super::rounded::rounded_box;
 
-/// How a surface looks: one for each body.
+/// The appearance of a body's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Skin {
     pub(crate) albedo: f32,
     pub(crate) texture: Texture,
-    /// Where in its texture the body lies.
+    /// Offset of the body in its texture.
     pub(crate) seed: u32,
-    /// Share of its area that growth covers.
+    /// Fraction of its area that growth covers.
     pub(crate) growth: f32,
 }
 
-/// A triangle in the world, its corners anticlockwise seen from outside.
+/// A triangle in the world, with its corners anticlockwise seen from outside.
 #[derive(Debug, Clone)]
 pub(crate) struct Triangle {
     pub(crate) at: [Vector3<f64>; 3],
-    /// The shading normals at its corners.
+    /// Shading normals at the corners.
     pub(crate) normals: [Vector3<f64>; 3],
-    /// The texture's coordinates at its corners (m).
+    /// Texture coordinates at the corners (m).
     pub(crate) uv: [[f64; 2]; 3],
-    /// Index of its skin.
+    /// Index of the skin.
     pub(crate) skin: u32,
-    /// Whether its edges (k to k + 1) are edges of the body, not seams within a face.
+    /// Whether side k to k + 1 is an edge of the body; otherwise it is a seam within a face.
     pub(crate) edges: [bool; 3],
-    /// 1 for paint, which lies in the plane of its plate; 0 otherwise.
+    /// Layer: 1 for paint, which lies in the plane of its plate; 0 otherwise.
     pub(crate) layer: u8,
 }
 
 #[cfg(test)]
 impl Triangle {
-    /// The unit normal of its plane, to the outside.
+    /// The outward unit normal of the plane.
     pub(crate) fn normal(&self) -> Vector3<f64> {
         let [a, b, c] = self.at;
         (b - a).cross(&(c - a)).normalize()
@@ -49,20 +49,20 @@ pub(crate) struct Mesh {
     pub(crate) skins: Vec<Skin>,
 }
 
-/// What time did to an object's surfaces.
+/// The wear of an object's surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Wear {
-    /// Radius to which its boxes' edges are rounded (m).
+    /// Radius of the rounded edges of boxes (m).
     pub(crate) rounding: f64,
-    /// Share of its area that growth covers.
+    /// Fraction of the area that growth covers.
     pub(crate) growth: f64,
 }
 
-/// Sides of a cylinder's cross-section.
+/// Number of sides of a cylinder's cross-section.
 const SIDES: usize = 20;
 
 impl Mesh {
-    /// Adds one object's bodies.
+    /// Adds the bodies of one object.
     pub(crate) fn add(
         &mut self,
         geometry: &Geometry,
@@ -104,7 +104,7 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// A new skin of this material, with a place of its own in the texture.
+    /// Adds a skin of this material, with an offset of its own in the texture.
     fn skin(&mut self, material: &str) -> u32 {
         let plain = MaterialPlan { name: String::new(), albedo: 0.5, texture: Texture::Plain };
         let found = self.geometry.materials.iter().find(|m| m.name == material).unwrap_or(&plain);
@@ -118,12 +118,12 @@ impl Builder<'_> {
         number
     }
 
-    /// A point of the object's frame in the world.
+    /// The world position of a point of the object's frame.
     fn world(&self, p: &Vector3<f64>) -> Vector3<f64> {
         self.pose.rotation() * p + self.pose.translation()
     }
 
-    /// A flat, convex face, its corners anticlockwise seen from outside, as a fan.
+    /// Adds a flat, convex face as a triangle fan; its corners are anticlockwise seen from outside.
     fn polygon(&mut self, corners: &[Vector3<f64>], skin: u32, layer: u8) {
         let at: Vec<Vector3<f64>> = corners.iter().map(|p| self.world(p)).collect();
         let n = at.len();
@@ -169,11 +169,11 @@ impl Builder<'_> {
         }
     }
 
-    /// A triangle of a curved surface, given in the object's frame.
+    /// Adds a triangle of a curved surface, given in the object's frame.
     fn smooth(&mut self, at: [Vector3<f64>; 3], normals: [Vector3<f64>; 3], edges: [bool; 3], skin: u32) {
         let normals = normals.map(|n| self.pose.rotation() * n);
         let at = at.map(|p| self.world(&p));
-        // Laid out on the plane that the mean normal faces most: enough for a texture without a seam.
+        // Planar texture mapping onto the plane that the mean normal faces most, which leaves no seam in a triangle.
         let mean = normals[0] + normals[1] + normals[2];
         let axis = mean.iamax();
         let uv = at.map(|p| [p[(axis + 1) % 3], p[(axis + 2) % 3]]);
@@ -239,14 +239,14 @@ impl Builder<'_> {
     }
 }
 
-/// R = Rz(yaw) Ry(pitch) Rx(roll) of angles in degrees.
+/// R = Rz(yaw) Ry(pitch) Rx(roll) from angles in degrees.
 pub(crate) fn turn(deg: [f64; 3]) -> Rotation3<f64> {
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     let [roll, pitch, yaw] = deg.map(f64::to_radians);
     (so3::exp(&(z * yaw)) * so3::exp(&(y * pitch)) * so3::exp(&(x * roll))).to_rotation_matrix()
 }
 
-/// Roll, pitch, yaw in degrees of which [`turn`] makes this rotation.
+/// Roll, pitch and yaw in degrees, the inverse of [`turn`].
 pub(super) fn angles(r: &Rotation3<f64>) -> [f64; 3] {
     let pitch = libm::asin((-r[(2, 0)]).clamp(-1.0, 1.0));
     [libm::atan2(r[(2, 1)], r[(2, 2)]), pitch, libm::atan2(r[(1, 0)], r[(0, 0)])].map(f64::to_degrees)

@@ -1,4 +1,4 @@
-//! The field: what stands on the bed, as it truly is, and as the site file describes it.
+//! The scene: true bodies on the seabed, and the site file that describes them.
 
 mod builtin;
 mod bvh;
@@ -35,20 +35,20 @@ use crate::{
     survey::{Mark, SurveyErrors, survey_marks},
 };
 
-/// A site as data: what a method is told, and the bodies that carry its points.
+/// A site as data: its nominal description, and the bodies that carry its points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SitePlan {
-    /// `seafix-site/1`, exact.
+    /// The site in the format `seafix-site/1`, without survey errors.
     pub site: Site,
-    /// `seafix-geometry/1`.
+    /// The bodies in the format `seafix-geometry/1`.
     pub geometry: Geometry,
 }
 
 impl SitePlan {
-    /// The plan of two texts.
+    /// Parses the texts of both files.
     ///
     /// # Errors
-    /// Everything that is wrong with either.
+    /// All faults of both.
     pub fn parse(site: (&str, &Path), geometry: (&str, &Path)) -> Result<Self, Vec<Fault>> {
         let described = Site::parse(site.0, site.1)?;
         let shape = Geometry::parse(geometry.0, geometry.1).map_err(|fault| vec![fault])?;
@@ -59,11 +59,11 @@ impl SitePlan {
     /// Reads `NAME.site.toml` and `NAME.geometry.toml`, given the path of the first.
     ///
     /// # Errors
-    /// Files that cannot be read, or everything that is wrong with them.
+    /// The files that cannot be read, or all faults in them.
     pub fn read(path: &Path) -> Result<Self, Vec<Fault>> {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let Some(stem) = name.strip_suffix(".site.toml") else {
-            let remedy = "a site for dives is NAME.site.toml, with NAME.geometry.toml beside it";
+            let remedy = "give a file NAME.site.toml with NAME.geometry.toml beside it";
             return Err(vec![Fault::new("not the name of a site file", path).remedy(remedy)]);
         };
         let other: PathBuf = path.with_file_name(format!("{stem}.geometry.toml"));
@@ -71,45 +71,45 @@ impl SitePlan {
         Self::parse((&read(path)?, path), (&read(&other)?, &other))
     }
 
-    /// All faults of the geometry against the site; empty when it can be dived.
+    /// All faults of the geometry against the site; empty when a dive is possible.
     pub fn faults(&self) -> Vec<Fault> {
         check::faults(&self.geometry, &self.site, "", Path::new(&self.geometry.name))
     }
 }
 
-/// A feature point where it truly is.
+/// A feature point at its true position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ScenePoint {
     pub(crate) at: Vector3<f64>,
-    /// The side from which it is seen.
+    /// Outward normal of the side from which the point is visible.
     pub(crate) normal: Option<Vector3<f64>>,
 }
 
-/// One object as it truly stands.
+/// One object at its true pose.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneObject {
     pub(crate) points: Vec<ScenePoint>,
 }
 
 impl SceneObject {
-    /// The mean of its feature points.
+    /// The mean of the feature points.
     pub(crate) fn centroid(&self) -> Vector3<f64> {
         self.points.iter().map(|p| p.at).sum::<Vector3<f64>>() / self.points.len() as f64
     }
 }
 
-/// Everything that can be seen, in the world.
+/// Everything visible, in the world.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
-    /// What a method is told, with the errors of its survey.
+    /// The site as a method receives it, with the errors of its survey.
     pub(crate) nominal: Site,
-    /// Where the told objects truly are.
+    /// The true poses of the nominal objects.
     pub(crate) world_from_object: Vec<Transform<World, Object>>,
     pub(crate) objects: Vec<SceneObject>,
     pub(crate) mesh: Mesh,
     pub(crate) bvh: Bvh,
     pub(crate) seabed: Seabed,
-    /// The bed's skin is the last of the mesh's.
+    /// Index of the seabed's skin, the last of the mesh.
     pub(crate) seabed_skin: u32,
 }
 
@@ -189,13 +189,13 @@ impl Scene {
         Self { nominal, world_from_object: truth, objects, mesh, bvh, seabed, seabed_skin }
     }
 
-    /// The first t > 0 at which `from + t·along` meets a body or the bed.
+    /// The first t > 0 at which `from + t·along` meets a body or the seabed.
     pub(crate) fn hit(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<f64> {
         let body = self.bvh.hit(&self.mesh.triangles, from, along, f64::INFINITY).map(|hit| hit.t);
         body.into_iter().chain(self.seabed.hit(from, along)).min_by(f64::total_cmp)
     }
 
-    /// Whether nothing lies between `from` and the place `to`, up to a millimetre before it.
+    /// Whether `to` is visible from `from`, up to a millimetre before it.
     pub(crate) fn clear(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let along = to - from;
         let before = 1.0 - 1e-3 / along.norm();
@@ -203,20 +203,20 @@ impl Scene {
             && self.seabed.hit(from, &along).is_none_or(|t| t >= before)
     }
 
-    /// Whether a feature point is turned towards `from` and nothing hides it.
+    /// Whether a feature point faces `from` and is not occluded.
     pub(crate) fn sees(&self, from: &Vector3<f64>, point: &ScenePoint) -> bool {
         point.normal.is_none_or(|normal| normal.dot(&(from - point.at)) > 0.0) && self.clear(from, &point.at)
     }
 
-    /// The distance from a place to the nearest body or bed, where it is below `limit` (m).
+    /// The distance to the nearest surface, if it is below `limit` (m).
     pub(crate) fn distance(&self, place: &Vector3<f64>, limit: f64) -> Option<f64> {
         let body = self.bvh.distance(&self.mesh.triangles, place, limit);
-        // The bed is so gentle that the vertical distance is the distance.
+        // The slopes of the seabed are so small that the vertical distance is the distance.
         let seabed = self.seabed.down(place.x, place.y) - place.z;
         body.into_iter().chain((seabed < limit).then_some(seabed)).min_by(f64::total_cmp)
     }
 
-    /// The place that `from` sees along `along`.
+    /// The surface point that a ray meets.
     pub(crate) fn seen(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<Point<World>> {
         self.hit(from, along).map(|t| Point::from(from + along * t))
     }

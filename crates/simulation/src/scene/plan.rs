@@ -1,47 +1,47 @@
-//! `seafix-geometry/1`: what truly stands on the bed, as data.
+//! The format `seafix-geometry/1`: true bodies on the seabed, as data.
 
 use std::path::Path;
 
 use seafix_component::{Fault, line_at};
 use serde::{Deserialize, Serialize};
 
-/// The format that is read and written.
+/// Name of the format.
 pub const GEOMETRY_FORMAT: &str = "seafix-geometry/1";
 
-/// Solid bodies, paint and materials of a site; each object's in the frame that its site file gives it.
+/// Solid bodies, paint and materials of a site, each object's in the frame of its site file.
 ///
-/// Lengths are metres, angles degrees.
+/// Lengths are in metres, angles in degrees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Geometry {
-    /// `seafix-geometry/1`.
+    /// Name of the format, `seafix-geometry/1`.
     pub format: String,
-    /// Its name.
+    /// Name of the site.
     pub name: String,
-    /// The sea bed.
+    /// The seabed.
     #[serde(rename = "bed")]
     pub seabed: SeabedPlan,
-    /// What surfaces are made of.
+    /// Materials of the surfaces.
     #[serde(default, rename = "material")]
     pub materials: Vec<MaterialPlan>,
-    /// The objects, by the ids of the site.
+    /// The objects, identified by the ids of the site.
     #[serde(default, rename = "object")]
     pub objects: Vec<ObjectGeometry>,
 }
 
-/// The sea bed.
+/// The seabed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct SeabedPlan {
-    /// Depth of the mean bed below the world's origin.
+    /// Depth of the mean seabed below the world's origin (m), from −100 000 to 100 000.
     pub depth: f64,
-    /// Scale of the relief: 0 is flat, 1 has waves of a few centimetres.
+    /// Scale of the relief, from 0 to 3: 0 is flat, 1 has waves of a few centimetres.
     pub relief: f64,
-    /// Share of the light that it returns.
+    /// Albedo, from 0 to 1.
     pub albedo: f64,
-    /// How it looks.
+    /// Texture.
     pub texture: Texture,
-    /// Rocks around each object.
+    /// Number of rocks around each object, at most 1000.
     pub rocks: usize,
 }
 
@@ -51,35 +51,35 @@ impl Default for SeabedPlan {
     }
 }
 
-/// How a surface looks up close.
+/// The texture of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Texture {
-    /// One albedo.
+    /// Uniform albedo.
     Plain,
     /// Sand with pebbles and shells.
     Sand,
     /// Coated steel with stains.
     Steel,
-    /// Paint, worn.
+    /// Worn paint.
     Paint,
     /// Rock.
     Rock,
-    /// Soft growth.
+    /// Soft marine growth.
     Growth,
-    /// A rough floor: grain down to some millimetres, cracks of shade over metres.
+    /// A rough floor: grain down to some millimetres, variations of shade over metres.
     Concrete,
 }
 
-/// What a surface is made of.
+/// A material, with Lambertian reflection.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaterialPlan {
-    /// Its name.
+    /// Name, to which bodies refer.
     pub name: String,
-    /// Share of the light that it returns, 0 to 1. (Lambert.)
+    /// Albedo, from 0 to 1.
     pub albedo: f64,
-    /// How it looks.
+    /// Texture.
     pub texture: Texture,
 }
 
@@ -87,7 +87,7 @@ pub struct MaterialPlan {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ObjectGeometry {
-    /// Its id in the site.
+    /// Id of the object in the site.
     pub id: String,
     /// Boxes.
     #[serde(default, rename = "box", skip_serializing_if = "Vec::is_empty")]
@@ -98,7 +98,7 @@ pub struct ObjectGeometry {
     /// Convex painted areas in the plane of a face.
     #[serde(default, rename = "panel", skip_serializing_if = "Vec::is_empty")]
     pub panels: Vec<PanelBody>,
-    /// Chequered markings: corners that are no feature points.
+    /// Chequered markings, whose corners are no feature points.
     #[serde(default, rename = "chequer", skip_serializing_if = "Vec::is_empty")]
     pub chequers: Vec<ChequerBody>,
     /// Triangle meshes.
@@ -110,14 +110,14 @@ pub struct ObjectGeometry {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct BoxBody {
-    /// Its centre.
+    /// Centre (m).
     pub centre: [f64; 3],
-    /// Its extents along its own axes.
+    /// Extents along the box's axes (m).
     pub size: [f64; 3],
-    /// Roll, pitch, yaw: R = Rz(yaw) Ry(pitch) Rx(roll), degrees.
+    /// Roll, pitch, yaw (degrees): R = Rz(yaw) Ry(pitch) Rx(roll).
     #[serde(default)]
     pub turn_deg: [f64; 3],
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
 }
 
@@ -125,23 +125,23 @@ pub struct BoxBody {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CylinderBody {
-    /// One end of its axis.
+    /// Start of the axis (m).
     pub from: [f64; 3],
-    /// The other end.
+    /// End of the axis (m).
     pub to: [f64; 3],
-    /// Its radius.
+    /// Radius (m).
     pub radius: f64,
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
 }
 
-/// A flat, convex painted area; it is drawn upon the face in whose plane it lies.
+/// A flat, convex painted area, rendered upon the face in whose plane it lies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PanelBody {
-    /// Its corners in order, anticlockwise seen from outside.
+    /// Corners in order, anticlockwise seen from outside (m).
     pub outline: Vec<[f64; 3]>,
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
 }
 
@@ -149,13 +149,13 @@ pub struct PanelBody {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ChequerBody {
-    /// Its first corner.
+    /// First corner (m).
     pub corner: [f64; 3],
-    /// From the first corner to the end of its first row of squares; `along` × `across` points outside.
+    /// Vector from the first corner to the end of the first row of squares (m); `along` × `across` points outside.
     pub along: [f64; 3],
-    /// From the first corner to the end of its first column of squares.
+    /// Vector from the first corner to the end of the first column of squares (m).
     pub across: [f64; 3],
-    /// Squares along and across; those of an even sum are painted.
+    /// Number of squares along and across; squares with an even sum of indices are painted.
     pub cells: [u32; 2],
     /// Name of the painted squares' material.
     pub material: String,
@@ -165,20 +165,19 @@ pub struct ChequerBody {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MeshBody {
-    /// Its vertices.
+    /// Vertices (m).
     pub vertices: Vec<[f64; 3]>,
-    /// Triples of places in `vertices`, from 0, anticlockwise seen from outside.
+    /// Triples of vertex indices from 0, anticlockwise seen from outside.
     pub triangles: Vec<[usize; 3]>,
-    /// Name of its material.
+    /// Name of the material.
     pub material: String,
 }
 
 impl Geometry {
-    /// Reads the file's text.
+    /// Parses the text of the file.
     ///
     /// # Errors
-    /// What the TOML reader finds, or another format. What the numbers say is
-    /// checked against a site.
+    /// A TOML error or another format. Values are checked against a site later.
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
         let read: Self = toml::from_str(text).map_err(|error| Fault::in_toml(file, text, &error))?;
         if read.format != GEOMETRY_FORMAT {
@@ -186,12 +185,12 @@ impl Geometry {
             return Err(Fault::new("unknown format", file)
                 .on_line(line)
                 .value(format!("`{}`", read.format))
-                .remedy(format!("this reader knows `{GEOMETRY_FORMAT}`")));
+                .remedy(format!("give `{GEOMETRY_FORMAT}`")));
         }
         Ok(read)
     }
 
-    /// The file's text.
+    /// The text of the file.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a geometry is made of tables, strings and numbers")
     }

@@ -1,4 +1,4 @@
-//! Sites drawn at random, for studies that must not depend on one.
+//! Randomly generated sites, for studies that must not depend on one site.
 
 use std::f64::consts::TAU;
 
@@ -17,23 +17,24 @@ use super::{
 };
 use crate::stream::{Purpose, Stream};
 
-/// Corners that two boxes share sides with are kept apart by this (m).
+/// Minimum distance between corners of boxes that share sides (m).
 const MIN_GAP: f64 = 0.12;
-/// Layouts of one object that are tried before the best is taken.
+/// Number of layouts of an object of which the best is taken.
 const TRIALS: usize = 60;
 
-/// A site of objects drawn at random: slabs with boxes and painted marks; the feature points are the
-/// corners of the boxes' upper faces and of the marks. All objects are at most 1.5 m high.
+/// A random site of slabs with boxes and painted marks.
+///
+/// The feature points are the corners of the boxes' upper faces and of the marks. All objects are at most 1.5 m high.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RandomSite {
-    /// How many objects.
+    /// Number of objects, from 1 to 50.
     pub objects: usize,
-    /// Feature points of each.
+    /// Number of feature points of each object, from 3 to 16.
     pub points: usize,
-    /// Side of the square that they stand in (m).
+    /// Side of the square that holds the objects (m), up to 1000. The minimum grows with the number of objects.
     pub extent: f64,
-    /// Which of all such sites.
+    /// Seed of the site: equal numbers give equal sites.
     pub number: u64,
 }
 
@@ -46,17 +47,17 @@ impl Default for RandomSite {
 impl RandomSite {
     pub(crate) fn check(&self) -> Result<(), String> {
         in_range((1..=50).contains(&self.objects), "random.objects", self.objects, "1 to 50 objects")?;
-        in_range((3..=16).contains(&self.points), "random.points", self.points, "3 to 16 points an object")?;
+        in_range((3..=16).contains(&self.points), "random.points", self.points, "3 to 16 points for each object")?;
         let min = 6.0 * (self.objects as f64).sqrt();
         let range = format!("{min:.0} to 1000 m for {} objects", self.objects);
         in_range(self.extent >= min && self.extent <= 1000.0, "random.extent", self.extent, &range)
     }
 
-    /// The site.
+    /// Generates the site.
     pub fn plan(&self) -> SitePlan {
         let depth = SeabedPlan::default().depth;
         let mut stream = Stream::new(self.number, 0, 0, Purpose::Site);
-        // One object in each of the cells of a square grid, somewhere within it, so that none meet.
+        // One object at a random place in each cell of a square grid, so that objects keep apart.
         let cells = (self.objects as f64).sqrt().ceil() as usize;
         let cell = self.extent / cells as f64;
         let (mut objects, mut shapes) = (Vec::new(), Vec::new());
@@ -91,8 +92,9 @@ impl RandomSite {
         }
     }
 
-    /// One object whose design frame (x forward, y starboard, z down, origin on the bed) is placed by
-    /// `world_from_design`.
+    /// One object, whose design frame is placed by `world_from_design`.
+    ///
+    /// The design frame is x forward, y starboard, z down, with its origin on the seabed.
     fn object(
         &self,
         index: usize,
@@ -176,7 +178,7 @@ struct DraftBox {
     yaw: f64,
 }
 
-/// One object's boxes, marks and points in its design frame, z down.
+/// The boxes, marks and points of one object in its design frame, z down.
 struct Draft {
     boxes: Vec<DraftBox>,
     marks: Vec<[Vector3<f64>; 3]>,
@@ -210,7 +212,7 @@ impl Draft {
             for [a, b] in quarters {
                 corners.push(on_top(0.5 * a * size[0], 0.5 * b * size[1]));
             }
-            // A dark triangle, its three corners good to find; seen from above it turns left.
+            // A dark triangle with three distinct corners, anticlockwise seen from above.
             let about = stream.between(0.0, TAU);
             let reach = 0.38 * size[0].min(size[1]);
             let place = |k: f64, r: f64| {
@@ -221,7 +223,7 @@ impl Draft {
             corners.extend(mark);
             marks.push(mark);
         }
-        // Any of the corners, apart from each other.
+        // Random corners with a minimum distance from each other.
         let mut points: Vec<Vector3<f64>> = Vec::new();
         for _ in 0..400 {
             let corner = corners[stream.below(corners.len())];
@@ -232,7 +234,7 @@ impl Draft {
         Self { boxes, marks, points }
     }
 
-    /// How well its distances tell its points apart: the least difference between two of them.
+    /// The discriminability of the points: the smallest difference between two of their distances.
     fn worth(&self) -> f64 {
         let n = self.points.len();
         let mut all: Vec<f64> = (0..n)

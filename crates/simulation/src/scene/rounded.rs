@@ -1,20 +1,20 @@
-//! A box whose edges and corners are rounded, as growth and silt leave them.
+//! A box with rounded edges and corners, as growth and silt leave it.
 
 use nalgebra::Vector3;
 
-/// Steps of a quarter turn.
+/// Number of steps of a quarter turn.
 const STEPS: usize = 4;
 
-/// A triangle: corners, normals, and which sides are edges of the body.
+/// A triangle: corners, normals, and whether each side is an edge of the body.
 pub(super) type Piece = ([Vector3<f64>; 3], [Vector3<f64>; 3], [bool; 3]);
 
-/// The triangles of a box of these half extents about the origin, rounded with `radius`.
+/// The triangles of a box with these half extents about the origin, rounded with `radius`.
 ///
-/// Every point is the nearest one of the inner box, moved out by the radius along the normal; the
-/// faces of a cube, bent outwards, give the normals.
+/// Every point is the nearest point of the inner box, displaced by the radius along the normal. The faces of a cube,
+/// bent outwards, give the normals.
 pub(super) fn rounded_box(half: Vector3<f64>, radius: f64) -> Vec<Piece> {
     let inner = half - Vector3::repeat(radius);
-    // Along an axis: the bend up to 45 degrees, the flat, the bend again; as (sign, tangent).
+    // Along an axis: the bend up to 45°, the flat part, the bend again; as (sign, tangent).
     let bend = |k: usize| libm::tan(std::f64::consts::FRAC_PI_4 * k as f64 / (STEPS / 2) as f64);
     let mut stops: Vec<(f64, f64)> = (0..=STEPS / 2).rev().map(|k| (-1.0, -bend(k))).collect();
     stops.extend((0..=STEPS / 2).map(|k| (1.0, bend(k))));
@@ -33,7 +33,7 @@ pub(super) fn rounded_box(half: Vector3<f64>, radius: f64) -> Vec<Piece> {
             for i in 0..stops.len() - 1 {
                 for j in 0..stops.len() - 1 {
                     let [p, q, r, s] = [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
-                    // Where the surface is bent, any side may be its outline.
+                    // Any side of a bent surface may be part of its outline.
                     for (t, edges) in [([p, q, r], [true, true, false]), ([p, r, s], [false, true, true])] {
                         if (t[1].0 - t[0].0).cross(&(t[2].0 - t[0].0)).norm() > 1e-14 {
                             pieces.push((t.map(|c| c.0), t.map(|c| c.1), edges));

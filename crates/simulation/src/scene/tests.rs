@@ -39,7 +39,7 @@ fn the_papers_site_is_the_blueprint_dressed() {
             assert!((point.at - corner.at).norm() < 3e-6);
         }
     }
-    // Heights below 1.5 m, so that a vehicle 2 m above the bed passes.
+    // Heights stay below 1.5 m, so that a vehicle 2 m above the seabed passes.
     assert!(scene.mesh.triangles.iter().flat_map(|t| t.at).all(|p| p.z > 38.5));
 }
 
@@ -79,7 +79,7 @@ fn changes_of_nothing_change_nothing_and_survey_keeps_what_was() {
         let step = (moved.world_from_object[k].translation() - as_built.world_from_object[k].translation()).norm();
         let expected = if object.id == "plet" { 0.4 } else { 0.0 };
         assert!((step - expected).abs() < 1e-9);
-        // Truth carries the told points onto the bodies, wherever they now are.
+        // The true pose carries the nominal points onto the displaced bodies.
         for (nominal, point) in moved.nominal.objects[k].points.iter().zip(&moved.objects[k].points) {
             assert!(((moved.world_from_object[k] * nominal.at).coords - point.at).norm() < 5e-6);
         }
@@ -118,12 +118,12 @@ fn what_is_wrong_with_a_geometry_is_stated_in_one_line_each() {
         assert!(!lines[0].contains('\n'));
     };
     one(text(&|g| g.objects[0].meshes.push(mesh(vec![[0.0; 3]; 3], vec![[0, 1, 2]]))), "a triangle without area");
-    one(text(&|g| g.objects[0].meshes.push(mesh(triangle.clone(), vec![[0, 1, 7]]))), "vertex that is not there");
+    one(text(&|g| g.objects[0].meshes.push(mesh(triangle.clone(), vec![[0, 1, 7]]))), "unknown vertex");
     one(text(&|g| g.objects[0].meshes.push(mesh(vec![[f64::NAN; 3]; 3], vec![[0, 1, 2]]))), "not finite");
     one(text(&|g| g.objects[0].boxes[1].size[2] = 0.0), "has no volume");
     one(text(&|g| g.objects[0].boxes[1].material = "yelow".into()), "unknown material");
     one(text(&|g| g.objects[0].panels[0].outline[0][2] += 0.1), "not flat");
     one(text(&|g| g.objects[0].id = "tree-x".into()), "did you mean `tree-");
-    one(text(&|g| g.seabed.albedo = 1.5), "albedo of the bed");
+    one(text(&|g| g.seabed.albedo = 1.5), "albedo of the seabed");
     one(text(&|g| g.objects[1].cylinders[0].radius = -0.1), "has no volume");
 }

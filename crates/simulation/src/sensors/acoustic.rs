@@ -1,4 +1,4 @@
-//! Acoustic positioning from a ship: USBL.
+//! Ultra-short-baseline (USBL) positioning from a ship.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,27 +9,29 @@ use crate::{
     vehicle::Track,
 };
 
-/// Outliers err by up to this share of the slant range.
+/// Maximum error of an outlier, as a fraction of the slant range.
 const OUTLIER: f64 = 0.1;
 
-/// Acoustic positions: each world axis errs by σ = `sigma` + `range_fraction`·(slant range). USBL has a share (0.5 %
-/// is usual, 0.1 to 2 % are found); a sigma (0.1 to 0.3 m) and no share stand for an LBL that is not looked into.
+/// Acoustic positions with the standard deviation σ = `sigma` + `range_fraction`·(slant range) on each world axis.
+///
+/// USBL has a range fraction (0.5 % is usual, published values go from 0.1 to 2 %). A `sigma` of 0.1 to 0.3 m without a
+/// fraction stands for an LBL system of which only the positions are used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Acoustic {
-    /// Where the transceiver is: north, east, down (m).
+    /// Position of the ship's transceiver: north, east, down (m), from −100 000 to 100 000 each.
     pub from: [f64; 3],
-    /// Where its transponder sits in the vehicle: body frame (m).
+    /// Position of the transponder in the body frame (m), from −10 to 10 each.
     pub at: [f64; 3],
-    /// Part of σ that grows with the slant range.
+    /// Growth of σ with the slant range, from 0 to 0.2. The default is a usual USBL.
     pub range_fraction: f64,
-    /// Part of σ that does not (m).
+    /// Constant part of σ (m), from 0 to 100.
     pub sigma: f64,
-    /// Fixes a second.
+    /// Fix rate (Hz), from 0.001 to 100.
     pub rate: f64,
-    /// Share of fixes that are far off.
+    /// Fraction of fixes that are outliers, from 0 to 1; their error reaches 10 % of the slant range.
     pub outliers: f64,
-    /// Share of fixes that never come.
+    /// Fraction of fixes that are lost, from 0 to 1.
     pub dropouts: f64,
 }
 
@@ -59,7 +61,7 @@ impl Acoustic {
         within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
-    /// The standard deviation of each axis at a slant range (m).
+    /// Standard deviation of each axis at a slant range (m).
     pub(crate) fn spread(&self, range: f64) -> f64 {
         self.sigma + self.range_fraction * range
     }

@@ -1,4 +1,4 @@
-//! Rate gyro and attitude.
+//! Rate gyro and attitude solution.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::so3;
@@ -12,28 +12,29 @@ use crate::{
 
 /// A gyro with its attitude solution.
 ///
-/// Rate: ω + bias + white noise of density `random_walk`; the bias is an Ornstein–Uhlenbeck process of
-/// standard deviation `instability`. Attitude: a heading error of the dive, and white noise.
+/// The rate is ω + bias + white noise of density `random_walk`. The bias is an Ornstein–Uhlenbeck process of standard
+/// deviation `instability` and time constant `tau`. The attitude has a heading error and a level error that stay the
+/// same for the dive, and white noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct AttitudeSensor {
-    /// Standard deviation of the heading error of the dive (degrees).
+    /// Standard deviation of the heading error, constant over a dive (degrees), from 0 to 180.
     pub heading_deg: f64,
-    /// Standard deviation of roll's and pitch's errors of the dive (degrees).
+    /// Standard deviation of the roll and pitch errors, constant over a dive (degrees), from 0 to 90.
     pub level_deg: f64,
-    /// Standard deviation of the attitude's noise, each axis (degrees).
+    /// Standard deviation of the white attitude noise about each axis (degrees), from 0 to 90.
     pub sigma_deg: f64,
-    /// Angle random walk (degrees/√h).
+    /// Angle random walk (degrees/√h), from 0 to 1000.
     pub random_walk: f64,
-    /// Standard deviation of the rate's bias (degrees/h).
+    /// Standard deviation of the rate bias (degrees/h), from 0 to 1 000 000.
     pub instability: f64,
-    /// Time constant of the bias (s).
+    /// Time constant of the bias (s), from 0.001 to 1 000 000.
     pub tau: f64,
-    /// Readings a second.
+    /// Reading rate (Hz), from 0.001 to 1000.
     pub rate: f64,
-    /// How late a reading comes (s).
+    /// Delay between measurement and arrival of a reading (s), from 0 to 60.
     pub latency: f64,
-    /// Share of readings that never come.
+    /// Fraction of readings that are lost, from 0 to 1.
     pub dropouts: f64,
 }
 
@@ -53,12 +54,12 @@ impl Default for AttitudeSensor {
     }
 }
 
-/// One reading.
+/// One reading of rate and attitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeReading {
-    /// Rate of turn, body frame (rad/s).
+    /// Angular velocity in the body frame (rad/s).
     pub rate: Vector3<f64>,
-    /// The body in the world.
+    /// The vehicle's attitude.
     pub world_from_body: UnitQuaternion<f64>,
 }
 
@@ -88,7 +89,7 @@ impl AttitudeSensor {
         within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
-    /// Standard deviation of the white noise of a reading's rate, each axis (rad/s): the random walk over a reading's time.
+    /// Standard deviation of the white rate noise on each axis (rad/s): the random walk over one reading interval.
     pub fn rate_sigma(&self) -> f64 {
         self.random_walk.to_radians() / 60.0 * self.rate.sqrt()
     }

@@ -9,21 +9,21 @@ use crate::{
     vehicle::Track,
 };
 
-/// Depth from pressure: a bias of the dive (tide, density), and white noise.
+/// Depth from pressure, with a constant bias over a dive (tide, density) and white noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DepthGauge {
-    /// Where it sits in the vehicle: body frame (m).
+    /// Position of the sensor in the body frame (m), from −10 to 10 each.
     pub at: [f64; 3],
-    /// Standard deviation of the bias (m).
+    /// Standard deviation of the bias (m), from 0 to 100.
     pub bias: f64,
-    /// Standard deviation of the noise (m).
+    /// Standard deviation of the white noise (m), from 0 to 100.
     pub sigma: f64,
-    /// Readings a second.
+    /// Reading rate (Hz), from 0.001 to 1000.
     pub rate: f64,
-    /// How late a reading comes (s).
+    /// Delay between measurement and arrival of a reading (s), from 0 to 60.
     pub latency: f64,
-    /// Share of readings that never come.
+    /// Fraction of readings that are lost, from 0 to 1.
     pub dropouts: f64,
 }
 
@@ -44,7 +44,7 @@ impl DepthGauge {
         within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
-    /// The readings up to `until` (s): depth (m).
+    /// The depths up to `until` (s), in metres.
     pub(crate) fn readings(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<TimedReading<f64>> {
         let bias = self.bias * Stream::new(seeds.0, seeds.1, u64::MAX, Purpose::Depth).normal();
         let reading = |k: u64| {

@@ -12,27 +12,29 @@ use crate::{
 
 /// Angle of the four beams to the vertical (degrees).
 const BEAM_DEG: f64 = 30.0;
-/// Share of beams on a structure that give a velocity.
+/// Fraction of the beams on a structure that give a velocity.
 const ON_STRUCTURE: f64 = 0.5;
 
-/// Velocity over ground of its place, in the body frame: a scale error of the dive, and white noise. It needs three of
-/// four beams; those that meet a structure fail half of the time.
+/// The sensor's velocity over ground in the body frame, with a constant scale error and white noise.
+///
+/// The scale error is sampled once for a dive. A velocity needs three of four beams; a beam that meets a structure
+/// fails in half of the pings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Doppler {
-    /// Where it sits in the vehicle: body frame (m).
+    /// Position of the sensor in the body frame (m), from −10 to 10 each.
     pub at: [f64; 3],
-    /// Standard deviation of the scale error (relative).
+    /// Standard deviation of the relative scale error, from 0 to 0.5.
     pub scale: f64,
-    /// Standard deviation of the noise, each axis (m/s).
+    /// Standard deviation of the white noise on each axis (m/s), from 0 to 10.
     pub sigma: f64,
-    /// Pings a second.
+    /// Ping rate (Hz), from 0.001 to 100.
     pub rate: f64,
-    /// Least and greatest length of a beam (m).
+    /// Minimum and maximum length of a beam (m): the minimum from 0 to 100, the maximum up to 10 000.
     pub reach: [f64; 2],
-    /// How late a reading comes (s).
+    /// Delay between measurement and arrival of a reading (s), from 0 to 60.
     pub latency: f64,
-    /// Share of readings that never come.
+    /// Fraction of readings that are lost, from 0 to 1.
     pub dropouts: f64,
 }
 
@@ -55,7 +57,7 @@ impl Doppler {
         within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
-    /// The readings up to `until` (s): velocity over ground, body frame (m/s).
+    /// The velocities over ground up to `until` (s), in the body frame (m/s).
     pub(crate) fn readings(
         &self,
         track: &Track,

@@ -1,4 +1,4 @@
-//! Devices that fail.
+//! Device faults.
 
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{TimedReading, Value};
 use crate::stream::{Purpose, Stream};
 
-/// Of slow devices only every so many-th reading comes.
+/// Decimation of a slow device: one reading in this number arrives.
 const SLOW: usize = 5;
 
 /// The devices that can fail.
@@ -27,39 +27,39 @@ pub enum FaultyDevice {
     Depth,
 }
 
-/// How a device fails, in the words of PX4's failure injection.
+/// The kinds of fault, named as in PX4's failure injection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
-    /// Nothing comes; images are black.
+    /// No reading arrives; images are black.
     Off,
-    /// The last value comes again and again.
+    /// The last reading before the fault is repeated; images repeat the first frame of the fault.
     Stuck,
-    /// Anything comes.
+    /// Random values arrive.
     Garbage,
-    /// Plausible values that are false; the two images have changed places.
+    /// Plausible but false values arrive; left and right images are exchanged.
     Wrong,
-    /// A fifth of the readings comes; images stand still for five frames.
+    /// One reading in five arrives; one image in five is new.
     Slow,
-    /// Readings come `amount` seconds late; images show what was then.
+    /// Readings arrive `amount` seconds late; images show the view of `amount` seconds ago.
     Delayed,
-    /// Each reading is lost with the probability `amount`.
+    /// Each reading is lost with the probability `amount`; a lost image is black.
     Intermittent,
 }
 
-/// A device that fails for a while.
+/// A fault of one device over an interval of time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DeviceFault {
     /// The device.
     pub device: FaultyDevice,
-    /// How it fails.
+    /// The kind of fault.
     pub kind: FaultKind,
-    /// When it begins (s).
+    /// Start of the fault (s), at least 0.
     pub from: f64,
-    /// When it ends (s), not before `from`; at `from` it never acts.
+    /// End of the fault (s), excluded and not before `from`. An end equal to `from` disables the fault.
     pub to: f64,
-    /// Seconds of delay, or the probability of a loss.
+    /// Delay (s), from 0 to 1000, or probability of a loss, from 0 to 1; other kinds ignore it.
     #[serde(default = "half")]
     pub amount: f64,
 }
@@ -69,7 +69,7 @@ fn half() -> f64 {
 }
 
 impl FaultKind {
-    /// Whether a fault of this kind can be from one time to another (s) with an amount; `index` is its place among `faults`.
+    /// Checks the interval `(from, to)` (s) and the amount of a fault; `index` is its position in `faults`.
     ///
     /// # Errors
     /// The first number outside its range: `name = value; give range`.
@@ -88,13 +88,13 @@ impl DeviceFault {
         self.kind.check((self.from, self.to), self.amount, index)
     }
 
-    /// Whether it acts at a time (s).
+    /// Whether the fault is active at a time (s).
     pub(crate) fn acts(&self, time: f64) -> bool {
         time >= self.from && time < self.to
     }
 }
 
-/// Readings of a device, failed as `faults` say.
+/// The readings of a device after its faults.
 pub(super) fn failed<V: Value>(
     readings: Vec<TimedReading<V>>,
     device: FaultyDevice,

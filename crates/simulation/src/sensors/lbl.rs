@@ -1,4 +1,4 @@
-//! Long-baseline positioning: ranges to transponders that stand on the bed.
+//! Long-baseline (LBL) positioning: ranges to transponders on the seabed.
 
 use nalgebra::Vector3;
 use seafix_component::in_range;
@@ -10,34 +10,34 @@ use crate::{
     vehicle::Track,
 };
 
-/// The most transponders.
+/// Maximum number of transponders.
 const MAX: usize = 8;
-/// An echo lengthens a range by up to this share.
+/// Maximum lengthening of a range by an echo, as a fraction of the range.
 const ECHO: f64 = 0.1;
 
-/// LBL: the vehicle asks, every transponder answers, and half of the time that passes is a range.
+/// Long-baseline ranging: half of the round-trip time between vehicle and transponder gives a range.
 ///
-/// A range is |p − t|·(1 + s) + noise: the transponder truly stands at t, `survey` off where it was surveyed, and s is
-/// the error of the speed of sound; both stay the same for the whole dive. Outliers are echoes, which are always too long.
-/// The vehicle counts as standing still while the sound travels.
+/// A range is |p − t|·(1 + s) + noise. The true transponder position t differs from its surveyed position by an error
+/// of standard deviation `survey`; s is the relative error of the speed of sound. Both stay the same for the dive.
+/// Outliers are echoes, which are always too long. The vehicle's motion during the travel time is neglected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Lbl {
-    /// Where the transponders were surveyed: north, east, down (m). Three to eight; none is no LBL.
+    /// Surveyed positions of the transponders: north, east, down (m). Give three to eight; an empty list disables LBL.
     pub transponders: Vec<[f64; 3]>,
-    /// Standard deviation of each surveyed coordinate (m).
+    /// Standard deviation of each surveyed coordinate (m), from 0 to 100.
     pub survey: f64,
-    /// Where the vehicle asks from: body frame (m).
+    /// Position of the interrogator in the body frame (m), from −10 to 10 each.
     pub at: [f64; 3],
-    /// Standard deviation of a range (m).
+    /// Standard deviation of a range (m), from 0 to 100.
     pub sigma: f64,
-    /// Standard deviation of the error of the speed of sound (relative).
+    /// Standard deviation of the relative error of the speed of sound, from 0 to 0.1.
     pub sound: f64,
-    /// Questions a second.
+    /// Interrogation rate (Hz), from 0.001 to 100.
     pub rate: f64,
-    /// Share of answers that are echoes.
+    /// Fraction of replies that are echoes, from 0 to 1; an echo lengthens a range by up to 10 %.
     pub outliers: f64,
-    /// Share of answers that never come.
+    /// Fraction of replies that are lost, from 0 to 1.
     pub dropouts: f64,
 }
 
@@ -56,7 +56,7 @@ impl Default for Lbl {
     }
 }
 
-/// The ranges of one question (m), in the order of the transponders; none where no answer came.
+/// The ranges of one interrogation (m), in the order of the transponders; `None` for a lost reply.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Ranges(pub [Option<f64>; MAX]);
 
@@ -74,14 +74,14 @@ impl Lbl {
     pub(super) fn check(&self) -> Result<(), String> {
         let within = |name, x, low, high| within("lbl", name, x, low, high);
         let n = self.transponders.len();
-        in_range(n == 0 || (3..=MAX).contains(&n), "sensors.lbl.transponders", n, "3 to 8 places, or none")?;
+        in_range(n == 0 || (3..=MAX).contains(&n), "sensors.lbl.transponders", n, "3 to 8 positions, or none")?;
         self.transponders.iter().flatten().try_for_each(|x| within("transponders", *x, -1e4, 1e4))?;
         let distinct = |k: usize| {
             let away = |j: &[f64; 3]| (Vector3::from(*j) - Vector3::from(self.transponders[k])).norm();
             self.transponders[..k].iter().all(|j| away(j) > 1.0)
         };
         let close = (0..n).find(|k| !distinct(*k));
-        let remedy = "a place more than 1 m from the others";
+        let remedy = "a position more than 1 m from the others";
         let name = format!("sensors.lbl.transponders[{}]", close.unwrap_or(0));
         in_range(close.is_none(), &name, format!("{:?}", close.map(|k| self.transponders[k])), remedy)?;
         within("survey", self.survey, 0.0, 100.0)?;
@@ -93,7 +93,7 @@ impl Lbl {
         within("dropouts", self.dropouts, 0.0, 1.0)
     }
 
-    /// What came of the questions up to `until` (s).
+    /// The replies to the interrogations up to `until` (s).
     pub(crate) fn answers(&self, track: &Track, until: f64, seeds: (u64, u64)) -> Vec<TimedReading<Ranges>> {
         if self.transponders.is_empty() {
             return Vec::new();

@@ -1,7 +1,7 @@
-//! The vehicle's navigation sensors: acoustic positions and ranges, Doppler velocity, rate and attitude, depth.
+//! The navigation sensors: acoustic positions and ranges, Doppler velocity, angular rate and attitude, depth.
 //!
-//! Every reading is a function of (seed, dive, device, number) alone; what a device has wrong for a whole
-//! dive is drawn once. A reading has the time of what it measures and the time at which it is there.
+//! Every reading is a function of seed, dive, device and reading number. An error that is constant over a dive is
+//! sampled once. A reading has the time of its measurement and the time of its arrival.
 
 mod acoustic;
 mod attitude;
@@ -27,14 +27,14 @@ pub(crate) use prior::{SensorNavigation, SensorPrior};
 /// The speed of sound (m/s).
 const SOUND: f64 = 1500.0;
 
-/// A reading of a sensor.
+/// A sensor reading with its times.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimedReading<V> {
-    /// The time of what it measures (s).
+    /// Time of the measurement (s).
     pub time: f64,
-    /// When it is there to be used (s).
+    /// Time of arrival (s); the reading is unknown before it.
     pub arrival: f64,
-    /// What it says.
+    /// The measured value.
     pub value: V,
 }
 
@@ -43,48 +43,49 @@ pub struct TimedReading<V> {
 pub struct AcousticFix {
     /// North, east, down (m).
     pub at: Vector3<f64>,
-    /// What the sensor says about it: standard deviation of each axis (m), outliers apart.
+    /// Reported standard deviation of each axis (m), outliers excluded.
     pub sigma: f64,
 }
 
-/// A position by the ranges to transponders.
+/// A position from the ranges to transponders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LblFix {
-    /// North, east, down of the place that asks (m).
+    /// North, east, down of the interrogator (m).
     pub at: Vector3<f64>,
-    /// What it says about itself: standard deviation of each axis (m).
+    /// Reported standard deviation of each axis (m).
     pub sigma: Vector3<f64>,
 }
 
-/// Everything that the navigation sensors say during a dive, each in order of what it measured. A reading may be
-/// used from its arrival on; errors, latency, losses and faults are in it, truth is not.
+/// All readings of the navigation sensors during a dive, each list in order of measurement.
+///
+/// A reading may be used from its arrival on. The lists contain errors, latency, losses and faults, but no truth.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Readings {
-    /// Position from USBL.
+    /// Positions from USBL.
     pub acoustic: Vec<TimedReading<AcousticFix>>,
-    /// Ranges to transponders, and the position that they give with the depth.
+    /// Ranges to transponders, and the positions computed from them and the depth.
     pub lbl: Vec<TimedReading<(Ranges, Option<LblFix>)>>,
-    /// Velocity over ground of the log's place, body frame (m/s).
+    /// Velocities over ground of the Doppler log, in the body frame (m/s).
     pub doppler: Vec<TimedReading<Vector3<f64>>>,
-    /// Rate of turn (rad/s, body frame) and attitude.
+    /// Angular rates (rad/s, body frame) and attitudes.
     pub attitude: Vec<TimedReading<AttitudeReading>>,
-    /// Depth of the gauge (m).
+    /// Depths of the gauge (m).
     pub depth: Vec<TimedReading<f64>>,
 }
 
-/// The navigation sensors.
+/// The navigation sensors of the vehicle.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sensors {
-    /// Position from a ship's transceiver.
+    /// USBL positioning from a ship.
     pub acoustic: Acoustic,
-    /// Position among transponders on the bed.
+    /// LBL positioning among transponders on the seabed.
     pub lbl: Lbl,
-    /// Velocity over ground.
+    /// Doppler velocity log.
     pub doppler: Doppler,
-    /// Rate of turn and attitude.
+    /// Gyro with attitude solution.
     pub attitude: AttitudeSensor,
-    /// Depth.
+    /// Depth gauge.
     pub depth: DepthGauge,
 }
 
@@ -98,16 +99,16 @@ impl Sensors {
     }
 }
 
-/// Whether a number lies within its bounds, for a sensor's setting.
+/// Checks that a sensor's setting lies in its range.
 fn within(sensor: &str, name: &str, x: f64, low: f64, high: f64) -> Result<(), String> {
     in_range(x >= low && x <= high, &format!("sensors.{sensor}.{name}"), x, &format!("a number from {low} to {high}"))
 }
 
-/// What a fault can do to a value.
+/// A value that faults can replace.
 pub(crate) trait Value: Copy {
-    /// Any value at all.
+    /// A random value.
     fn garbage(stream: &mut crate::stream::Stream) -> Self;
-    /// The value, off by a step that looks plausible.
+    /// The value with a plausible error.
     fn wrong(self) -> Self;
 }
 

@@ -1,4 +1,4 @@
-//! The rough pose that navigation without images gives.
+//! The prior pose from navigation without images.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Transform, World};
@@ -10,34 +10,35 @@ use super::{
 };
 use crate::{scene::Scene, vehicle::Track};
 
-/// Fixes farther from the dead-reckoned place than this many standard deviations are not believed.
+/// Gate of a position fix, in standard deviations of its difference from dead reckoning.
 const GATE: f64 = 4.0;
 
-/// All readings of a dive, and the poses they give.
+/// All readings of a dive, and the prior poses computed from them.
 #[derive(Debug, Clone)]
 pub(crate) struct SensorNavigation {
     sensors: Sensors,
     fixes: Vec<TimedReading<Vector3<f64>>>,
     answers: Vec<TimedReading<Ranges>>,
-    /// All positions, in order of their times.
+    /// All positions, in order of time.
     positions: Vec<TimedReading<Position>>,
     velocities: Vec<TimedReading<Vector3<f64>>>,
     attitudes: Vec<TimedReading<AttitudeReading>>,
     depths: Vec<TimedReading<f64>>,
 }
 
-/// The place of one part of the vehicle.
+/// The position of one part of the vehicle.
 #[derive(Debug, Clone, Copy)]
 struct Position {
     at: Vector3<f64>,
-    /// Where that part is: body frame (m).
+    /// Lever arm of that part in the body frame (m).
     lever: Vector3<f64>,
-    /// Variance of its noise, each axis (m²), and the covariance of what errs alike in the next one.
+    /// Variance of the independent noise on each axis (m²).
     noise: Vector3<f64>,
+    /// Covariance of the error that consecutive positions share (m²).
     common: Matrix3<f64>,
 }
 
-/// A pose with standard deviations: position covariance in the world (m²), attitude each axis (rad).
+/// A pose with the covariance of its position (world, m²) and the deviation of its attitude (rad).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SensorPrior {
     pub(crate) world_from_body: Transform<World, Body>,
@@ -45,7 +46,7 @@ pub(crate) struct SensorPrior {
     pub(crate) attitude: f64,
 }
 
-/// The last reading that is there at a time.
+/// The last reading that has arrived at a time.
 fn latest<V>(readings: &[TimedReading<V>], now: f64) -> Option<&TimedReading<V>> {
     readings.iter().rev().find(|r| r.arrival <= now && r.time <= now)
 }
@@ -95,7 +96,7 @@ impl SensorNavigation {
         all
     }
 
-    /// The place that asked the transponders, by their answers and the depth gauge.
+    /// The interrogator's position from the replies and the depth gauge.
     fn among_transponders(&self, answer: &TimedReading<Ranges>) -> Option<Found> {
         let lbl = &self.sensors.lbl;
         let length =
@@ -107,18 +108,18 @@ impl SensorNavigation {
             let turn = self.turned(said.time).map(|said| said.world_from_body).unwrap_or_default();
             let between = (turn * (Vector3::from(lbl.at) - Vector3::from(self.sensors.depth.at))).z;
             let gauge = &self.sensors.depth;
-            // Between reading and question it rises and sinks slowly.
+            // The vehicle may have risen or sunk since the depth reading, at up to 0.1 m/s.
             let slow = 0.1 * (answer.time - said.time);
             Length { value: said.value + between, noise: gauge.sigma.hypot(slow), common: gauge.bias }
         });
         let middle = places.clone().sum::<Vector3<f64>>() / lbl.transponders.len().max(1) as f64;
-        // Transponders stand on the bed, and the vehicle is above them.
+        // Transponders stand on the seabed, so the vehicle is above them.
         let highest = places.map(|t| t.z).fold(f64::INFINITY, f64::min);
         let start = Vector3::new(middle.x, middle.y, depth.map_or(highest - 3.0, |depth| depth.value));
         trilaterate(&ranges, depth, start)
     }
 
-    /// Everything that was said.
+    /// All readings, as [`Readings`].
     pub(crate) fn readings(&self) -> Readings {
         let fix = |fix: &TimedReading<Vector3<f64>>| TimedReading {
             time: fix.time,
@@ -139,29 +140,29 @@ impl SensorNavigation {
         }
     }
 
-    /// The standard deviation of each axis of an acoustic position, by its own range.
+    /// Standard deviation of each axis of an acoustic position at its own range.
     fn spread(&self, at: &Vector3<f64>) -> f64 {
         let range = (at - Vector3::from(self.sensors.acoustic.from)).norm();
         self.sensors.acoustic.spread(range).max(1e-3)
     }
 
-    /// The attitude reading that was last made at a time.
+    /// The latest attitude reading measured at or before a time.
     fn turned(&self, time: f64) -> Option<&AttitudeReading> {
         self.attitudes.partition_point(|a| a.time <= time).checked_sub(1).map(|k| &self.attitudes[k].value)
     }
 
-    /// The vehicle's place when one of its parts was at a position.
+    /// The vehicle's position at the time of a position of one of its parts.
     fn place(&self, position: &TimedReading<Position>) -> Vector3<f64> {
         let turn = self.turned(position.time).map(|said| said.world_from_body).unwrap_or_default();
         position.value.at - turn * position.value.lever
     }
 
-    /// The pose at a time (s): the acoustic positions that are there, carried on by Doppler velocity and attitude,
-    /// each new one weighed with what was known; the depth from the gauge. `None` before the first position.
+    /// The prior pose at a time (s); `None` before the first position.
     ///
-    /// A Kalman filter of the position and of the drift for each metre travelled, each axis for itself:
-    /// heading and scale err alike all the way, which noise of the steps would not say. What errs alike in all
-    /// positions is no noise either, and is added in the end.
+    /// A Kalman filter for each axis separately, whose states are the position and the drift per metre travelled.
+    /// Doppler velocity and attitude predict, acoustic positions correct, and the gauge gives the depth. The drift is a
+    /// state because heading and scale errors persist over the path, which step noise would not model. The error that
+    /// all positions share is no noise; it is added at the end.
     pub(crate) fn at(&self, now: f64) -> Option<SensorPrior> {
         let attitude = latest(&self.attitudes, now)?;
         let mut positions = self.positions.iter().filter(|position| position.arrival <= now);
@@ -171,7 +172,7 @@ impl SensorNavigation {
         let doppler = &self.sensors.doppler;
         let drift = doppler.scale.powi(2) + heading * heading + level * level;
         let noise = doppler.sigma.powi(2) / doppler.rate;
-        // Position, drift, and their variances an axis: (position, both, drift).
+        // Position, drift, and their variances on each axis: (position, covariance, drift).
         let (mut at, mut slope, mut time) = (self.place(first), Vector3::zeros(), first.time);
         let mut p = [0, 1, 2].map(|k| [first.value.noise[k], 0.0, drift]);
         let mut common = first.value.common;
@@ -192,7 +193,7 @@ impl SensorNavigation {
             let here = &position.value;
             let total = Vector3::from_fn(|k, _| p[k][0] + here.noise[k]);
             let miss = self.place(position) - at;
-            // Squares over variances, scaled by the first axis': equal axes lose no digit by it.
+            // Squares over variances, scaled by the first axis' variance: equal axes lose no digit.
             let allowed = total + here.common.diagonal() + common.diagonal();
             let scaled = Vector3::from_fn(|k, _| miss[k] * (allowed[0] / allowed[k]));
             if miss.dot(&scaled) < GATE * GATE * 3.0 * allowed[0] {
@@ -203,7 +204,7 @@ impl SensorNavigation {
                     slope[k] += miss[k] * gains[1];
                     p[k] = [p[k][0] * (1.0 - gains[0]), p[k][1] * (1.0 - gains[0]), p[k][2] - gains[1] * p[k][1]];
                 }
-                // No more than this, however alike the two err.
+                // The shared error enters with at most the gain of the position.
                 let gain = Vector3::from_fn(|k, _| before[k][0] / total[k]).mean();
                 common = common * (1.0 - gain) + here.common * gain;
             }
@@ -212,7 +213,7 @@ impl SensorNavigation {
         let mut position = Matrix3::from_diagonal(&Vector3::from_fn(|k, _| p[k][0])) + common;
         if let Some(depth) = latest(&self.depths, now) {
             at.z = depth.value - (attitude.value.world_from_body * Vector3::from(self.sensors.depth.at)).z;
-            // Between reading and now it rises and sinks slowly.
+            // The vehicle may have risen or sunk since the depth reading, at up to 0.1 m/s.
             let slow = (0.1 * (now - depth.time)).powi(2);
             position.row_mut(2).fill(0.0);
             position.column_mut(2).fill(0.0);
@@ -225,14 +226,14 @@ impl SensorNavigation {
         Some(SensorPrior { world_from_body, position, attitude: attitude_sigma.max(1e-5) })
     }
 
-    /// How far the vehicle went between two times by Doppler and attitude (m): the step, and the length.
+    /// Displacement between two times by Doppler and attitude (m), and the path length (m).
     fn travelled(&self, from: f64, to: f64) -> (Vector3<f64>, f64) {
         let (mut sum, mut length) = (Vector3::zeros(), 0.0);
         let mut last = from;
         let mut ping = self.velocities.partition_point(|v| v.time < from);
         while last < to {
             let next = self.velocities.get(ping).map_or(to, |v| v.time).min(to);
-            // Without a new ping the last velocity goes on.
+            // The last velocity holds until a new ping arrives.
             let Some(velocity) = self.velocities[..ping.min(self.velocities.len())].last().or(self.velocities.first())
             else {
                 break;

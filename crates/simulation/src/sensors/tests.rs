@@ -8,7 +8,7 @@ use crate::{
     vehicle::{Track, VehicleState},
 };
 
-/// Straight ahead at half a metre a second, 4 m above the bed.
+/// A straight track at 0.5 m/s, 4 m above the seabed.
 fn track(seconds: usize) -> Track {
     let state = |k: usize| VehicleState {
         world_from_body: Transform::new(UnitQuaternion::identity(), Vector3::new(0.005 * k as f64, 0.0, 36.0)),
@@ -24,7 +24,7 @@ fn scene() -> Scene {
 
 #[test]
 fn acoustic_errors_grow_with_the_range_as_stated() {
-    // Seen to fail with errors 1.2 times as large as said.
+    // Regression: errors 1.2 times as large as reported fail this test.
     for distance in [100.0, 1000.0] {
         let usbl =
             Acoustic { from: [-distance, 0.0, 36.0], outliers: 0.0, dropouts: 0.0, rate: 50.0, ..Acoustic::default() };
@@ -60,7 +60,7 @@ fn the_scale_of_the_doppler_log_is_one_number_a_dive() {
 
 #[test]
 fn the_gyros_allan_deviation_falls_with_the_root_of_time_to_its_floor() {
-    // Seen to fail with noise that does not follow the rate.
+    // Regression: noise that does not depend on the rate fails this test.
     let sensor = AttitudeSensor { random_walk: 0.15, instability: 0.0, rate: 50.0, ..AttitudeSensor::default() };
     let allan = |sensor: &AttitudeSensor, span: usize| {
         let readings = sensor.readings(&track(600), 600.0, (3, 0));
@@ -68,7 +68,7 @@ fn the_gyros_allan_deviation_falls_with_the_root_of_time_to_its_floor() {
             readings.chunks_exact(span).map(|c| c.iter().map(|r| r.value.rate.x).sum::<f64>() / span as f64).collect();
         (means.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * (means.len() - 1) as f64)).sqrt()
     };
-    // N/√τ with N the random walk.
+    // N/√τ, with the random walk N.
     for span in [50, 200, 800] {
         let expected = 0.15_f64.to_radians() / 60.0 / (span as f64 / 50.0).sqrt();
         assert!((allan(&sensor, span) / expected - 1.0).abs() < 0.25, "{span}");
@@ -79,8 +79,9 @@ fn the_gyros_allan_deviation_falls_with_the_root_of_time_to_its_floor() {
 
 #[test]
 fn the_bias_of_the_gyro_has_the_allan_deviation_of_its_process() {
-    // Of a bias with standard deviation s and time constant T, over means of τ (IEEE Std 952):
-    // σ²(τ) = 2 s² T/τ · (1 − T/(2τ)·(3 − 4 e^{−τ/T} + e^{−2τ/T})), highest about τ = 1.9 T. Mean of twelve dives.
+    // The Allan variance of a bias with standard deviation s and time constant T over means of τ (IEEE Std 952) is
+    // σ²(τ) = 2 s² T/τ · (1 − T/(2τ)·(3 − 4 e^{−τ/T} + e^{−2τ/T})), with its maximum at about τ = 1.9 T.
+    // The test takes the mean of twelve dives.
     let (s, constant) = (200.0_f64, 10.0);
     for rate in [5.0, 20.0] {
         let sensor =
@@ -111,7 +112,7 @@ fn the_bias_of_the_gyro_has_the_allan_deviation_of_its_process() {
 #[test]
 fn what_sensors_state_has_an_error_by_what_is_set() {
     // Normalised squared errors of every sensor over 150 dives: the mean is the number of axes, within four standard
-    // errors. Errors that stay for a dive count once a dive, noise once a reading.
+    // errors. A constant error counts once in a dive, noise once in a reading.
     let (track, scene) = (track(12), scene());
     let (mut scale, mut heading, mut depth) = (Vec::new(), Vec::new(), Vec::new());
     let (mut doppler, mut gauge) = (Vec::new(), Vec::new());
@@ -158,12 +159,12 @@ fn the_prior_pose_has_an_error_as_its_covariance_states() {
         n += 1.0;
         assert!(SensorNavigation::at(&navigation, -1.0).is_none());
     }
-    // χ² of three degrees of freedom over 120 dives: 3 ± 0.67 at three standard deviations.
+    // χ² with three degrees of freedom over 120 dives: 3 ± 0.67 at three standard deviations.
     let mean: f64 = nees / n;
     assert!((mean - 3.0).abs() < 0.9, "{mean}");
 }
 
-/// Five transponders about the site, and no USBL.
+/// Five transponders about the site, without USBL.
 fn among_five() -> Sensors {
     let transponders =
         vec![[-60.0, -50.0, 38.0], [70.0, -40.0, 39.0], [55.0, 65.0, 37.0], [-50.0, 60.0, 40.0], [0.0, 90.0, 36.0]];
@@ -186,11 +187,11 @@ fn positions_among_transponders_err_as_their_covariance_states() {
         nees += (prior_pose.position.try_inverse().unwrap() * miss).dot(&miss);
         n += 1.0;
         for reading in navigation.readings().lbl {
-            // Now and then too few answers come, or they contradict each other.
+            // Some interrogations give too few replies, or contradictory ones.
             let Some(fix) = reading.value.1 else { continue };
             let at = track.at(reading.time).world_from_body * seafix_geometry::Point::new(0.3, 0.0, -0.5);
             assert!((fix.at - at.coords).norm() < 5.0 * fix.sigma.norm());
-            // Three answers and the depth are enough, and say less than five.
+            // Three replies and the depth suffice, with a larger standard deviation than five replies.
             good += usize::from(fix.sigma.norm() < 0.3);
             fixes += 1;
         }
@@ -209,11 +210,11 @@ fn exact_ranges_report_the_place_that_asks() {
     for reading in SensorNavigation::new(&sensors, &[], &track, &scene, 20.0, (4, 0)).readings().lbl {
         let at = track.at(reading.time).world_from_body * seafix_geometry::Point::new(0.3, 0.0, -0.5);
         assert!((reading.value.1.unwrap().at - at.coords).norm() < 1e-6);
-        // The last answer comes from the farthest transponder.
+        // The last reply comes from the farthest transponder.
         let farthest = reading.value.0.0.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
         assert!((reading.arrival - reading.time - 2.0 * farthest / 1500.0).abs() < 1e-9);
     }
-    // Without transponders there is no LBL, whatever else is set.
+    // LBL without transponders is off, whatever its other settings.
     let none = Sensors { lbl: Lbl { transponders: Vec::new(), sigma: 9.0, ..sensors.lbl }, ..Sensors::default() };
     let said = |sensors: &Sensors| SensorNavigation::new(sensors, &[], &track, &scene, 20.0, (4, 0));
     assert_eq!(said(&none).readings(), said(&Sensors::default()).readings());
@@ -223,7 +224,7 @@ fn exact_ranges_report_the_place_that_asks() {
 #[test]
 fn transponders_that_give_no_position_are_refused() {
     let message = |transponders: Vec<[f64; 3]>| Lbl { transponders, ..Lbl::default() }.check().unwrap_err();
-    assert_eq!(message(vec![[0.0; 3]; 2]), "sensors.lbl.transponders = 2; give 3 to 8 places, or none");
+    assert_eq!(message(vec![[0.0; 3]; 2]), "sensors.lbl.transponders = 2; give 3 to 8 positions, or none");
     let twice = message(vec![[0.0; 3], [50.0, 0.0, 0.0], [0.0; 3]]);
     assert!(twice.starts_with("sensors.lbl.transponders[2] = ") && !twice.contains('\n'), "{twice}");
     assert!(message(vec![[f64::NAN; 3]; 3]).contains("= NaN; give a number"));

@@ -1,16 +1,18 @@
-//! A position from ranges to known places, and from the depth.
+//! Trilateration: a position from ranges to known places and a depth.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Steps of the fit, and the step that ends it (m).
+/// Maximum number of Levenberg–Marquardt steps.
 const STEPS: usize = 40;
+/// Step length that ends the fit (m).
 const STILL: f64 = 1e-9;
-/// A fit whose weighted squares exceed χ² of its degrees of freedom at 0.1 % has an echo in it.
+/// Limits of the weighted sum of squares: the 99.9 % quantiles of χ² for 0 to 5 degrees of freedom. A larger sum
+/// indicates an echo.
 const LIMITS: [f64; 6] = [0.0, 10.8, 13.8, 16.3, 18.5, 20.5];
-/// A direction in which a position is known worse than this (m) is not known.
+/// Standard deviation above which a direction counts as undetermined (m).
 const UNKNOWN: f64 = 1e3;
 
-/// A measured length with the standard deviation of its noise, and of what errs alike at the next time (m).
+/// A measured length with standard deviations of its independent and of its shared error (m).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Length {
     pub(super) value: f64,
@@ -24,7 +26,7 @@ impl Length {
     }
 }
 
-/// A position, the covariance of its noise, and of what errs alike in the next one (m²).
+/// A position with the covariances of its independent noise and of its shared error (m²).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Found {
     pub(super) at: Vector3<f64>,
@@ -32,11 +34,12 @@ pub(super) struct Found {
     pub(super) common: Matrix3<f64>,
 }
 
-/// The place (north, east, down) that fits ranges to places, and a depth, by least squares. With more than needed, ranges
-/// that contradict the others are left out, worst first; what stays contradictory, and too little, is no position.
+/// The least-squares position (north, east, down) from ranges and an optional depth.
 ///
-/// Two ranges and a depth fit two places, on either side of the line between: no position. Places at one depth have a
-/// mirror image below them: `start` says on which side the vehicle is.
+/// Ranges that contradict the others are excluded, worst first, while enough remain. The answer is `None` if a
+/// contradiction remains or if the measurements are too few. Two ranges and a depth fit two positions, one on each side
+/// of the baseline, hence `None`. Places at one depth have a mirror image below them; `start` selects the vehicle's
+/// side.
 pub(super) fn trilaterate(
     ranges: &[(Vector3<f64>, Length)],
     depth: Option<Length>,
@@ -52,7 +55,7 @@ pub(super) fn trilaterate(
         if free == 0 || cost <= LIMITS[free.min(LIMITS.len() - 1)] {
             return Some(found);
         }
-        // Leaving one out must leave something that could contradict.
+        // The rest must be redundant after an exclusion, or no contradiction could show.
         if free == 1 {
             return None;
         }
@@ -65,9 +68,9 @@ pub(super) fn trilaterate(
     }
 }
 
-/// The fit, and its weighted sum of squares.
+/// The fit and its weighted sum of squares.
 fn fit(ranges: &[(Vector3<f64>, Length)], depth: Option<Length>, start: Vector3<f64>) -> Option<(Found, f64)> {
-    // (direction, what is missing, σ, its common part) of each measurement at a place.
+    // Each row: direction, residual, measured length with its deviations.
     let rows = |at: &Vector3<f64>| -> Vec<(Vector3<f64>, f64, Length)> {
         let range = |(place, range): &(Vector3<f64>, Length)| {
             let offset = at - place;
@@ -138,7 +141,7 @@ mod tests {
             assert!((found.at - at).norm() < 1e-6, "{n}: {}", found.at);
         }
         assert_eq!(trilaterate(&received(&at, 1), depth, Vector3::zeros()), None);
-        // Seen to give the place on the wrong side where two were enough.
+        // Regression: two ranges once gave the position on the wrong side.
         assert_eq!(trilaterate(&received(&at, 2), depth, Vector3::zeros()), None);
     }
 
@@ -152,7 +155,8 @@ mod tests {
             let found = trilaterate(&ranges, depth, Vector3::new(0.0, 0.0, 20.0)).unwrap();
             assert!((found.at - at).norm() < 1e-6, "{echo}: {}", found.at);
         }
-        // Of three ranges and a depth one is too many, and nothing says which: no position instead of a false one.
+        // Three ranges and a depth have one redundant measurement, which cannot identify the echo: no position instead
+        // of a false one.
         let mut ranges = received(&at, 3);
         ranges[1].1.value += 4.0;
         assert_eq!(trilaterate(&ranges, depth, Vector3::zeros()), None);
@@ -163,7 +167,7 @@ mod tests {
         let ranges: Vec<_> = [0.0_f64, 40.0, 100.0]
             .map(|x| (Vector3::new(x, 0.0, 40.0), Length { value: 50.0, noise: 0.1, common: 0.0 }))
             .into();
-        // On the line itself nothing tells north from south.
+        // North and south of the line are indistinguishable.
         let depth = Some(Length { value: 40.0, noise: 0.02, common: 0.1 });
         let on_line: Vec<_> = ranges.iter().map(|(t, l)| (*t, Length { value: (t.x - 30.0).abs(), ..*l })).collect();
         assert_eq!(trilaterate(&on_line, depth, Vector3::new(20.0, 0.0, 40.0)), None);

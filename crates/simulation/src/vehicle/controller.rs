@@ -1,4 +1,4 @@
-//! The vehicle under control: a PID controller that follows the way.
+//! The controlled vehicle: a PID controller follows the route.
 
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
 use seafix_component::in_range;
@@ -13,11 +13,11 @@ use super::{
 };
 use crate::seabed::Seabed;
 
-/// The vehicles there are.
+/// The vehicle models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum VehicleKind {
-    /// No vehicle: the cameras go exactly the way.
+    /// An ideal carriage: the cameras follow the route exactly.
     Rail,
     /// A hovering vehicle of 200 kg with five thrusters.
     #[default]
@@ -26,18 +26,18 @@ pub enum VehicleKind {
     Bluerov2Heavy,
 }
 
-/// The vehicle and its controller: forces are proportional to the error of place and velocity and to the
-/// error's integral, each scaled by the vehicle's mass.
+/// The vehicle and its PID controller. Gains apply to position and velocity errors and are scaled by the vehicle's
+/// mass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vehicle {
-    /// Which vehicle.
+    /// The vehicle model.
     pub kind: VehicleKind,
-    /// Force for a metre of error, for each kilogram (1/s²).
+    /// Proportional gain: force per metre of error and kilogram (1/s²), from 0 to 10.
     pub proportional: f64,
-    /// Force for a metre per second of error, for each kilogram (1/s).
+    /// Derivative gain: force per metre per second of error and kilogram (1/s), from 0 to 10.
     pub derivative: f64,
-    /// Force for a metre·second of error, for each kilogram (1/s³).
+    /// Integral gain: force per metre·second of error and kilogram (1/s³), from 0 to 10.
     pub integral: f64,
 }
 
@@ -57,7 +57,7 @@ impl Vehicle {
         Ok(())
     }
 
-    /// Where it goes, and how far the water has carried what floats in it, both at the states' times.
+    /// Simulates the vehicle: its track, and the displacement of floating particles at the states' times.
     pub(crate) fn travel(
         &self,
         route: &PlannedRoute,
@@ -103,7 +103,7 @@ fn upright(heading: f64) -> UnitQuaternion<f64> {
     so3::exp(&(Vector3::z() * heading))
 }
 
-/// Exactly on the way, level.
+/// The state of an ideal vehicle exactly on the route, level.
 fn on_rails(goals: &[Goal], k: usize, camera: &Vector3<f64>) -> VehicleState {
     let goal = &goals[k];
     let turn = upright(goal.heading);
@@ -115,13 +115,13 @@ fn on_rails(goals: &[Goal], k: usize, camera: &Vector3<f64>) -> VehicleState {
     VehicleState { world_from_body, motion: Vector6::new(0.0, 0.0, rate, v.x, v.y, v.z) }
 }
 
-/// The vehicle with what its controller remembers.
+/// The vehicle and the state of its controller.
 struct Pilot {
     model: Model,
     allocation: nalgebra::DMatrix<f64>,
     gains: [f64; 3],
     motion: Motion,
-    /// Integral of the error of place (world) and of heading.
+    /// Integrals of the position error (world) and of the heading error.
     sum: Vector3<f64>,
     turned: f64,
     camera: Vector3<f64>,
@@ -149,7 +149,7 @@ impl Pilot {
         }
     }
 
-    /// The state over ground; (ω, v) in the order of this crate.
+    /// The state over ground; (ω, v) in this crate's order.
     fn state(&self, flow: &Vector3<f64>) -> VehicleState {
         let Motion { at, turn, nu, .. } = &self.motion;
         let v = nu.fixed_rows::<3>(0).into_owned() + turn.inverse() * flow;
@@ -164,7 +164,7 @@ impl Pilot {
         let heading = libm::atan2((turn * Vector3::x()).y, (turn * Vector3::x()).x);
         let error = goal.at - upright(goal.heading) * self.camera - self.motion.at;
         let slip = goal.velocity - turn * now.motion.fixed_rows::<3>(3).into_owned();
-        // The integral waits while the error is large: it is for what is steady.
+        // The integrator is frozen while the error is large (anti-windup).
         if error.norm() < 1.0 {
             self.sum += error * dt;
         }
@@ -173,12 +173,12 @@ impl Pilot {
         self.turned += if max_deviation.abs() < 0.5 { max_deviation * dt } else { 0.0 };
         let m = self.model.inertia_matrix().diagonal();
         let along = turn.inverse() * (error * p + slip * d + self.sum * i);
-        // What the drag of the wanted speed takes is given in advance.
+        // Feed-forward of the drag at the desired velocity.
         let through = turn.inverse() * (goal.velocity - flow);
         let ahead = |k: usize| (self.model.linear[k] + self.model.quadratic[k] * through[k].abs()) * through[k];
         let force = |k: usize| m[k] * along[k] + ahead(k);
         let yaw = m[5] * (2.0 * p * max_deviation + 1.6 * d * (rate - now.motion[2]) + i * self.turned);
-        // Pitch is held at zero; roll rights itself.
+        // Pitch is controlled to zero; roll is passively stable.
         let pitch = libm::asin((-(turn * Vector3::x()).z).clamp(-1.0, 1.0));
         let level = m[4] * (-2.0 * p * pitch - 1.6 * d * now.motion[1]);
         let wanted = DVector::from_column_slice(&[force(0), force(1), force(2), 0.0, level, yaw]);

@@ -8,25 +8,26 @@ use crate::stream::{Purpose, Stream};
 
 /// Von Kármán's constant.
 const KARMAN: f64 = 0.41;
-/// The height at which the current is given (m).
+/// The height above the seabed for which the current is given (m).
 const REFERENCE: f64 = 3.0;
 
-/// The current: a mean, slower near the bed by the law of the wall, and slow fluctuations.
+/// A current with a logarithmic mean profile and slow horizontal fluctuations.
 ///
-/// u(z) = u*/κ ln(z/z₀), scaled to `speed` 3 m above the bed. The fluctuation of each level axis is an
-/// Ornstein–Uhlenbeck process, x' = x e^(−dt/τ) + σ √(1 − e^(−2dt/τ)) n: exact for any step.
+/// The mean follows the law of the wall, u(z) = u*/κ ln(z/z₀), scaled to `speed` 3 m above the seabed. The fluctuation
+/// of each horizontal axis is an Ornstein–Uhlenbeck process, x' = x e^(−dt/τ) + σ √(1 − e^(−2dt/τ)) n, exact for any
+/// step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Current {
-    /// Its mean speed 3 m above the bed (m/s).
+    /// Mean speed 3 m above the seabed (m/s), from 0 to 5.
     pub speed: f64,
-    /// Where it flows to, from north to east (degrees).
+    /// Direction of the flow, from north over east (degrees), from −360 to 360.
     pub towards_deg: f64,
-    /// The roughness height z₀ (m); 0 is the same current at all heights.
+    /// Roughness height z₀ (m), from 0 to 0.2; 0 gives the same current at all heights.
     pub roughness: f64,
-    /// Standard deviation of the fluctuation, each level axis (m/s).
+    /// Standard deviation of the fluctuation on each horizontal axis (m/s), from 0 to 2.
     pub sigma: f64,
-    /// Its time constant τ (s).
+    /// Time constant τ of the fluctuation (s), from 0.001 to 1 000 000.
     pub tau: f64,
 }
 
@@ -48,7 +49,7 @@ impl Current {
         within("tau", self.tau, 1e-3, 1e6)
     }
 
-    /// The velocity (north, east, down) this high above the bed, with the fluctuation as it is.
+    /// The velocity (north, east, down) at a height above the seabed, with the given fluctuation.
     pub(crate) fn velocity(&self, height: f64, fluctuation: &Vector3<f64>) -> Vector3<f64> {
         let fraction = if self.roughness > 0.0 {
             let log = |z: f64| libm::log(z.max(self.roughness * 1.001) / self.roughness) / KARMAN;
@@ -61,7 +62,7 @@ impl Current {
     }
 }
 
-/// The fluctuation, step by step.
+/// The state of the fluctuation.
 #[derive(Debug)]
 pub(crate) struct Fluctuation {
     stream: Stream,
@@ -92,7 +93,7 @@ mod tests {
 
     #[test]
     fn the_variance_does_not_depend_on_the_step() {
-        // Seen to fail with noise of one size for all steps.
+        // Regression: noise of one size for all steps fails this test.
         let current = Current { sigma: 0.1, tau: 2.0, ..Current::default() };
         for dt in [0.1, 1.0, 10.0] {
             let mut process = Fluctuation::new(&current, 3, 0);
@@ -105,7 +106,7 @@ mod tests {
                 together += before.dot(&process.now) / 2.0;
             }
             let variance = squares / f64::from(n);
-            // About n dt/(2 τ) independent draws: 3 % at the smallest step.
+            // About n dt/(2 τ) independent samples: 3 % at the smallest step.
             assert!((variance / 0.01 - 1.0).abs() < 0.09, "{dt}: {variance}");
             assert!((together / squares - libm::exp(-dt / 2.0)).abs() < 0.02, "{dt}");
         }
@@ -116,7 +117,7 @@ mod tests {
         let current = Current { speed: 0.4, towards_deg: 90.0, ..Current::default() };
         let at = |height| current.velocity(height, &Vector3::zeros()).y;
         assert!((at(3.0) - 0.4).abs() < 1e-12 && at(0.5) < at(1.0) && at(1.0) < 0.4);
-        // The law of the wall: equal ratios of height, equal differences of speed.
+        // Law of the wall: equal ratios of height give equal differences of speed.
         assert!(((at(2.0) - at(1.0)) - (at(1.0) - at(0.5))).abs() < 1e-12);
         assert_eq!(Current { roughness: 0.0, ..current }.velocity(0.1, &Vector3::zeros()).y, 0.4);
     }

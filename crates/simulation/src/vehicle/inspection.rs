@@ -1,5 +1,6 @@
-//! The way of an inspection: each point of interest is looked at from a stand-off, from as near to its normal as the cameras,
-//! which look where they are mounted, and the bodies around it let them.
+//! The route of an inspection, with one stand-off view of each point of interest.
+//!
+//! Each view is as near to the point's normal as the mounted cameras and the surrounding bodies allow.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Body, Camera, Point, StereoRig, Transform, World, so3};
@@ -8,23 +9,24 @@ use seafix_referencing::BoundingBox;
 use super::route::{Goal, PlannedRoute, ROUNDING, Route};
 use crate::scene::Scene;
 
-/// No view is farther from a point's normal than this (degrees).
+/// Maximum angle between a view and the point's normal (degrees).
 const OBLIQUE_DEG: i32 = 60;
-/// Views are sought on rings about the normal, so far apart (degrees), and at so many places of each.
+/// Angular step of the rings about the normal on which views are sought (degrees).
 const RING_DEG: i32 = 5;
+/// Number of places on each ring.
 const PLACES: i32 = 24;
-/// Headings that are tried at each place.
+/// Number of headings tried at each place.
 const HEADINGS: i32 = 4;
-/// A point that is looked at is this share of the image's shorter side away from its border.
+/// Minimum distance of the inspected point from the image border, as a fraction of the shorter side.
 const BORDER: f64 = 0.1;
-/// So much of the line of sight before the point may be hidden (m): the point's own relief.
+/// Length of the last part of a line of sight that the point's own relief may occlude (m).
 const RELIEF: f64 = 0.01;
-/// Between two places of a leg that are held against the bodies (m).
+/// Step of the collision check along a segment (m).
 const STEP: f64 = 0.1;
-/// How far above the altitude the vehicle may have to go from one view to the next (m).
+/// Heights above the altitude that are tried on the path between two views (m).
 const RAISED: [f64; 5] = [0.0, 1.0, 2.0, 4.0, 8.0];
 
-/// What looks at the points: the cameras as they are mounted, and what else must not touch anything.
+/// The cameras as mounted, and the parts that need clearance.
 #[derive(Debug, Clone)]
 pub(crate) struct Looker<'a> {
     pub(crate) rig: &'a StereoRig,
@@ -33,7 +35,7 @@ pub(crate) struct Looker<'a> {
     pub(crate) parts: Vec<Vector3<f64>>,
 }
 
-/// Where the left camera is, and how the vehicle, which is level, is turned (rad from north to east).
+/// The left camera's position and the heading of the level vehicle (rad, from north over east).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Stand {
     at: Vector3<f64>,
@@ -42,13 +44,13 @@ struct Stand {
 
 /// A point of interest in the world.
 struct Wanted {
-    /// Its object and its name.
+    /// Names of the object and of the point.
     name: String,
     at: Vector3<f64>,
     normal: Vector3<f64>,
 }
 
-/// How many of the places about a point were refused, and why.
+/// Numbers of rejected places about a point, by cause.
 #[derive(Debug, Clone, Copy, Default)]
 struct Refused {
     touching: usize,
@@ -57,11 +59,11 @@ struct Refused {
     under: usize,
 }
 
-/// The way along the points of interest of all objects, or of one. `scene` is the site as it was built: what a vehicle knows
-/// of it when it plans.
+/// Plans the route along the points of interest of all objects, or of one. `scene` is the site as built, which is the
+/// planner's knowledge.
 ///
-/// The views are gone in the order that is short, by nearest neighbours and exchanges; from one to the next straight where
-/// that keeps clear, else up to the altitude of the route, over, and down again.
+/// Nearest neighbour and 2-opt order the views. The vehicle moves from one view to the next straight if that segment is
+/// clear, or else climbs to the route's altitude, crosses and descends.
 pub(super) fn planned(
     route: &Route,
     only: Option<usize>,
@@ -73,7 +75,7 @@ pub(super) fn planned(
     if wanted.is_empty() {
         let whose = only.map_or_else(|| "the site".to_owned(), |o| format!("`{}`", scene.nominal.objects[o].id));
         return Err(format!(
-            "route.kind = `inspection`; {whose} has no point to inspect: give it an [[object.interest]] in the site file"
+            "route.kind = `inspection`; {whose} has no point of interest; add an [[object.interest]] to the site file"
         ));
     }
     let views: Vec<Stand> = wanted.iter().map(|point| ground.view(point)).collect::<Result<_, _>>()?;
@@ -85,7 +87,7 @@ pub(super) fn planned(
         let names = [pair[0], pair[1]].map(|k| &wanted[k].name);
         for corner in ground.segment(a, b, names)? {
             planned.go(corner);
-            // At rest a corner is not cut.
+            // Corners are not rounded at a stop.
             planned.rest(2.0 * ROUNDING);
         }
         planned.rest(route.hold * route.speed);
@@ -93,7 +95,7 @@ pub(super) fn planned(
     Ok(planned.finish(route.speed))
 }
 
-/// The points of interest, in the world as it was built; one without a normal is looked at from above.
+/// The points of interest in the world, as built; a point without a normal is viewed from above.
 fn wanted(only: Option<usize>, scene: &Scene) -> Vec<Wanted> {
     let objects = scene.nominal.objects.iter().zip(&scene.world_from_object).enumerate();
     let chosen = objects.filter(|(o, _)| only.is_none_or(|one| one == *o));
@@ -109,13 +111,13 @@ fn wanted(only: Option<usize>, scene: &Scene) -> Vec<Wanted> {
     points.map(of).collect()
 }
 
-/// What stands there, and how near one may come.
+/// The scene for the collision check, with the required clearance.
 struct Ground<'a> {
     route: &'a Route,
     scene: &'a Scene,
     looker: &'a Looker<'a>,
     gates: Vec<BoundingBox<World>>,
-    /// The depth of the altitude (m).
+    /// Depth of the route's altitude (m).
     cruise: f64,
 }
 
@@ -129,12 +131,12 @@ impl<'a> Ground<'a> {
         Self { route, scene, looker, gates, cruise: scene.seabed.depth() - route.altitude }
     }
 
-    /// world_from_camera of a stand, its turn.
+    /// The camera's attitude at a stand.
     fn turned(&self, stand: &Stand) -> UnitQuaternion<f64> {
         so3::exp(&(Vector3::z() * stand.heading)) * self.looker.body_from_camera.rotation()
     }
 
-    /// Whether every camera and lamp keeps clear of the shells, the bodies and the bed.
+    /// Whether every camera and lamp keeps its clearance from bounding boxes, bodies and seabed.
     fn clear(&self, stand: &Stand) -> bool {
         let (turn, clearance) = (self.turned(stand), self.route.clearance);
         self.looker.parts.iter().all(|part| {
@@ -145,7 +147,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// Whether all of a straight leg from rest to rest is clear, the vehicle turning as it will.
+    /// Whether a straight segment from stop to stop is clear at every heading of the vehicle.
     fn clear_along(&self, a: &Stand, b: &Stand) -> bool {
         let mut segment = Along::new(*a, 2.0 * ROUNDING);
         segment.go(*b);
@@ -181,14 +183,15 @@ impl<'a> Ground<'a> {
         }
         let Refused { touching, outside, hidden, under } = refused;
         Err(format!(
-            "route: no clear view of `{}` at north {:.2}, east {:.2}, depth {:.2} m from {} m within {OBLIQUE_DEG}° of its normal: \
-             of the places around it {touching} are within {} m of a shell, a body or the bed, from {outside} it is out of the \
-             images, from {hidden} hidden, {under} have no free way up; change route.stand-off, route.clearance or rig.ahead-deg",
+            "route: no clear view of `{}` at north {:.2}, east {:.2}, depth {:.2} m from {} m within \
+             {OBLIQUE_DEG}° of its normal: {touching} viewpoints are within {} m of a bounding box, a body or the \
+             seabed, the point is outside of the images from {outside} and occluded from {hidden}, {under} have no \
+             clear path upward; change route.stand-off, route.clearance or rig.ahead-deg",
             point.name, point.at.x, point.at.y, point.at.z, self.route.stand_off, self.route.clearance
         ))
     }
 
-    /// The best heading of a view from the direction `from`: how far from the middle of the view the point is then (rad).
+    /// The best view from the direction `from`, with the point's angle to the optical axis (rad).
     fn stand(&self, point: &Wanted, from: &Vector3<f64>, refused: &mut Refused) -> Option<(f64, Stand)> {
         let at = point.at + from * self.route.stand_off;
         let ahead = -from.xy();
@@ -232,12 +235,12 @@ impl<'a> Ground<'a> {
         seeing.first().copied()
     }
 
-    /// Straight above a place, at a depth; the place itself where it is higher.
+    /// The stand straight above at a depth, or the stand itself if it is higher.
     fn above(&self, stand: &Stand, depth: f64) -> Stand {
         Stand { at: Vector3::new(stand.at.x, stand.at.y, depth.min(stand.at.z)), ..*stand }
     }
 
-    /// The places from one view to the next, the last included.
+    /// The vertices from one view to the next, the last included.
     fn segment(&self, a: &Stand, b: &Stand, names: [&String; 2]) -> Result<Vec<Stand>, String> {
         if self.clear_along(a, b) {
             return Ok(vec![*b]);
@@ -250,8 +253,8 @@ impl<'a> Ground<'a> {
             }
         }
         Err(format!(
-            "route: no clear way from `{}` to `{}`, neither straight nor at {} m above the bed or up to {} m higher; raise \
-             route.altitude or lower route.clearance",
+            "route: no clear path from `{}` to `{}`, neither straight nor at {} m above the seabed or up to {} m \
+             higher; raise route.altitude or lower route.clearance",
             names[0],
             names[1],
             self.route.altitude,
@@ -260,13 +263,13 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Some unit vector across `normal`.
+/// A unit vector perpendicular to `normal`.
 fn across_of(normal: &Vector3<f64>) -> Vector3<f64> {
     let axis = if normal.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
     normal.cross(&axis).normalize()
 }
 
-/// An order in which the way through the views is short: by nearest neighbours, then by turning parts round while that helps.
+/// An order of the views with a short path: nearest neighbour, then 2-opt.
 fn short(views: &[Stand]) -> Vec<usize> {
     let n = views.len();
     let far = |i: usize, k: usize| (views[i].at - views[k].at).norm();
@@ -276,7 +279,7 @@ fn short(views: &[Stand]) -> Vec<usize> {
         let left = (0..n).filter(|k| !order.contains(k));
         order.extend(left.min_by(|&i, &k| far(last, i).total_cmp(&far(last, k))));
     }
-    // A part i..=k turned round changes the two legs at its ends; an end of the way has none.
+    // Reversing the part i..=k exchanges the two segments at its ends; an end of the path has none.
     loop {
         let mut better = false;
         for i in 0..n {
@@ -299,7 +302,7 @@ fn short(views: &[Stand]) -> Vec<usize> {
     }
 }
 
-/// A way in the making.
+/// A route under construction.
 struct Along {
     places: Vec<Vector3<f64>>,
     headings: Vec<f64>,
@@ -307,7 +310,7 @@ struct Along {
 }
 
 impl Along {
-    /// From a view, with a rest there.
+    /// Starts at a view with a stop.
     fn new(start: Stand, rest: f64) -> Self {
         let mut planned = Self { places: vec![start.at], headings: vec![start.heading], lengths: vec![0.0] };
         planned.rest(rest);
@@ -320,7 +323,7 @@ impl Along {
         self.lengths.push(self.lengths[self.lengths.len() - 1] + length);
     }
 
-    /// On to a place; headings go on the shorter way round.
+    /// Moves to a place; headings turn the shorter way.
     fn go(&mut self, to: Stand) {
         let (at, heading) = (self.places[self.places.len() - 1], self.headings[self.headings.len() - 1]);
         let turn = libm::remainder(to.heading - heading, std::f64::consts::TAU);
@@ -342,7 +345,7 @@ mod tests {
 
     #[test]
     fn the_order_is_short() {
-        // Places of a line, mixed up: the way through them is the line, from one end to the other.
+        // Shuffled places of a line: the path through them is the line, from one end to the other.
         let stand = |x: f64| Stand { at: Vector3::new(x, 0.0, 0.0), heading: 0.0 };
         let places = [3.0, 0.0, 5.0, 1.0, 4.0, 2.0];
         let order = short(&places.map(stand));

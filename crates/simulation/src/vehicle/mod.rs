@@ -1,4 +1,4 @@
-//! The vehicle: where it is meant to go, what moves it, and where it goes.
+//! The vehicle: its route, its dynamics, its controller and its trajectory.
 
 mod controller;
 mod current;

@@ -1,4 +1,4 @@
-//! How a vehicle moves in water.
+//! Vehicle dynamics in water.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Quaternion, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::so3::skew;
@@ -6,7 +6,7 @@ use seafix_geometry::so3::skew;
 /// Acceleration of gravity (m/s²).
 const GRAVITY: f64 = 9.81;
 
-/// A thruster: where it is, whereto it pushes, how much at most (N).
+/// A thruster: position, direction, maximum thrust (N).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Thruster {
     pub(crate) at: Vector3<f64>,
@@ -14,29 +14,31 @@ pub(crate) struct Thruster {
     pub(crate) max: f64,
 }
 
-/// A rigid vehicle, neutrally buoyant, its centre of buoyancy above that of gravity, which is the origin
-/// of the body frame. (Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, 2021.)
+/// A rigid, neutrally buoyant vehicle in six degrees of freedom.
 ///
-/// M ν̇ + C(ν) ν + D(ν) ν + g(η) = τ with ν the velocity relative to the water, (v, ω) in Fossen's order.
+/// The centre of gravity is the origin of the body frame; the centre of buoyancy lies above it. The equation of motion
+/// is Fossen's (*Handbook of Marine Craft Hydrodynamics and Motion Control*, 2021), M ν̇ + C(ν) ν + D(ν) ν + g(η) = τ,
+/// with ν the velocity relative to the water, (v, ω) in Fossen's order.
 #[derive(Debug, Clone)]
 pub(crate) struct Model {
-    /// Mass (kg) and moments of inertia (kg m²).
+    /// Mass (kg).
     pub(crate) mass: f64,
+    /// Principal moments of inertia (kg m²).
     pub(crate) inertia: Vector3<f64>,
     /// Added mass of surge, sway, heave (kg), roll, pitch, yaw (kg m²).
     pub(crate) added: Vector6<f64>,
-    /// Linear and quadratic damping of the same.
+    /// Linear damping of each degree of freedom.
     pub(crate) linear: Vector6<f64>,
+    /// Quadratic damping of each degree of freedom.
     pub(crate) quadratic: Vector6<f64>,
-    /// Height of the centre of buoyancy above that of gravity (m).
+    /// Height of the centre of buoyancy above the centre of gravity (m).
     pub(crate) righting: f64,
     pub(crate) thrusters: Vec<Thruster>,
     /// Time constant of the thrusters (s).
     pub(crate) lag: f64,
 }
 
-/// The vehicle's motion: place and attitude in the world, velocity relative to the water and rotation in
-/// the body frame, and the forces of the thrusters (N).
+/// The vehicle's state: pose, velocity relative to the water and angular velocity in the body frame, thrusts (N).
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Motion {
     pub(crate) at: Vector3<f64>,
@@ -51,8 +53,10 @@ fn vector(x: f64, y: f64, z: f64, k: f64, m: f64, n: f64) -> Vector6<f64> {
 }
 
 impl Model {
-    /// A hovering vehicle of 200 kg with five thrusters: two of surge, one of sway, two of heave, which also
-    /// turn it about yaw and pitch; roll rights itself. (Scaled after Girona500.)
+    /// A hovering vehicle of 200 kg, scaled after Girona500.
+    ///
+    /// Two of its five thrusters act in surge, one in sway and two in heave; they also control yaw and pitch. Roll is
+    /// passively stable.
     pub(crate) fn hover_200() -> Self {
         let thruster = |at: [f64; 3], along: [f64; 3], max| Thruster { at: at.into(), along: along.into(), max };
         Self {
@@ -73,8 +77,8 @@ impl Model {
         }
     }
 
-    /// BlueROV2 Heavy. (von Benzon et al., J. Mar. Sci. Eng. 10:1898, 2022, with the signs and the third
-    /// thruster's angle put right; a T200 pushes 30 N here.)
+    /// BlueROV2 Heavy after von Benzon et al., J. Mar. Sci. Eng. 10:1898, 2022, with corrected signs and a corrected
+    /// angle of the third thruster. The thrust of a T200 is limited to 30 N.
     pub(crate) fn bluerov2_heavy() -> Self {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let flat = |x: f64, y: f64, dx: f64, dy: f64| Thruster {
@@ -104,14 +108,14 @@ impl Model {
         }
     }
 
-    /// M, rigid body and added mass.
+    /// M, the inertia matrix of rigid body and added mass.
     pub(crate) fn inertia_matrix(&self) -> Matrix6<f64> {
         let i = self.inertia;
         let rigid = vector(self.mass, self.mass, self.mass, i.x, i.y, i.z);
         Matrix6::from_diagonal(&(rigid + self.added))
     }
 
-    /// C(ν), skew-symmetric: made of M ν, so that it does no work.
+    /// C(ν), the Coriolis and centripetal matrix; skew-symmetric, so that it does no work.
     pub(crate) fn coriolis(&self, nu: &Vector6<f64>) -> Matrix6<f64> {
         let p = self.inertia_matrix() * nu;
         let (linear, angular) = (skew(&p.fixed_rows::<3>(0).into_owned()), skew(&p.fixed_rows::<3>(3).into_owned()));
@@ -122,20 +126,20 @@ impl Model {
         c
     }
 
-    /// −D(ν) ν.
+    /// −D(ν) ν, the damping force.
     fn drag(&self, nu: &Vector6<f64>) -> Vector6<f64> {
         Vector6::from_fn(|k, _| -(self.linear[k] + self.quadratic[k] * nu[k].abs()) * nu[k])
     }
 
-    /// −g(η): weight and buoyancy cancel; their lever rights the vehicle.
+    /// −g(η), the restoring moment; weight and buoyancy cancel.
     fn restoring(&self, turn: &UnitQuaternion<f64>) -> Vector6<f64> {
-        // Buoyancy, −z of the world, at −righting on the body's z.
+        // Buoyancy acts along −z of the world, at −righting on the body's z axis.
         let force = turn.inverse() * Vector3::new(0.0, 0.0, -self.mass * GRAVITY);
         let moment = Vector3::new(0.0, 0.0, -self.righting).cross(&force);
         vector(0.0, 0.0, 0.0, moment.x, moment.y, moment.z)
     }
 
-    /// The matrix B from thrusts (N) to force and moment.
+    /// The thruster configuration matrix B from thrusts (N) to force and moment.
     pub(crate) fn thruster_matrix(&self) -> DMatrix<f64> {
         DMatrix::from_fn(6, self.thrusters.len(), |row, column| {
             let thruster = &self.thrusters[column];
@@ -143,12 +147,12 @@ impl Model {
         })
     }
 
-    /// B⁺, the least thrusts for a wanted force and moment, as far as the thrusters can.
+    /// B⁺, the allocation: minimum-norm thrusts for a desired force and moment.
     pub(crate) fn allocation(&self) -> DMatrix<f64> {
         self.thruster_matrix().pseudo_inverse(1e-6).unwrap_or_else(|_| DMatrix::zeros(self.thrusters.len(), 6))
     }
 
-    /// Force and moment of thrusts.
+    /// Force and moment of the thrusts.
     fn push(&self, thrusts: &[f64]) -> Vector6<f64> {
         let mut sum = Vector6::zeros();
         for (thruster, thrust) in self.thrusters.iter().zip(thrusts) {
@@ -159,13 +163,13 @@ impl Model {
         sum
     }
 
-    /// Thrusts as commanded, no more than each can; all scaled alike, so that the direction stays.
+    /// Thrusts after saturation; all are scaled alike, so that the direction is kept.
     pub(crate) fn saturated(&self, wanted: &DVector<f64>) -> Vec<f64> {
         let worst = wanted.iter().zip(&self.thrusters).map(|(w, t)| w.abs() / t.max).fold(1.0, f64::max);
         wanted.iter().map(|w| w / worst).collect()
     }
 
-    /// ν̇ of a motion.
+    /// ν̇, the acceleration in a state.
     fn acceleration(&self, motion: &Motion) -> Vector6<f64> {
         let forces = self.push(&motion.thrusts) + self.drag(&motion.nu) + self.restoring(&motion.turn)
             - self.coriolis(&motion.nu) * motion.nu;
@@ -173,13 +177,14 @@ impl Model {
         forces.component_div(&m)
     }
 
-    /// The motion after `dt`, in water that flows with `current`; fourth order Runge–Kutta, the thrusts
-    /// following the commands with their lag.
+    /// The state after `dt` in water that flows with `current`: fourth-order Runge–Kutta, with first-order thruster
+    /// lag.
     pub(crate) fn step(&self, motion: &Motion, commands: &[f64], current: &Vector3<f64>, dt: f64) -> Motion {
         let keep = if self.lag > 0.0 { libm::exp(-dt / self.lag) } else { 0.0 };
         let thrusts: Vec<f64> = motion.thrusts.iter().zip(commands).map(|(t, c)| c + (t - c) * keep).collect();
         let from = Motion { thrusts, ..motion.clone() };
-        // The attitude as four numbers, q̇ = ½ q (0, ω): sums of rotation vectors would be of second order.
+        // The attitude is integrated as a quaternion, q̇ = ½ q (0, ω); sums of rotation vectors would be of second
+        // order.
         let slope = |m: &Motion| {
             let w = m.nu.fixed_rows::<3>(3).into_owned();
             let turning = m.turn.quaternion() * Quaternion::from_imag(w) * 0.5;
@@ -203,7 +208,7 @@ impl Model {
         moved(&mean, dt)
     }
 
-    /// Kinetic energy, with that of the added mass, and that of the righting lever (J).
+    /// Kinetic energy with that of the added mass, plus the potential energy of the righting lever (J).
     #[cfg(test)]
     pub(crate) fn energy(&self, motion: &Motion) -> f64 {
         let up = motion.turn * Vector3::z();
@@ -233,12 +238,12 @@ mod tests {
 
     #[test]
     fn coriolis_does_no_work_and_allocation_inverts_the_thrusters() {
-        // Seen to fail with the sign of one block of C(ν) turned.
+        // Regression: a wrong sign of one block of C(ν) fails this test.
         for model in [Model::hover_200(), Model::bluerov2_heavy()] {
             let nu = vector(0.4, -0.3, 0.2, 0.5, -0.1, 0.7);
             let c = model.coriolis(&nu);
             assert!((c + c.transpose()).amax() < 1e-12 && nu.dot(&(c * nu)).abs() < 1e-12);
-            // B B⁺ is the identity on all that the thrusters can do: all but roll of the larger vehicle.
+            // B B⁺ is the identity on the controllable directions: all but roll of the larger vehicle.
             let both = model.thruster_matrix() * model.allocation();
             for k in [0, 1, 2, 4, 5] {
                 for j in [0, 1, 2, 4, 5] {
@@ -261,7 +266,7 @@ mod tests {
             energy = now;
         }
         let current = Vector3::new(0.2, 0.1, 0.0);
-        // In the water's frame it was moving against the current; in the end it rests in it.
+        // The vehicle first moves against the current relative to the water, and ends at rest in it.
         let anchored = Motion { nu: vector(-0.2, -0.1, 0.0, 0.0, 0.0, 0.0), ..still(&model) };
         let drifting = run(&model, anchored, &off, current, 0.05, 400.0);
         assert!(drifting.nu.norm() < 1e-6);
@@ -269,11 +274,11 @@ mod tests {
 
     #[test]
     fn terminal_speed_balances_thrust_and_drag() {
-        // Seen to fail with a quadratic drag 5 % too high.
+        // Regression: a quadratic drag 5 % too high fails this test.
         let model = Model::bluerov2_heavy();
         let cosine = std::f64::consts::FRAC_1_SQRT_2;
         let forward = [30.0, 30.0, -30.0, -30.0, 0.0, 0.0, 0.0, 0.0];
-        // Held level, as its controller would: only surge is looked at.
+        // The vehicle is held level as by its controller; only surge matters.
         let level = Model { righting: 5.0, ..model };
         let u = run(&level, still(&level), &forward, Vector3::zeros(), 0.01, 60.0).nu[0];
         let force = 4.0 * 30.0 * cosine;
@@ -284,23 +289,23 @@ mod tests {
     fn speed_and_energy_do_not_depend_on_the_step() {
         let model = Model::hover_200();
         let push = [60.0, 55.0, 10.0, -10.0, 5.0];
-        // The thrusters push already: their lag is followed step by step, to first order.
+        // The thrusters already push; their lag is integrated to first order.
         let begin = Motion { nu: vector(0.8, -0.5, 0.3, 0.2, 0.3, -0.5), thrusts: push.to_vec(), ..still(&model) };
         let after = |dt, time| run(&model, begin.clone(), &push, Vector3::new(0.1, 0.0, 0.0), dt, time);
         let (fine, coarse) = (after(0.005, 8.0), after(0.04, 8.0));
         let energy = |motion: &Motion| model.energy(motion) - model.energy(&still(&model));
         assert!((energy(&coarse) / energy(&fine) - 1.0).abs() < 1e-5, "{} {}", energy(&coarse), energy(&fine));
-        // Terminal speed of a steady push straight ahead.
+        // Terminal speed under steady forward thrust.
         let ahead = |dt| run(&model, still(&model), &[60.0, 60.0, 0.0, 0.0, 0.0], Vector3::zeros(), dt, 120.0);
         let (slow, quick) = (ahead(0.01), ahead(0.08));
         assert!((slow.nu - quick.nu).norm() < 1e-9 * slow.nu.norm() && slow.nu[0] > 0.5, "{} {}", slow.nu, quick.nu);
-        // The attitude stays a rotation.
+        // The attitude remains a unit quaternion.
         assert!((coarse.turn.quaternion().norm() - 1.0).abs() < 1e-14);
     }
 
     #[test]
     fn it_rocks_with_the_period_of_its_righting_lever() {
-        // Seen to fail with a lever 5 % too long.
+        // Regression: a lever 5 % too long fails this test.
         let free = Model { linear: Vector6::zeros(), quadratic: Vector6::zeros(), ..Model::hover_200() };
         let tilted = Motion { turn: seafix_geometry::so3::exp(&(Vector3::x() * 0.01)), ..still(&free) };
         let period = std::f64::consts::TAU * ((20.0 + 10.0) / (200.0 * GRAVITY * 0.04)).sqrt();

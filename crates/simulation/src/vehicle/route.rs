@@ -1,4 +1,4 @@
-//! Where the vehicle is meant to go: waypoints, and the usual ways over a site.
+//! The planned route: waypoints and the standard survey patterns.
 
 use nalgebra::{Vector2, Vector3};
 use seafix_component::in_range;
@@ -7,55 +7,57 @@ use serde::{Deserialize, Serialize};
 use super::{Looker, inspection};
 use crate::scene::Scene;
 
-/// Half of the stretch over which corners of the way are rounded (m).
+/// Half length of the rounding of a corner (m).
 pub(super) const ROUNDING: f64 = 0.8;
-/// Samples of that stretch.
+/// Number of samples of that rounding.
 const SAMPLES: i32 = 16;
 
-/// The kinds of way.
+/// The kinds of route.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RouteKind {
-    /// Over one object after the other and back again until `length` is reached: the paper's 200 m.
+    /// A tour over all objects, back and forth until `length` is reached; the paper's 200 m path.
     #[default]
     Tour,
-    /// Parallel lines over the whole site, `spacing` apart.
+    /// Parallel lines over the complete site, `spacing` apart.
     Lawnmower,
-    /// Around `object` at `radius`, looking at it.
+    /// A circle of `radius` around `object`, with the heading towards it.
     Orbit,
-    /// From `length` away over `object`, sinking from twice the altitude.
+    /// A descent to `object` over `length`, from twice the altitude.
     Approach,
-    /// Through `waypoints`.
+    /// The polyline through `waypoints`.
     Waypoints,
-    /// To a view of each point of interest of the site, or of `object`, from `stand-off`, with a rest at each.
+    /// A stop at a view of each point of interest, from `stand-off`.
     Inspection,
 }
 
-/// Where the vehicle is meant to go.
+/// The planned route.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Route {
-    /// The kind of way.
+    /// The kind of route.
     pub kind: RouteKind,
-    /// Height of the cameras above the mean bed (m); on an inspection between views that no straight way joins.
+    /// Height of the cameras above the mean seabed (m), from 0.3 to 100. An inspection uses it between views that no
+    /// straight line joins.
     pub altitude: f64,
-    /// Speed over ground (m/s).
+    /// Speed over ground (m/s), from 0 to 5. The default lies in the paper's range of 0.2 to 0.5 m/s.
     pub speed: f64,
-    /// Length of a tour, or of an approach (m).
+    /// Length of a tour or of an approach (m), from 0 to 100 000. The default is the paper's.
     pub length: f64,
-    /// Between the lines of a lawnmower (m).
+    /// Distance between the lines of a lawnmower (m), from 0.2 to 100.
     pub spacing: f64,
-    /// Radius of an orbit (m).
+    /// Radius of an orbit (m), from 0.2 to 100.
     pub radius: f64,
-    /// The object of an orbit or approach, empty is the site's own; of an inspection, empty is all.
+    /// The object of an orbit, approach or inspection. An empty name selects the site's own object, or all objects of
+    /// an inspection.
     pub object: String,
-    /// From a point of interest to the left camera that looks at it (m).
+    /// Distance from a point of interest to the left camera (m), from 0.2 to 100.
     pub stand_off: f64,
-    /// How far an inspection keeps from the objects' shells, and from all else (m).
+    /// Minimum distance of an inspection from bounding boxes and surfaces (m), from 0 to 100.
     pub clearance: f64,
-    /// Rest at each view (s).
+    /// Duration of the stop at each view of an inspection (s), from 0 to 600.
     pub hold: f64,
-    /// North, east, height above the mean bed (m), one after the other.
+    /// Vertices of a `waypoints` route: north, east, height above the mean seabed (m).
     pub waypoints: Vec<[f64; 3]>,
 }
 
@@ -93,26 +95,26 @@ impl Route {
         for (k, point) in self.waypoints.iter().enumerate() {
             let fine = point.iter().all(|x| x.abs() < 1e5) && point[2] > 0.0;
             let name = format!("route.waypoints[{k}]");
-            in_range(fine, &name, format!("{point:?}"), "north, east and a height above the bed")?;
+            in_range(fine, &name, format!("{point:?}"), "north, east and a positive height above the seabed")?;
         }
         let count = self.waypoints.len();
         in_range(self.kind != RouteKind::Waypoints || count > 0, "route.waypoints", count, "one waypoint or more")
     }
 }
 
-/// A way in the world: a line through places, with a place to look at or the way ahead as the heading.
+/// A planned route: a polyline with headings, or with the direction of motion or a place to look at as the heading.
 #[derive(Debug, Clone)]
 pub(crate) struct PlannedRoute {
     pub(super) places: Vec<Vector3<f64>>,
-    /// Length of the way up to each place; between two that are one, of a rest.
+    /// Path length up to each vertex; two equal vertices enclose a stop, as a length.
     pub(super) lengths: Vec<f64>,
-    /// The heading at each place, none jumping by more than half a turn; empty where places do not say.
+    /// The unwrapped heading at each vertex; empty where the vertices do not state any.
     pub(super) headings: Vec<f64>,
     pub(super) look_at: Option<Vector2<f64>>,
     pub(super) speed: f64,
 }
 
-/// Where the vehicle should be, and how it should move.
+/// The desired position, velocity and heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Goal {
     pub(crate) at: Vector3<f64>,
@@ -121,7 +123,7 @@ pub(crate) struct Goal {
 }
 
 impl PlannedRoute {
-    /// The way over a field, by the cameras and lamps of `looker`.
+    /// Plans the route over a scene with the cameras and lamps of `looker`.
     pub(crate) fn new(route: &Route, scene: &Scene, looker: &Looker<'_>) -> Result<Self, String> {
         let depth = scene.seabed.depth();
         let over = |p: Vector2<f64>, height: f64| Vector3::new(p.x, p.y, depth - height);
@@ -171,13 +173,13 @@ impl PlannedRoute {
         Self { places, lengths, headings: Vec::new(), look_at, speed }
     }
 
-    /// The place after this length of the way.
+    /// The position at this path length.
     fn place(&self, s: f64) -> Vector3<f64> {
         let (k, t) = self.between(s);
         if t == 0.0 { self.places[k] } else { self.places[k] + (self.places[k + 1] - self.places[k]) * t }
     }
 
-    /// The place before this length of the way, and what share of the stretch to the next is gone.
+    /// The vertex before this path length, and the fraction of the segment to the next.
     fn between(&self, s: f64) -> (usize, f64) {
         let last = self.places.len() - 1;
         let k = self.lengths.partition_point(|l| *l <= s);
@@ -191,7 +193,7 @@ impl PlannedRoute {
         (k - 1, (s - a) / (b - a))
     }
 
-    /// The goal at a time (s): the mean of the way around its place, so that corners are round.
+    /// The desired state at a time (s): the mean of the route around its position, which rounds the corners.
     pub(crate) fn at(&self, time: f64) -> Goal {
         let s = self.speed * time;
         let step = ROUNDING / f64::from(SAMPLES);
@@ -214,29 +216,29 @@ impl PlannedRoute {
             let sum: f64 = (-SAMPLES..=SAMPLES).map(|k| heading(s + f64::from(k) * step)).sum();
             return Goal { at, velocity: ahead * self.speed, heading: sum / f64::from(2 * SAMPLES + 1) };
         }
-        // The way ahead, seen from a little farther, so that the heading stays defined at both ends.
+        // The direction of motion over a longer stretch, which is also defined at both ends.
         let far = self.place((s + 1.5).min(self.length())) - self.place((s - 1.5).max(0.0).min(self.length() - 1e-3));
         let towards = self.look_at.map_or(far.xy(), |p| p - at.xy());
         let heading = if towards.norm() > 1e-6 { libm::atan2(towards.y, towards.x) } else { 0.0 };
         Goal { at, velocity: ahead * self.speed, heading }
     }
 
-    /// The places that it leads through.
+    /// The vertices of the route.
     pub(crate) fn places(&self) -> &[Vector3<f64>] {
         &self.places
     }
 
-    /// Its length (m), rests included.
+    /// The path length (m), stops included.
     pub(crate) fn length(&self) -> f64 {
         self.lengths[self.lengths.len() - 1]
     }
 }
 
-/// Over the places one after the other and back, until a length is reached.
+/// The places one after the other and back, up to a length.
 fn tour(centres: &[Vector2<f64>], length: f64) -> Vec<Vector2<f64>> {
     let n = centres.len();
     if n == 1 {
-        // One object: crosses over it.
+        // A single object: crosses over it.
         let arm = |k: usize| centres[0] + [Vector2::x(), Vector2::y(), -Vector2::x(), -Vector2::y()][k % 4] * 0.8;
         return (0..4 + (length / 1.6) as usize).map(arm).collect();
     }

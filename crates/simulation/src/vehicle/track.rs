@@ -1,31 +1,30 @@
-//! Where the vehicle was, at any time of the dive.
+//! The vehicle's state at any time of the dive.
 
 use nalgebra::{Vector3, Vector6};
 use seafix_geometry::{Body, Transform, World, so3};
 
-/// States a second.
+/// State rate (Hz).
 pub(super) const RATE: f64 = 100.0;
 
-/// The vehicle at one instant.
+/// The vehicle's state at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct VehicleState {
     pub(crate) world_from_body: Transform<World, Body>,
-    /// Rotation (rad/s) and velocity (m/s) over ground, body frame.
+    /// Angular velocity (rad/s) and velocity over ground (m/s) in the body frame.
     pub(crate) motion: Vector6<f64>,
 }
 
-/// States at even steps of time.
+/// States at equal time steps.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Track {
     pub(crate) states: Vec<VehicleState>,
 }
 
 impl Track {
-    /// States a second.
+    /// State rate (Hz).
     pub(crate) const RATE: f64 = RATE;
 
-    /// The state at a time (s): a cubic through the neighbouring states' places and velocities, the turn
-    /// between their attitudes at an even rate.
+    /// The state at a time (s): cubic Hermite interpolation of the position, slerp of the attitude.
     pub(crate) fn at(&self, time: f64) -> VehicleState {
         let x = (time * RATE).clamp(0.0, (self.states.len() - 1) as f64);
         let k = (x as usize).min(self.states.len().saturating_sub(2));
@@ -52,7 +51,7 @@ mod tests {
 
     #[test]
     fn between_states_the_vehicle_moves_smoothly() {
-        // A circle: interpolated places stay on it.
+        // Interpolated positions of a circular motion stay on the circle.
         let state = |k: usize| {
             let angle = 0.02 * k as f64;
             let turn = so3::exp(&(Vector3::z() * angle));

@@ -1,4 +1,4 @@
-//! The same seed gives the same bytes: on any number of threads, in debug and in release, on every platform.
+//! Equal seeds give equal bytes for any number of threads, in debug and release, on every platform.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use seafix_simulation::{
 };
 use seafix_vision::Threads;
 
-/// A small dive with everything in it: turbid water, snow, a decentred dome, current, growth, rolling shutter.
+/// A small dive with every effect: turbid water, snow, a decentred dome, current, growth, rolling shutter.
 fn full() -> Mission {
     let mut mission = Mission {
         frames: 2,
@@ -28,7 +28,7 @@ fn full() -> Mission {
     mission
 }
 
-/// FNV-1a of the bits of all images and points of a dive.
+/// FNV-1a hash of the bits of all images and points of a dive.
 fn digest(mission: &Mission, threads: Threads) -> u64 {
     let plan = mission.plan(7, 0, Path::new("")).expect("the mission can be planned");
     let mut hash = 0xCBF2_9CE4_8422_2325_u64;
@@ -46,10 +46,9 @@ fn digest(mission: &Mission, threads: Threads) -> u64 {
 
 #[test]
 fn a_dive_has_the_bytes_that_it_always_had() {
-    // As long as it is there, dives of its seed share the looks of surfaces, which take the most time.
+    // Keeps the surface textures, which dives of one seed share and which take most of the time.
     let _kept = full().plan(7, 0, Path::new("")).unwrap();
-    // The number stands for what every build, debug or release, gives; it changes with the renderer and the triangulation
-    // alone.
+    // Every build, debug or release, gives this hash; it changes only with the renderer and the triangulation.
     let found = digest(&full(), Threads::One);
     assert_eq!(found, 0x12D0_5A55_3BFB_807D, "0x{found:016X}");
     for threads in [1, 2, 8] {

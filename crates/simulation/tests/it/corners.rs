@@ -1,4 +1,4 @@
-//! An independent detector finds the corners of rendered images where the truth has them.
+//! An independent detector finds the corners of rendered images at their true positions.
 
 use std::{fmt::Write, fs, path::Path, process::Command};
 
@@ -9,7 +9,7 @@ use seafix_simulation::{
 };
 use seafix_vision::{Image, Threads};
 
-/// OpenCV's corner refinement from starts on whole pixels: `image u v half-window` a line.
+/// OpenCV's corner refinement from whole-pixel starts; each input line is `image u v half-window`.
 const REFINE: &str = r"
 import sys, numpy, cv2
 images = {}
@@ -22,7 +22,7 @@ for line in sys.stdin:
     print(*found.ravel())
 ";
 
-/// Whether two panels touch at a feature point: an X. Otherwise, on one panel, it is an L.
+/// Whether two panels touch at a feature point (an X corner); a corner of one panel is an L.
 fn is_x(plan: &ObjectPlan, panel: usize) -> bool {
     let here = &plan.panels[panel];
     plan.panels.iter().filter(|p| p.carrier == here.carrier && p.outline[0] == here.outline[0]).count() == 2
@@ -33,7 +33,7 @@ fn save(path: &Path, image: &Image) {
     fs::write(path, [header.into_bytes(), image.to_u8()].concat()).expect("the temporary folder can be written");
 }
 
-/// The corners that OpenCV finds in the dive's images: errors in pixels, and whether each is an X.
+/// The corners that OpenCV finds in the images of a dive: errors in pixels, and whether each is an X.
 fn errors(python: &str, folder: &Path, mission: &Mission) -> Vec<([f64; 2], bool)> {
     let blueprint = Blueprint::drill_centre();
     let plan = mission.plan(3, 0, folder).unwrap();
@@ -82,7 +82,7 @@ fn errors(python: &str, folder: &Path, mission: &Mission) -> Vec<([f64; 2], bool
     found.zip(&truth).map(|([u, v], (at, x))| ([u - at.u, v - at.v], *x)).collect()
 }
 
-/// RMS an axis of the errors of X corners, or of L corners; says it with median and worst.
+/// RMS error on each axis of the X or L corners; prints it with median and maximum.
 fn rms(errors: &[([f64; 2], bool)], x: bool, name: &str) -> f64 {
     let mut squares: Vec<f64> = errors.iter().filter(|e| e.1 == x).map(|([u, v], _)| 0.5 * (u * u + v * v)).collect();
     squares.sort_by(f64::total_cmp);
@@ -97,7 +97,7 @@ fn rms(errors: &[([f64; 2], bool)], x: bool, name: &str) -> f64 {
 
 #[test]
 fn opencv_finds_corners_where_the_truth_has_them() {
-    // crates/vision/benches/README.md says how the interpreter is made.
+    // crates/vision/benches/README.md describes the interpreter.
     let Ok(python) = std::env::var("SEAFIX_PEERS") else {
         println!("skipped: SEAFIX_PEERS names no Python with OpenCV");
         return;
@@ -115,7 +115,7 @@ fn opencv_finds_corners_where_the_truth_has_them() {
             site: site.to_owned(),
             frames: 30,
             rate: 0.0,
-            // A particle before a corner is no corner.
+            // Particles before corners would disturb the detector.
             water: Water { attenuation: 0.1, snow: 0.0, ..Water::default() },
             imager: Imager::default(),
             ..Mission::default()
@@ -125,9 +125,9 @@ fn opencv_finds_corners_where_the_truth_has_them() {
     };
     let (worn, plain) = (dive("drill-centre"), dive("smooth.site.toml"));
     fs::remove_dir_all(&folder).unwrap();
-    // Between smooth surfaces an X is where its edges cross; stains and grain of worn plates move what OpenCV takes for it.
-    // Seen to fail with as much grain at a centimetre as at a decimetre, which no coat has: X 0.054. Shadows in steps of a
-    // pixel of their map brought a smooth L 0.95 px off, and the RMS to 0.202.
+    // An X on smooth surfaces is the intersection of its edges; stains and grain of worn plates move OpenCV's corner.
+    // Regression: equal grain at a centimetre and at a decimetre, which no coat has, gave 0.054 for X. Shadows in steps
+    // of a map pixel displaced a smooth L by 0.95 px, which raised the RMS to 0.202.
     for (name, found) in [("worn", &worn), ("smooth", &plain)] {
         let (x, l) = (rms(found, true, name), rms(found, false, name));
         assert!(x <= 0.05 && l <= 0.2, "{name}: X {x}, L {l}");

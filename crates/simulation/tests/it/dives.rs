@@ -1,4 +1,4 @@
-//! What tests of whole dives share.
+//! Common parts of the tests of complete dives.
 
 use std::{path::Path, sync::LazyLock};
 
@@ -10,7 +10,7 @@ use seafix_simulation::{
 };
 use seafix_vision::{Image, Threads};
 
-/// A short, small dive in clear water over the first object, with rough poses from the sensors.
+/// A short, small dive in clear water over the first object, with prior poses from the sensors.
 pub(crate) fn base() -> Mission {
     Mission {
         frames: 2,
@@ -24,7 +24,7 @@ pub(crate) fn base() -> Mission {
     }
 }
 
-/// Everything that a method, or a judge, sees of a dive.
+/// All outputs of a dive, for a method and for the evaluation.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Seen {
     pub(crate) images: Vec<(Image, Image)>,
@@ -38,11 +38,10 @@ fn plan(mission: &Mission) -> PlannedMission {
     mission.plan(5, 0, Path::new("")).expect("the mission can be planned")
 }
 
-/// Dives of one seed share the looks of surfaces for as long as one of them is there: without this one, each would make them
-/// anew, which takes longer than all the rest.
+/// Keeps the surface textures, which dives of one seed share; computing them anew takes longer than all the rest.
 static KEPT: LazyLock<PlannedMission> = LazyLock::new(|| plan(&base()));
 
-/// What is seen of a dive, on request without images, which take the most time.
+/// The outputs of a dive; `images` includes the images, which take most of the time.
 pub(crate) fn seen(mission: &Mission, images: bool) -> Seen {
     LazyLock::force(&KEPT);
     let plan = plan(mission);

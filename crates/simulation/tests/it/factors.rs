@@ -1,4 +1,4 @@
-//! What is switched on with magnitude 0 is the same, bit for bit, as what is left out; and with a magnitude it shows.
+//! A factor of magnitude 0 gives the same bits as no factor, and a factor with a magnitude has an effect.
 
 use seafix_simulation::{
     Imager, Mission,
@@ -10,7 +10,7 @@ use seafix_simulation::{
 
 use crate::dives::{base, seen};
 
-/// A factor: its name, how it is switched on with magnitude 0, and with one that shows.
+/// A factor: name, activation with magnitude 0, activation with an effect.
 type Factor = (&'static str, fn(&mut Mission), fn(&mut Mission));
 
 fn fault(device: FaultyDevice, kind: FaultKind, to: f64, amount: f64) -> DeviceFault {
@@ -31,7 +31,7 @@ fn transponders() -> Vec<[f64; 3]> {
     vec![[-50.0, -40.0, 38.0], [60.0, -40.0, 39.0], [55.0, 55.0, 37.0], [-40.0, 60.0, 38.5]]
 }
 
-/// One named object, changed by nothing.
+/// Changes that list one object and do not change it.
 fn named() -> Changes {
     Changes { objects: vec!["manifold".into()], ..Changes::default() }
 }
@@ -112,15 +112,15 @@ const FACTORS: &[Factor] = &[
 #[test]
 fn a_factor_of_magnitude_zero_is_a_factor_left_out() {
     let plain = seen(&base(), true);
-    assert!(plain.poses.iter().any(|pose| pose.contains("VisiblePoint")), "nothing is in view");
+    assert!(plain.poses.iter().any(|pose| pose.contains("VisiblePoint")), "no point is in view");
     for (name, nothing, something) in FACTORS {
         let with = |change: &fn(&mut Mission)| {
             let mut mission = base();
             change(&mut mission);
             seen(&mission, true)
         };
-        assert!(with(nothing) == plain, "{name} of magnitude 0 changes something");
-        assert!(with(something) != plain, "{name} changes nothing");
+        assert!(with(nothing) == plain, "{name} of magnitude 0 has an effect");
+        assert!(with(something) != plain, "{name} has no effect");
     }
 }
 

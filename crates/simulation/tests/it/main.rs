@@ -1,6 +1,6 @@
-//! Laws of the simulated dives and images.
+//! Properties of simulated dives and images.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and says what it measured")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and prints its measurements")]
 
 mod bytes;
 mod corners;

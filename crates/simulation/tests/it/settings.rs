@@ -1,6 +1,6 @@
-//! Every setting of a dive does something, and those of a factor that is off do nothing: P72 setting by setting.
+//! Every setting of a dive has an effect, and a setting of an inactive factor has none (P72 for each setting).
 //!
-//! The list is complete: a setting that is in neither table below fails the test.
+//! The list is complete: a setting outside of both tables fails the test.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 use crate::dives::{Seen, base, seen};
 
-/// A setting, another value for it, what has to be set for it to matter, and what makes it matter no more.
+/// A setting, another value for it, the settings that activate it, and the settings that deactivate it.
 type Setting = (&'static str, &'static str, &'static str, Option<&'static str>);
 
 const TRANSPONDERS: &str =
@@ -159,10 +159,10 @@ const SETTINGS: &[Setting] = &[
     ("points.clutter", "20", "", None),
 ];
 
-/// Settings that change nothing of what is seen: which of images and points a run takes, and what is refused.
+/// Settings without an effect on the outputs: the choice between images and points, and the limit of rejection.
 const SILENT: [&str; 2] = ["as-points", "clearance"];
 
-/// `settings` as `key=value;key=value`.
+/// The table with `settings`, given as `key=value;key=value`.
 fn with(table: &Table, settings: &str) -> Table {
     let mut table = table.clone();
     for setting in settings.split(';').filter(|text| !text.is_empty()) {
@@ -171,7 +171,7 @@ fn with(table: &Table, settings: &str) -> Table {
         let mut keys: Vec<&str> = key.split('.').collect();
         let last = keys.pop().expect("a key has a name");
         let place = keys.iter().fold(&mut table, |at, key| at[*key].as_table_mut().expect("settings are in tables"));
-        assert!(place.insert(last.to_owned(), value).is_some(), "there is no setting {key}");
+        assert!(place.insert(last.to_owned(), value).is_some(), "unknown setting {key}");
     }
     table
 }
@@ -180,7 +180,7 @@ fn observe(table: &Table, images: bool) -> Seen {
     seen(&table.clone().try_into::<Mission>().expect("these are settings"), images)
 }
 
-/// All settings, as dotted keys.
+/// All settings as dotted keys.
 fn leaves(table: &Table, before: &str, into: &mut BTreeSet<String>) {
     for (key, value) in table {
         let name = format!("{before}{key}");
@@ -205,7 +205,7 @@ fn every_setting_does_something_and_nothing_where_its_factor_is_off() {
     let table = Table::try_from(base()).unwrap();
     let mut faults = Vec::new();
     let mut before: HashMap<(String, bool), Seen> = HashMap::new();
-    // Whether a change on top of some settings is seen. Cameras do not know what sensors say.
+    // Whether a change on top of some settings has an effect. Images do not depend on sensors.
     let mut shows = |settings: String, change: &str| {
         let images = !["sensors.", "points.", "prior"].iter().any(|key| change.starts_with(key));
         let table = with(&table, &settings);
@@ -215,10 +215,10 @@ fn every_setting_does_something_and_nothing_where_its_factor_is_off() {
     for (key, value, on, off) in SETTINGS {
         let change = format!("{key}={value}");
         if !shows((*on).to_owned(), &change) {
-            faults.push(format!("{change} does nothing"));
+            faults.push(format!("{change} has no effect"));
         }
         if let Some(off) = off.filter(|off| shows(format!("{on};{off}"), &change)) {
-            faults.push(format!("{change} does something with {off}"));
+            faults.push(format!("{change} has an effect with {off}"));
         }
     }
     assert!(faults.is_empty(), "{faults:#?}");

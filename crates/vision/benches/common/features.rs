@@ -1,4 +1,4 @@
-//! Places with descriptors, ours or a peer's, and what the protocols measure of two sets of them.
+//! Features of Seafix or a peer, and the scores of two sets of them.
 
 use std::cmp::Ordering;
 
@@ -12,22 +12,22 @@ use super::{
     scene::map,
 };
 
-/// What one method makes of one image.
+/// The features of one image by one method.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Features {
-    /// Where; strongest first.
+    /// The positions, strongest first.
     pub(crate) at: Vec<Pixel>,
-    /// In the same order.
+    /// The descriptors, in the order of the positions.
     pub(crate) descriptors: Descriptors,
 }
 
-/// What the protocols measure of two images whose relation is known.
+/// The scores of two images with a known homography.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Scores {
     pub(crate) repeatability: f64,
     pub(crate) matching: f64,
     pub(crate) accuracy: f64,
-    /// Points in the part that both images show, the smaller number.
+    /// The smaller number of points in the common part of both images.
     pub(crate) points: f64,
 }
 
@@ -40,18 +40,18 @@ impl std::ops::AddAssign for Scores {
     }
 }
 
-/// A peer's rows of x, y, size, angle, response.
+/// The rows of x, y, size, angle, response in a peer's answer.
 pub(crate) fn rows(answer: &Value) -> Vec<[f32; 5]> {
     let values = numbers(&answer["keypoints"]);
     values.chunks_exact(5).map(|row| std::array::from_fn(|i| row[i])).collect()
 }
 
 impl Features {
-    /// The strongest `count` of a peer's.
+    /// The strongest `count` features of a peer's answer.
     pub(crate) fn of_peer(answer: &Value, count: usize) -> Self {
         let rows = rows(answer);
         let [n, length] = shape(&answer["descriptors"]);
-        assert_eq!(n, rows.len(), "a descriptor for each key point");
+        assert_eq!(n, rows.len(), "descriptors and key points differ in number");
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|&a, &b| rows[b][4].partial_cmp(&rows[a][4]).unwrap_or(Ordering::Equal));
         order.truncate(count);
@@ -66,7 +66,7 @@ impl Features {
         Self { at, descriptors }
     }
 
-    /// Only the points that `keep` says.
+    /// The features whose positions satisfy `keep`.
     fn only(&self, keep: impl Fn(Pixel) -> bool) -> Self {
         let order: Vec<usize> = (0..self.at.len()).filter(|&i| keep(self.at[i])).collect();
         let descriptors = match &self.descriptors {
@@ -82,14 +82,14 @@ fn picked<T: Copy + Default>(values: &[T], length: usize, order: &[usize]) -> Ta
     Table::new(length, order.iter().flat_map(|&i| values[i * length..][..length].iter().copied()).collect())
 }
 
-/// The scores of `a` and `b`, where `b_from_a` takes a pixel of the one image to the other; both of `size`.
+/// The scores of `a` and `b`, two images of `size` with the homography `b_from_a`.
 pub(crate) fn scores(a: &Features, b: &Features, b_from_a: &Matrix3<f64>, size: [usize; 2]) -> Scores {
     let inside = |p: Pixel| {
         let [right, bottom] = size.map(|n| (n - 1) as f64);
         (0.0..=right).contains(&p.u) && (0.0..=bottom).contains(&p.v)
     };
-    let a_from_b = b_from_a.try_inverse().expect("a view of a plane");
-    // Only what both images show counts.
+    let a_from_b = b_from_a.try_inverse().expect("an invertible homography");
+    // Only the common part of both images counts.
     let (a, b) = (a.only(|p| inside(map(b_from_a, p))), b.only(|p| inside(map(&a_from_b, p))));
     let fewer = a.at.len().min(b.at.len());
     if fewer == 0 {
@@ -106,7 +106,7 @@ pub(crate) fn scores(a: &Features, b: &Features, b_from_a: &Matrix3<f64>, size: 
     }
 }
 
-/// How many pairs of points are within `radius`, the nearest pairs first, no point in two.
+/// The number of pairs of points within `radius`, nearest pairs first and each point once.
 fn one_to_one(a: &[Pixel], b: &[Pixel], radius: f64) -> usize {
     let mut pairs = Vec::new();
     for (i, p) in a.iter().enumerate() {
@@ -125,7 +125,7 @@ fn one_to_one(a: &[Pixel], b: &[Pixel], radius: f64) -> usize {
     count
 }
 
-/// The pairs that are each other's nearest.
+/// The mutual nearest neighbours.
 fn mutual(a: &Descriptors, b: &Descriptors) -> Vec<(usize, usize)> {
     let (n, m) = (a.len(), b.len());
     let mut nearest_b = vec![(f32::INFINITY, usize::MAX); n];

@@ -1,6 +1,6 @@
-//! What the benches share: the peers, the images, how they are seen from elsewhere.
+//! The parts common to the benches: peers, scenes, scores.
 
-#![allow(dead_code, reason = "each bench uses its part")]
+#![allow(dead_code, reason = "each bench uses a part of this module")]
 
 pub(crate) mod features;
 pub(crate) mod peer;

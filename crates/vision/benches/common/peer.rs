@@ -1,6 +1,6 @@
-//! A Python interpreter with a peer's library, asked through `peers.py`.
+//! A peer: a Python interpreter with a peer's library, controlled through `peers.py`.
 
-#![allow(clippy::print_stdout, reason = "a bench prints")]
+#![allow(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::{
     io::{BufRead, BufReader, Write},
@@ -12,20 +12,21 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use seafix_vision::Image;
 use serde_json::{Value, json};
 
-/// The interpreter with a present OpenCV and scikit-image.
+/// The variable that names the interpreter with a recent OpenCV and scikit-image.
 pub(crate) const OPENCV: &str = "SEAFIX_PEERS";
-/// The interpreter with opencv-contrib 3.4.2.
+/// The variable that names the interpreter with opencv-contrib 3.4.2.
 pub(crate) const SURF: &str = "SEAFIX_PEERS_SURF";
 
-/// glibc keeps large planes instead of returning them to the system each time: without these, OpenCV's
-/// filters pay page faults for every image.
+/// The malloc settings of glibc that keep large planes instead of returning them to the system.
+///
+/// Without them OpenCV's filters pay page faults for every image.
 const MALLOC: [(&str, &str); 3] = [
     ("MALLOC_MMAP_THRESHOLD_", "1073741824"),
     ("MALLOC_TRIM_THRESHOLD_", "4294967296"),
     ("MALLOC_TOP_PAD_", "268435456"),
 ];
 
-/// A running interpreter; it ends when its input is closed.
+/// A running interpreter, which ends when its input is closed.
 pub(crate) struct Peer {
     child: Child,
     requests: Option<ChildStdin>,
@@ -35,12 +36,12 @@ pub(crate) struct Peer {
 }
 
 impl Peer {
-    /// The interpreter that the environment variable names; else one line on what is skipped.
+    /// The interpreter that the environment variable names; `None`, with one printed line, if it is unavailable.
     pub(crate) fn from_env(variable: &str, skipped: &str) -> Option<Self> {
         match std::env::var(variable).map_err(|_| "not set".to_owned()).and_then(|python| Self::start(&python)) {
             Ok(peer) => Some(peer),
             Err(why) => {
-                println!("skipped: {skipped} ({variable}: {why}; see crates/vision/benches/README.md)");
+                println!("skipped {skipped}: {variable}: {why}; see crates/vision/benches/README.md");
                 None
             }
         }
@@ -72,18 +73,21 @@ impl Peer {
         }
     }
 
-    /// Its answer; a peer that fails ends the bench with its message.
+    /// The peer's answer.
+    ///
+    /// # Panics
+    /// If the peer reports an error.
     pub(crate) fn ask(&mut self, request: &Value) -> Value {
-        self.try_ask(request).unwrap_or_else(|error| panic!("{}: {} of {}", self.version, error, request["do"]))
+        self.try_ask(request).unwrap_or_else(|error| panic!("{}: {}; request {}", self.version, error, request["do"]))
     }
 
-    /// Keeps an image there under a name, rounded to 8 bits.
+    /// Stores an image under a name in the peer, rounded to 8 bits.
     pub(crate) fn keep(&mut self, name: &str, image: &Image) {
         let array = array(&[image.height(), image.width()], "u1", &image.to_u8());
         self.ask(&json!({"do": "keep", "name": name, "array": array}));
     }
 
-    /// Keeps a table of numbers there under a name.
+    /// Stores a table of numbers under a name in the peer.
     pub(crate) fn keep_table(&mut self, name: &str, rows: usize, values: &[f32]) {
         self.ask(&json!({"do": "keep", "name": name, "array": floats(&[rows, values.len() / rows], values)}));
     }
@@ -93,7 +97,7 @@ impl Peer {
         self.image(&json!({"do": "photograph", "name": name}))
     }
 
-    /// A picture from a file.
+    /// An image from a file.
     pub(crate) fn picture(&mut self, path: &str) -> Image {
         self.image(&json!({"do": "picture", "path": path}))
     }
@@ -102,14 +106,14 @@ impl Peer {
         let answer = self.ask(request);
         let ([height, width], pixels) = (shape(&answer["image"]), bytes(&answer["image"]));
         let pixels = pixels.into_iter().map(f32::from).collect();
-        Image::new(width, height, pixels).expect("an image fills its shape")
+        Image::new(width, height, pixels).expect("width × height pixels")
     }
 }
 
 impl Drop for Peer {
     fn drop(&mut self) {
         self.requests = None;
-        // It has nothing left to do; whether it ended well does not matter.
+        // The interpreter has nothing left to do, so its exit status does not matter.
         let _ = self.child.wait();
     }
 }
@@ -118,24 +122,24 @@ fn array(shape: &[usize], kind: &str, bytes: &[u8]) -> Value {
     json!({"shape": shape, "type": kind, "data": BASE64_STANDARD.encode(bytes)})
 }
 
-/// An array of numbers, as `peers.py` reads it.
+/// An array of numbers in the format of `peers.py`.
 pub(crate) fn floats(shape: &[usize], values: &[f32]) -> Value {
     array(shape, "f4", &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<_>>())
 }
 
-/// The two extents of an array.
+/// The two dimensions of an array.
 pub(crate) fn shape(array: &Value) -> [usize; 2] {
     [0, 1].map(|i| array["shape"][i].as_u64().unwrap_or(1) as usize)
 }
 
-/// Whether its elements are bytes.
+/// Whether the elements are bytes.
 pub(crate) fn is_bytes(array: &Value) -> bool {
     array["type"] == "u1"
 }
 
 /// The bytes of an array.
 pub(crate) fn bytes(array: &Value) -> Vec<u8> {
-    BASE64_STANDARD.decode(array["data"].as_str().unwrap_or_default()).expect("the peer answers in base64")
+    BASE64_STANDARD.decode(array["data"].as_str().unwrap_or_default()).expect("base64 from the peer")
 }
 
 /// The numbers of an array.

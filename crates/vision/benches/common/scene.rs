@@ -1,19 +1,19 @@
-//! Images, and how a plane that carries one is seen from elsewhere.
+//! Images, and views of a textured plane.
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Pinhole, Pixel, StereoRig, Transform};
 use seafix_vision::Image;
 
-/// Where a homography takes a pixel.
+/// The image of a pixel under a homography.
 pub(crate) fn map(h: &Matrix3<f64>, at: Pixel) -> Pixel {
     let p = h * Vector3::new(at.u, at.v, 1.0);
     Pixel { u: p.x / p.z, v: p.y / p.z }
 }
 
-/// The image of `size` that shows `base` through the homography `base_from_image`, in 8 bits.
+/// The view of `base` of this `size` through the homography `base_from_image`, in 8 bits.
 ///
-/// Each pixel is the mean of `samples`² places in it, more than one where the image is smaller than the
-/// base, by Keys' cubic convolution; beyond its border the base continues mirrored, so that no edge appears there.
+/// Each pixel is the mean of `samples`² points in it, more than one if the image is smaller than the base, by Keys'
+/// cubic convolution. The base is mirrored at its border, so that no edge appears there.
 pub(crate) fn render(base: &Image, size: [usize; 2], base_from_image: &Matrix3<f64>, samples: usize) -> Image {
     let step = |i: usize| (i as f64 + 0.5) / samples as f64 - 0.5;
     let pixel = |x: usize, y: usize| {
@@ -28,10 +28,10 @@ pub(crate) fn render(base: &Image, size: [usize; 2], base_from_image: &Matrix3<f
     };
     let [width, height] = size;
     let pixels = (0..width * height).map(|i| pixel(i % width, i / width)).collect();
-    Image::new(width, height, pixels).expect("every pixel is made")
+    Image::new(width, height, pixels).expect("width × height pixels")
 }
 
-/// Rounded to 8 bits.
+/// The value rounded to 8 bits.
 pub(crate) fn eight_bits(value: f64) -> f32 {
     value.round().clamp(0.0, 255.0) as f32
 }
@@ -49,7 +49,7 @@ fn cubic(image: &Image, at: Pixel) -> f64 {
     sum
 }
 
-/// Keys' weights, a = −1/2.
+/// The weights of Keys' cubic convolution, a = −1/2.
 fn keys(t: f64) -> [f64; 4] {
     [
         t * (-0.5 + t * (1.0 - 0.5 * t)),
@@ -65,7 +65,7 @@ fn mirrored(i: i64, n: usize) -> usize {
     (if i < n as i64 { i } else { period - 1 - i }) as usize
 }
 
-/// Stones of many sizes under uneven light: what to look at where no photograph is.
+/// Stones of many sizes under uneven light, a substitute for a photograph.
 pub(crate) fn stones(size: [usize; 2]) -> Image {
     let hash = |x: i64, y: i64, octave: u64| {
         let mut h =
@@ -87,10 +87,10 @@ pub(crate) fn stones(size: [usize; 2]) -> Image {
         eight_bits(128.0 + octaves.map(|n| 45.0 * (0.5 - n.abs())).sum::<f64>())
     };
     let pixels = (0..size[0] * size[1]).map(|i| pixel(i % size[0], i / size[0])).collect();
-    Image::new(size[0], size[1], pixels).expect("every pixel is made")
+    Image::new(size[0], size[1], pixels).expect("width × height pixels")
 }
 
-/// A rectified rig 0.25 m wide, with the field of view of a dive camera.
+/// A rectified rig with a baseline of 0.25 m and the field of view of a dive camera.
 pub(crate) fn rig(size: [usize; 2]) -> StereoRig {
     let [width, height] = size.map(|n| n as f64);
     let focal = 0.8 * width;
@@ -102,8 +102,7 @@ pub(crate) fn rig(size: [usize; 2]) -> StereoRig {
     StereoRig::new(camera, camera, Transform::from_matrix(&right_from_left).expect("a shift")).expect("a rig")
 }
 
-/// Where the right camera of [`rig`] sees what the left one sees of a plane 4 m away, tilted by 25° about an
-/// oblique axis.
+/// The homography between the images of [`rig`] by a plane 4 m away, tilted by 25° about an oblique axis.
 pub(crate) fn right_from_left(rig: &StereoRig) -> Matrix3<f64> {
     let [focal, _] = rig.left().focal();
     let [cx, cy] = rig.left().principal();
@@ -115,9 +114,9 @@ pub(crate) fn right_from_left(rig: &StereoRig) -> Matrix3<f64> {
     Matrix3::new(1.0 - row.x, -row.y, -row.z, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 }
 
-/// Both views of a plane that carries `base`, mirrored on where it ends; `scale` pixels to one of the base.
+/// Both views of a plane textured with `base`, mirrored at its border; `scale` pixels to one of the base.
 pub(crate) fn stereo(base: &Image, size: [usize; 2], scale: f64) -> [Image; 2] {
     let base_from_left = Matrix3::new(1.0 / scale, 0.0, 0.0, 0.0, 1.0 / scale, 0.0, 0.0, 0.0, 1.0);
-    let h = right_from_left(&rig(size)).try_inverse().expect("a view of a plane");
+    let h = right_from_left(&rig(size)).try_inverse().expect("an invertible homography");
     [base_from_left, base_from_left * h].map(|from| render(base, size, &from, 1))
 }

@@ -1,4 +1,4 @@
-//! The stages, and what each asks of its peer.
+//! The stages, and the requests to their peers.
 
 use seafix_component::{Choice, Registry};
 use seafix_geometry::{Pixel, StereoRig};
@@ -13,7 +13,7 @@ use super::{
     scene,
 };
 
-/// Points an image.
+/// The number of points of an image.
 pub(crate) const COUNT: usize = 1000;
 
 /// A stage of the front end.
@@ -21,44 +21,44 @@ pub(crate) struct Stage<'a> {
     pub(crate) name: &'static str,
     /// The environment variable of the peer.
     pub(crate) asks: &'static str,
-    /// What it is asked; null: it has nothing like it.
+    /// The request to the peer; null if the peer has no equivalent.
     pub(crate) request: Value,
-    /// Our time over the peer's, at most.
+    /// The maximum ratio of Seafix's time to the peer's.
     pub(crate) max_ratio: Option<f64>,
-    /// Our time at most (ms).
+    /// The maximum time of Seafix (ms).
     pub(crate) max_ms: Option<f64>,
-    /// Ours.
+    /// The stage of Seafix.
     pub(crate) ours: Box<dyn FnMut(Threads) + Send + 'a>,
 }
 
-/// Standard deviation of OpenCV's window, 3 px wide (px).
+/// The standard deviation of OpenCV's window, which is 3 px wide (px).
 const BLOCK: f64 = 0.82;
 
-/// Two images and what is found in them.
+/// Two images with their features.
 pub(crate) struct Scene {
     images: [Image; 2],
     rig: StereoRig,
     keypoints: [Vec<Keypoint>; 2],
-    /// Pairs a few tenths of a pixel beside the truth.
+    /// Matches a few tenths of a pixel from the truth.
     matches: Vec<Match>,
-    /// Descriptors of many more points: made, since their values do not matter to the time.
+    /// Descriptors of many more points; they are synthetic, since their values do not affect the time.
     large_sets: [[Descriptors; 2]; 2],
 }
 
 const LARGE: [usize; 2] = [1000, 3000];
 
-/// The component, if it is listed with these settings.
+/// The component, if it is registered with these settings.
 fn listed<T: ?Sized>(registry: &'static Registry<T>, choice: &Choice) -> Option<Box<T>> {
     registry.build(choice).ok()
 }
 
-/// Runs with memory of its own for each way to share the work.
+/// Runs with separate memory for one thread and for the pool.
 fn with_memory<'a>(mut run: impl FnMut(&mut Workspace) + Send + 'a) -> Box<dyn FnMut(Threads) + Send + 'a> {
     let mut memory = [Threads::One, Threads::Pool].map(Workspace::new);
     Box::new(move |threads| run(&mut memory[usize::from(threads == Threads::Pool)]))
 }
 
-/// Unit vectors, no two alike.
+/// Distinct unit vectors.
 fn unit_vectors(count: usize, seed: u32) -> Vec<f32> {
     let mut state = seed;
     let mut next = || {
@@ -74,7 +74,7 @@ fn unit_vectors(count: usize, seed: u32) -> Vec<f32> {
 }
 
 impl Scene {
-    /// The images, known to the peers as `left` and `right`.
+    /// The images, stored in the peers as `left` and `right`.
     pub(crate) fn new(base: &Image, size: [usize; 2], peers: [&mut Option<Peer>; 2]) -> Self {
         let images = scene::stereo(base, size, size[0] as f64 / 1024.0);
         let rig = scene::rig(size);
@@ -100,7 +100,7 @@ impl Scene {
         Self { images, rig, keypoints, matches, large_sets }
     }
 
-    /// All stages for which we have a component.
+    /// All stages with a component of Seafix.
     pub(crate) fn stages(&self) -> Vec<Stage<'_>> {
         let mut stages = Vec::new();
         stages.extend(self.detectors());
@@ -117,7 +117,7 @@ impl Scene {
         let corners = |harris: bool| json!({"do": "corners", "image": "left", "count": COUNT, "harris": harris});
         let named = |name: &str| Choice::named(name).with("features", features);
         let plain = |name: &str| named(name).with("window", "box").with("sigma", BLOCK).with("selection", "strongest");
-        // As OpenCV's: every pixel that is stronger than its eight neighbours.
+        // OpenCV's criterion: every pixel that is stronger than its eight neighbours.
         let every_fast = Choice::named("fast").with("radius", 1).with("subpixel", false).with("features", 1_000_000);
         let list = [
             ("Harris, NMS, top 1000", plain("harris"), corners(true), Some(0.4)),
@@ -139,7 +139,7 @@ impl Scene {
         stages.collect()
     }
 
-    /// Detected and described in one.
+    /// Detection and description in one.
     fn features(&self) -> Vec<Stage<'_>> {
         let features = |kind: &str| json!({"do": "features", "image": "left", "kind": kind, "count": COUNT});
         let surf = |upright: bool| {
@@ -174,7 +174,7 @@ impl Scene {
         stages.collect()
     }
 
-    /// Described at given corners.
+    /// Description at given corners.
     fn given(&self) -> Vec<Stage<'_>> {
         let rows = self.keypoints[0].iter().flat_map(|k| [k.at.u as f32, k.at.v as f32, 11.25, -1.0, 1.0]);
         let rows: Vec<f32> = rows.collect();
@@ -197,7 +197,9 @@ impl Scene {
         stages.collect()
     }
 
-    /// Nearest two of each, by the matcher without geometry: it also looks back and applies the ratio test.
+    /// The two nearest neighbours of each descriptor, by the matcher without geometry.
+    ///
+    /// The matcher also works in the other direction and applies the ratio test.
     fn matchers(&self) -> Vec<Stage<'_>> {
         let names = ["2-NN, 64 floats, 1000²", "2-NN, 64 floats, 3000²"];
         let stages = names.into_iter().enumerate().map(|(i, name)| {
@@ -231,11 +233,11 @@ impl Scene {
         let nothing = json!({"do": "lucas_kanade", "points": points, "window": 21});
         let wide = || Direct { window: 21, warp: Warp::Translation, ..Direct::default() };
         let list = [
-            ("refine 1000, window 21; LK from nothing", wide(), nothing.clone(), Some(1.0 / 3.0)),
+            ("refine 1000, window 21; LK from zero flow", wide(), nothing.clone(), Some(1.0 / 3.0)),
             ("refine 1000, window 21; LK from matches", wide(), aside, None),
-            ("refine 1000, default; LK from nothing", Direct::default(), nothing.clone(), None),
+            ("refine 1000, default; LK from zero flow", Direct::default(), nothing.clone(), None),
             (
-                "refine 1000, window that only moves; LK from nothing",
+                "refine 1000, translation; LK from zero flow",
                 Direct { warp: Warp::Translation, ..Direct::default() },
                 nothing,
                 None,
@@ -265,8 +267,8 @@ impl Scene {
         };
         let projections = [projection(0.0), projection(focal * self.rig.baseline())];
         let limit = if self.images[0].width() > 1024 { 40.0 } else { 25.0 };
-        // The peer's stages; then with every corner located first, as the pipeline does by default.
-        let list = [("whole pair, the peer's stages", "peak"), ("whole pair, the pipeline's defaults", "corner")];
+        // The peer's stages, then those of the default pipeline, which locates every corner first.
+        let list = [("stereo pair, the peer's stages", "peak"), ("stereo pair, the default pipeline", "corner")];
         let stages = list.into_iter().map(|(name, locator)| {
             let harris = Choice::named("harris").with("features", COUNT as i64);
             let front_end = FrontEnd {

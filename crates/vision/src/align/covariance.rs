@@ -1,37 +1,38 @@
-//! How well an alignment is known.
+//! The covariance of an alignment.
 
 use nalgebra::{Matrix2, Matrix4, SMatrix, Vector2, Vector4};
 
 use super::window::Normal;
 
-/// What is left between two aligned windows.
+/// The residual between two aligned windows.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Residual {
-    /// Σ w (Ĩ − T̃)², Σ w = 1.
+    /// The residual energy Σ w (Ĩ − T̃)², with Σ w = 1.
     pub(super) energy: f64,
-    /// Variance of the right window (squares of grey levels).
+    /// The variance of the right window (squared grey levels).
     pub(super) variance: f64,
-    /// The fractions at which the right window was interpolated, where they are the same for all its pixels.
+    /// The interpolation fractions of the right window, if they are the same for all its pixels.
     pub(super) fractions: Option<[f64; 2]>,
-    /// Σ w².
+    /// The sum of the squared weights, Σ w².
     pub(super) squared_weights: f64,
-    /// The variance of rounding: no noise is less (squares of grey levels).
+    /// The variance of rounding, a lower bound of the noise (squared grey levels).
     pub(super) rounding: f64,
 }
 
-/// The prior pulls deformations towards none; they are about this great, one standard deviation.
+/// The prior standard deviation of deformations about zero.
 const SLOPE: f64 = 0.15;
 
-/// The covariance of the aligned place (px²), in the pixels of the left image; `None` if noise makes up all
-/// that the window shows.
+/// The covariance of the aligned position (px²) in pixels of the left image; `None` if the window is noise alone.
 ///
-/// Noise of variance σ² in both images, T of variance s_T², I of s_I², both scaled to 1, moves the
-/// place by δ = G⁻¹ Σ w J̃ᵀ(ñ_T − ñ_I), so Cov δ = σ² (1/s_T² + 1/s_I²) G⁻¹ (Σ w² J̃ᵀJ̃) G⁻¹. G is
-/// Σ w J̃ᵀJ̃ without what noise adds to it, since noise in J̃ is not found again in the other image; and that part
-/// of Σ w² J̃ᵀJ̃ which is noise meets the noise of the right image only, since with its own it makes an odd sum,
-/// that vanishes. Interpolation keeps only a share q of the noise ([`kept`]) in the residual and in what meets
-/// noise, but not in what meets the scene, which has low frequencies only:
-/// σ² = Σ w (Ĩ − T̃)² / (1/s_T² + q/s_I²), corrected for the fitted parameters.
+/// Noise of variance σ² in both images, with T of variance s_T² and I of s_I² scaled to 1, moves the position by δ =
+/// G⁻¹ Σ w J̃ᵀ(ñ_T − ñ_I), so Cov δ = σ² (1/s_T² + 1/s_I²) G⁻¹ (Σ w² J̃ᵀJ̃) G⁻¹. Three corrections apply:
+///
+/// - G is Σ w J̃ᵀJ̃ without the contribution of noise, since noise in J̃ does not recur in the other image.
+/// - The noise part of Σ w² J̃ᵀJ̃ counts with the right image's noise alone; with its own it forms an odd sum, which
+///   vanishes.
+/// - Interpolation keeps a fraction q of the noise ([`kept`]) in the residual and in products with noise, but not in
+///   products with the scene, whose frequencies are low: σ² = Σ w (Ĩ − T̃)² / (1/s_T² + q/s_I²), corrected for the
+///   fitted parameters.
 pub(super) fn covariance<const P: usize>(normal: &Normal<P>, residual: &Residual) -> Option<Matrix2<f64>> {
     let (left, right) = (1.0 / normal.variance, 1.0 / residual.variance);
     let kept = residual.fractions.map_or(MEAN_KEPT * MEAN_KEPT, |[x, y]| kept(x) * kept(y));
@@ -48,31 +49,31 @@ pub(super) fn covariance<const P: usize>(normal: &Normal<P>, residual: &Residual
     Some((place + place.transpose()) * 0.5)
 }
 
-/// The slant that the end of a moving window shows.
+/// The slant estimated at the end of an alignment by translation.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slant {
-    /// How far it puts the moving window off (px, of the left image).
+    /// The error that the slant causes in the translated window's position (px of the left image).
     pub(super) off: Vector2<f64>,
-    /// Rao's score: χ² of two degrees of freedom where there is no slant.
+    /// Rao's score: χ² with two degrees of freedom if there is no slant.
     score: f64,
 }
 
 impl Slant {
-    /// Whether it cannot be chance: 95 of 100 windows without a slant have a smaller score.
+    /// Whether the slant is significant: 95 % of windows without a slant have a smaller score.
     pub(super) fn is_seen(&self) -> bool {
         self.score > 5.99
     }
 
-    /// The share of it that is no noise: without a slant the score is 2 in the mean.
+    /// The fraction of the slant that is not noise; the mean score without a slant is 2.
     pub(super) fn fraction(&self) -> f64 {
         (1.0 - 2.0 / self.score).max(0.0).sqrt()
     }
 }
 
-/// The slant at the end of a moving window; none where noise makes up all that the window shows.
+/// The slant at the end of an alignment by translation; `None` if the window is noise alone.
 ///
-/// With g the gradient of the four parameters and G their information, u = g_s − G_sm G_mm⁻¹ g_m is the slant's own part;
-/// its covariance is σ² (1/s_T² + 1/s_I²) T (Σ w² J̃ᵀJ̃) Tᵀ with T = (−G_sm G_mm⁻¹, 1).
+/// The slant's own part is u = g_s − G_sm G_mm⁻¹ g_m, with g the gradient of the four parameters and G their
+/// information. Its covariance is σ² (1/s_T² + 1/s_I²) T (Σ w² J̃ᵀJ̃) Tᵀ with T = (−G_sm G_mm⁻¹, 1).
 pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Residual) -> Option<Slant> {
     let block = |all: &Matrix4<f64>, i, j| all.fixed_view::<2, 2>(i, j).into_owned();
     let within = block(&normal.information, 0, 0).try_inverse()?;
@@ -91,8 +92,9 @@ pub(super) fn slant(normal: &Normal<4>, gradient: &Vector4<f64>, residual: &Resi
     Some(Slant { off: across.transpose() * slope, score })
 }
 
-/// Σ_k η(t − k)², η the cardinal cubic spline: what interpolation at the fraction t keeps of the variance of white
-/// noise, a cubic in t (1 − t).
+/// The variance of white noise that interpolation at the fraction t keeps: Σ_k η(t − k)², a cubic in t (1 − t).
+///
+/// η is the cardinal cubic spline.
 fn kept(t: f64) -> f64 {
     let p = t * (1.0 - t);
     1.0 - p * p * (3.0 + 3.607_695_15 * p)
@@ -105,7 +107,7 @@ const MEAN_KEPT: f64 = 0.874_23;
 mod tests {
     use super::*;
 
-    /// η(t − k), by the prefilter's exact response.
+    /// The cardinal spline η(t − k), by the prefilter's exact response.
     fn cardinal(t: f64, k: i32) -> f64 {
         let beta = |x: f64| match x.abs() {
             x if x < 1.0 => 2.0 / 3.0 - x * x + 0.5 * x * x * x,

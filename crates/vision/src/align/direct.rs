@@ -7,43 +7,42 @@ use serde::{Deserialize, Serialize};
 use super::{Aligned, Aligner, Expected, Refinement, Unaligned, Warp, Weight, apart, local::Local, together};
 use crate::{Image, Pair, Workspace};
 
-/// How the right place of a match is aligned to the left one.
+/// Direct alignment of a match by inverse-compositional Gauss–Newton, with its covariance.
 ///
-/// Both detectors err; the error of the disparity is what the depth suffers from. The window around
-/// the left place, T, is laid over the right image, I, by the map W(x) = c + A x that minimises
-/// Σ w (Ĩ(W(x)) − T̃(x))², where ˜ means: mean subtracted, scaled to unit variance (so this maximises
-/// the zero-normalised cross correlation). The right place becomes c. A begins as what a surface parallel to
-/// the left image would show, and stays so, or follows the surface ([`Warp`]).
-/// Inverse-compositional Gauss–Newton: the derivatives are those of T, computed once, on whole pixels, so that
-/// noise in them has no preferred direction; I is interpolated by a cubic spline.
+/// Depth depends on the disparity, so the right pixel is aligned to the left one. The map W(x) = c + A x takes the
+/// window T around the left pixel to the right image I and minimises Σ w (Ĩ(W(x)) − T̃(x))². The tilde means: mean
+/// subtracted, scaled to unit variance; so the zero-normalised cross-correlation is maximised. The right pixel becomes
+/// c. A begins as the relation on a surface parallel to the left image and is kept or fitted ([`Warp`]). The
+/// derivatives are those of T, computed once at integer pixels, so that their noise has no preferred direction; a cubic
+/// spline interpolates I.
 ///
-/// The place found in the left image errs by L, and the right one with it: only the error A of the alignment, which
-/// follows from the gradients and the residual, comes between them ([`UncertainPixels`]).
+/// The error of the left pixel is common to both images; only the alignment's error, which follows from the gradients
+/// and the residual, comes between them ([`UncertainPixels`]).
 ///
-/// Where it does not converge, or ends far from where it began, or the windows remain unlike, or the
-/// place would be known no better than `reach`, the pair is most often a false match: it is left out, or the detectors'
-/// places stay, with independent errors ([`Unaligned`]).
+/// An alignment fails if it does not converge, ends far from its start, leaves dissimilar windows, or has a standard
+/// deviation above `reach`. Most such pairs are false matches: they are rejected, or keep the detectors' positions with
+/// independent errors ([`Unaligned`]).
 ///
-/// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a
-/// perfect fit for signal and image processing*, 1999.
+/// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a perfect fit for
+/// signal and image processing*, 1999.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Direct {
-    /// Whether to align at all; without, it is as [`Unrefined`](super::Unrefined).
+    /// Whether to align at all; `false` equals [`Unrefined`](super::Unrefined).
     pub refine: bool,
-    /// Side of the window (px), odd, 3 to 201.
+    /// Side of the window (px); odd, 3 to 201.
     pub window: usize,
-    /// How the pixels of the window count.
+    /// Weights of the window's pixels.
     pub weight: Weight,
-    /// How the window may deform.
+    /// Deformation of the window.
     pub warp: Warp,
-    /// How far the alignment may move the right place (px).
+    /// Maximum shift of the right pixel by the alignment (px).
     pub reach: f64,
-    /// The least zero-normalised cross correlation of the aligned windows.
+    /// Minimum zero-normalised cross-correlation of the aligned windows.
     pub min_correlation: f64,
-    /// The greatest number of iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
-    /// What becomes of a pair that could not be aligned.
+    /// Treatment of a pair whose alignment fails.
     pub unaligned: Unaligned,
 }
 
@@ -65,7 +64,7 @@ impl Default for Direct {
 impl Component for Direct {
     const NAME: &'static str = "direct";
     const SUMMARY: &'static str =
-        "the left window laid over the right image, by splines and Gauss–Newton, with the covariance of each match";
+        "inverse-compositional Gauss–Newton alignment on cubic splines, with the covariance of each match";
     const SOURCE: &'static str = "Baker and Matthews, Lucas–Kanade 20 years on, IJCV 2004";
 
     fn check(&self) -> Result<(), String> {
@@ -124,7 +123,7 @@ impl Direct {
     }
 }
 
-/// Matches that are aligned one after the other.
+/// The number of matches in a piece of the work.
 const PIECE: usize = 64;
 
 #[derive(Debug, Default)]
@@ -141,7 +140,7 @@ mod tests {
 
     use crate::UncertainPixel;
 
-    /// Waves, seen `shift` px further to the right and half of that down, with other light and contrast.
+    /// Waves, shifted `shift` px to the right and half of that down, with the given contrast and brightness offset.
     fn waves(shift: f64, contrast: f64, light: f64) -> Image {
         let value = |i: usize| {
             let (x, y) = ((i % 60) as f64 - shift, (i / 60) as f64 - 0.5 * shift);
@@ -150,7 +149,7 @@ mod tests {
         Image::new(60, 60, (0..3600).map(|i| value(i) as f32).collect()).unwrap()
     }
 
-    /// f = 500 px, side by side, 0.25 m.
+    /// A rig with f = 500 px and the cameras side by side, 0.25 m apart.
     fn rig() -> StereoRig {
         let camera = Pinhole::new([60, 60], [500.0; 2], [29.5; 2], &[]).unwrap();
         let step = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
@@ -228,7 +227,7 @@ mod tests {
                 let error = Vector2::new(pair.at.right.u, pair.at.right.v) - truth;
                 sum += (error.transpose() * own.try_inverse().unwrap() * error).x;
             }
-            // χ² of two degrees of freedom: the mean of 300 is known to 0.12.
+            // The mean of 300 values of χ² with two degrees of freedom has a standard deviation of 0.12.
             let mean = sum / f64::from(trials);
             assert!((1.7..2.3).contains(&mean), "{warp:?}: {mean}");
         }
@@ -245,10 +244,10 @@ mod tests {
         let tiny = Image::new(1, 1, vec![90.0]).unwrap();
         let (border, far) = (Pixel { u: 2.0, v: 30.0 }, Pixel { u: 34.0, v: 30.0 });
         for (why, image, at, start) in [
-            ("nothing to align to", &flat, at, start),
-            ("an image too small", &tiny, at, start),
-            ("a window cut off", &right, border, start),
-            ("too far to reach", &right, at, far),
+            ("a flat image", &flat, at, start),
+            ("an image that is too small", &tiny, at, start),
+            ("a window beyond the border", &right, border, start),
+            ("a start beyond reach", &right, at, far),
         ] {
             let keep = Direct { unaligned: Unaligned::Keep, ..Direct::default() };
             assert_eq!(aligned(image, at, start, &keep).right, start, "{why}");

@@ -1,4 +1,4 @@
-//! Places of one image found in another where somebody knows about where they are.
+//! Alignment of points between two images with a known approximate relation.
 
 use nalgebra::{Matrix2, Vector2};
 use seafix_geometry::Pixel;
@@ -9,17 +9,18 @@ use super::{
 };
 use crate::{Image, Track, Workspace};
 
-/// A place of one image that is expected somewhere in another.
+/// A point of one image with its expected position in another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected {
-    /// In the first image.
+    /// The position in the first image.
     pub place: Pixel,
-    /// Where about it is in the second.
+    /// The expected position in the second image.
     pub start: Pixel,
-    /// Derivative of the second image's pixels by those of the first around it.
+    /// The derivative of the second image's pixels by those of the first around it.
     pub shape: Matrix2<f64>,
-    /// How the place in the second image moves with depth, in the pixels of the first; of unit length. Only
-    /// [`Warp::Slanted`] asks for it.
+    /// The direction of motion with depth in the second image, in pixels of the first; of unit length.
+    ///
+    /// Only [`Warp::Slanted`] uses it.
     pub along: Vector2<f64>,
 }
 
@@ -28,15 +29,15 @@ struct Memory {
     aligners: Vec<Aligner>,
 }
 
-/// Places that are aligned one after the other.
+/// The number of points in a piece of the work.
 const PIECE: usize = 32;
 
 impl Direct {
-    /// Replaces `found` by where `to` shows each of the `expected` places of `from`, in their order; `None` where it
-    /// does not, or not well enough.
+    /// Replaces `found` by the positions in `to` of the `expected` points of `from`, in order.
     ///
-    /// As the alignment of a stereo pair, with the relation of the two images given instead of taken from a rig: one
-    /// patch is laid over image after image, so that a place keeps its meaning.
+    /// `None` marks a point that is not visible or does not align. The alignment is that of a stereo pair with a given
+    /// relation of the images instead of a rig. One template is aligned to image after image, so a point does not
+    /// drift.
     pub fn follow_into(
         &self,
         from: &Image,
@@ -60,7 +61,7 @@ impl Direct {
         self.overlay(from, to, expected, aligner).map(Track::from)
     }
 
-    /// The window around the place, laid over the second image as these settings say.
+    /// Aligns the window around the point to the second image with these settings.
     pub(super) fn overlay(
         &self,
         from: &Image,
@@ -89,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_place_seen_larger_is_found_where_its_neighbourhood_is_expected_larger() {
-        // The second image shows all at 1.25 times the size about (120, 90).
+        // The second image shows the first at 1.25 times the size about (120, 90).
         let from = stones(240, [0.0; 2]);
         let scale = 1.25;
         let centre = [120.0, 90.0];

@@ -12,69 +12,70 @@ use super::{
 };
 use crate::{Image, UncertainPixel};
 
-/// When an alignment is believed.
+/// The acceptance rules of an alignment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rules {
-    /// Side of the window (px), odd.
+    /// The side of the window (px), odd.
     pub(crate) window: usize,
-    /// How its pixels count.
+    /// The weights of its pixels.
     pub(crate) weight: Weight,
-    /// How far the place may move (px).
+    /// The maximum shift of the position (px).
     pub(crate) reach: f64,
-    /// The least correlation of the windows.
+    /// The minimum correlation of the windows.
     pub(crate) min_correlation: f64,
-    /// The greatest number of steps.
+    /// The maximum number of steps.
     pub(crate) iterations: usize,
-    /// A step shorter than this (px) is the last.
+    /// The length (px) below which a step is the last.
     pub(crate) precision: f64,
-    /// Whether windows may reach beyond the images, which are continued as their mirror images.
+    /// Whether windows may extend beyond the images, which are then mirrored at their borders.
     pub(crate) beyond: bool,
 }
 
-/// Pixels of the greatest spline that is made for many places.
+/// The maximum number of pixels of a spline for several positions.
 const MAX_AT_ONCE: f64 = 20_000.0;
 
 impl Rules {
-    /// Far below what any window tells.
+    /// A precision (px) far below the resolution of any window.
     pub(crate) const FINE: f64 = 3e-3;
-    /// Where one more step comes: it is a tenth of this.
+    /// A precision (px) for alignments with one more step, a tenth as long.
     const COARSE: f64 = 1e-2;
 }
 
-/// Where the window was found.
+/// The result of an alignment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Aligned {
-    /// The place.
+    /// The position in the right image.
     pub(crate) at: Vector2<f64>,
-    /// What the window's neighbourhood became: the place of the left pixel + x is at + shape · x.
+    /// The deformation: the position of the left pixel + x is at + shape · x.
     pub(crate) shape: Matrix2<f64>,
-    /// Covariance of `at`, given the left place (px²).
+    /// The covariance of `at`, given the left pixel (px²).
     pub(crate) covariance: Matrix2<f64>,
-    /// Zero-normalised cross correlation of the windows.
+    /// The zero-normalised cross-correlation of the windows.
     pub(crate) correlation: f64,
 }
 
 impl Aligned {
-    /// The place with its covariance, given the left one.
+    /// The position with its covariance, given the left pixel.
     pub(super) fn place(&self) -> UncertainPixel {
         UncertainPixel { at: Pixel { u: self.at.x, v: self.at.y }, covariance: self.covariance }
     }
 }
 
-/// Memory to align in, used again for every match.
+/// The working memory of alignments, reused for each match.
 #[derive(Debug, Default)]
 pub(crate) struct Aligner {
     grid: Grid,
     template: Template,
     spline: Spline,
-    /// The variance of rounding in the right image (squares of grey levels).
+    /// The variance of rounding in the right image (squared grey levels).
     rounding: f64,
     across: Vec<f32>,
     patch: Vec<f32>,
 }
 
 impl Aligner {
-    /// The place in `right` whose window is that around `centre` in `left`, searched from `start` and `shape`.
+    /// The position in `right` whose window matches that around `centre` in `left`, from the initial `start` and
+    /// `shape`.
     pub(crate) fn align<const P: usize>(
         &mut self,
         left: &Image,
@@ -89,13 +90,12 @@ impl Aligner {
         self.judge(&at, &shape, &normal, &found, rules)
     }
 
-    /// As [`align`](Self::align) by what only moves, unless that leaves a slant which cannot be chance: then as a slanted
-    /// window is.
+    /// Aligns by translation as [`align`](Self::align), or with a slant if the translation leaves a significant one.
     ///
-    /// The test is that of Rao's score: where the moving window ended, the derivative by the slant, freed of what moving
-    /// would do, is as great as noise makes it, χ² of two degrees of freedom. Where the moving one's place stays, because the
-    /// slant may be chance or the slanted window finds no end, the error that the slant would make there comes to its
-    /// covariance.
+    /// The test is Rao's score. Under noise alone, the gradient by the slant at the end of the translation, without its
+    /// part due to translation, follows χ² with two degrees of freedom. If the slant is not significant or the slanted
+    /// alignment fails, the translation's position is kept and its covariance grows by the error that the slant would
+    /// cause.
     pub(super) fn align_as_seen(
         &mut self,
         left: &Image,
@@ -106,7 +106,7 @@ impl Aligner {
         model: &Slanted,
     ) -> Option<Aligned> {
         let start = begin.0;
-        // A comparison follows that all steps share: its own is the last.
+        // One comparison with the slant follows; the last step of every alignment reuses it.
         let coarse = Rules { precision: Rules::COARSE, ..*rules };
         let slanted = self.take(left, [centre, start], rules, model)?;
         let moving = slanted.moving();
@@ -143,7 +143,7 @@ impl Aligner {
         rules: &Rules,
         model: &impl Model<P>,
     ) -> Option<Normal<P>> {
-        // Far outside there is nothing, and numbers too great for whole ones.
+        // Positions far outside have no window, and would overflow integers.
         let possible = |at: &Vector2<f64>| at.iter().all(|x| x.abs() < 1e9);
         if !(possible(centre) && possible(start)) {
             return None;
@@ -155,9 +155,11 @@ impl Aligner {
         Some(normal)
     }
 
-    /// Where the steps from `at` and `shape` end, no further from `start` than they may go, and the comparison before the
-    /// last step, which is too short to change it; `known` is that at the beginning, if it was made.
-    #[expect(clippy::too_many_arguments, reason = "two call sites; each is a different thing")]
+    /// Iterates from `at` and `shape`, within reach of `start`, until a step is shorter than the precision.
+    ///
+    /// Returns the last comparison; that step is too short to change it. `known` is the initial comparison, if
+    /// available.
+    #[expect(clippy::too_many_arguments, reason = "two call sites with distinct arguments")]
     fn descend<const P: usize>(
         &mut self,
         right: &Image,
@@ -188,7 +190,7 @@ impl Aligner {
             if !((at - start).norm() <= rules.reach) {
                 return None;
             }
-            // A first slant may turn the window about its middle, which does not move.
+            // A first slant may turn the window about its centre, which does not move.
             if fresh && moved.norm() < rules.precision {
                 return Some((at, shape, found));
             }
@@ -196,8 +198,8 @@ impl Aligner {
         None
     }
 
-    /// The correlation of the left window with that around each of `places` in the right image; −1 where there
-    /// is none.
+    /// The correlations of the left window with those around each of `places` in the right image; −1 if the window is
+    /// unavailable.
     pub(crate) fn survey(
         &mut self,
         left: &Image,
@@ -216,7 +218,7 @@ impl Aligner {
         self.patch.resize(self.grid.weights.len(), 0.0);
         self.spline.forget();
         let here = Matrix2::identity();
-        // One spline for the places that lie close together.
+        // One spline for positions close together.
         let size = [right.width() as f64, right.height() as f64];
         let inside = |at: &&Vector2<f64>| (0..2).all(|i| at[i] >= 0.0 && at[i] < size[i]);
         let corners = places.iter().filter(inside).map(|at| self.extent(at, &here));
@@ -229,7 +231,7 @@ impl Aligner {
         }
     }
 
-    /// The alignment that ended here, if it is believed.
+    /// The alignment that ended here, if it is accepted.
     fn judge<const P: usize>(
         &self,
         at: &Vector2<f64>,
@@ -243,7 +245,7 @@ impl Aligner {
         }
         let own = covariance(normal, &self.residual(at, shape, found))?;
         let covariance = shape * own * shape.transpose();
-        // What is known worse than the start is not found.
+        // A position of a larger variance than the reach is rejected.
         let known = covariance.trace() <= rules.reach * rules.reach;
         known.then_some(Aligned { at: *at, shape: *shape, covariance, correlation: found.correlation })
     }
@@ -254,10 +256,10 @@ impl Aligner {
         [at - side, at + side]
     }
 
-    /// Makes the spline cover the warped window and a little more.
+    /// Loads the spline for the warped window with a margin.
     fn load(&mut self, image: &Image, at: &Vector2<f64>, shape: &Matrix2<f64>) -> Option<()> {
         let [first, last] = self.extent(at, shape);
-        // A window that is stretched beyond reason costs more than it is worth.
+        // An excessively stretched window is not worth its cost.
         if !((last - first).max() <= 4.0 * self.grid.side as f64 + 8.0) {
             return None;
         }
@@ -265,7 +267,7 @@ impl Aligner {
         Some(())
     }
 
-    /// Makes the spline cover these corners of windows and a little more.
+    /// Loads the spline for windows between these corners with a margin.
     fn load_between(&mut self, image: &Image, first: &Vector2<f64>, last: &Vector2<f64>) {
         let fill = (self.grid.columns - self.grid.side) as f64;
         let full = |x: f64| x.floor() as isize;
@@ -274,7 +276,7 @@ impl Aligner {
         self.spline.load(image, start, end);
     }
 
-    /// Compares the template with the window of the right image that the warp gives; `None` where the image ends.
+    /// Compares the template with the warped window of the right image; `None` beyond the image.
     fn compare<const P: usize>(
         &mut self,
         right: &Image,
@@ -328,7 +330,7 @@ impl Aligner {
         })
     }
 
-    /// What is left between the windows.
+    /// The residual between the windows.
     fn residual<const P: usize>(&self, at: &Vector2<f64>, shape: &Matrix2<f64>, found: &Found<P>) -> Residual {
         let full = *shape == Matrix2::identity();
         let squares: f32 = self.grid.weights.iter().map(|w| w * w).sum();
@@ -342,25 +344,26 @@ impl Aligner {
     }
 }
 
-/// What the comparison gave.
+/// The result of a comparison.
 struct Found<const P: usize> {
-    /// Σ w J̃ᵀ(Ĩ − T̃).
+    /// The gradient Σ w J̃ᵀ(Ĩ − T̃).
     gradient: SVector<f64, P>,
-    /// Variance of the right window (squares of grey levels).
+    /// The variance of the right window (squared grey levels).
     variance: f64,
-    /// Correlation of the windows.
+    /// The correlation of the windows.
     correlation: f64,
 }
 
 impl Found<4> {
-    /// Of its gradient the part by moving.
+    /// The comparison with the gradient by translation alone.
     fn moving(&self) -> Found<2> {
         let Self { gradient, variance, correlation } = *self;
         Found { gradient: gradient.fixed_rows::<2>(0).into(), variance, correlation }
     }
 }
 
-/// Variance of the patch, after its mean was subtracted, its product with T̃ and with the columns of J̃.
+/// Subtracts the mean of the patch; returns its variance and its product with T̃, and fills `gradient` with its
+/// products with the columns of J̃.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn sums(
     patch: &mut [f32],

@@ -1,6 +1,6 @@
-//! Sums that come out the same on any machine.
+//! Sums that are identical on any machine.
 
-/// Partial sums, added up in a fixed order; the compiler keeps them in wide registers.
+/// The number of partial sums, added in a fixed order; the compiler keeps them in wide registers.
 const LANES: usize = 16;
 
 #[inline(always)]
@@ -16,7 +16,7 @@ fn fold(lanes: [f32; LANES]) -> f32 {
     lanes[0]
 }
 
-/// Σ a b; the lengths are equal and a multiple of 8.
+/// The sum Σ a b; the lengths are equal and a multiple of 8.
 #[inline(always)]
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut lanes = [0.0; LANES];
@@ -33,7 +33,7 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     fold(lanes)
 }
 
-/// Σ a b c; the lengths are equal and a multiple of 8.
+/// The sum Σ a b c; the lengths are equal and a multiple of 8.
 #[inline(always)]
 pub(super) fn dot3(a: &[f32], b: &[f32], c: &[f32]) -> f32 {
     let mut lanes = [0.0; LANES];

@@ -1,23 +1,24 @@
-//! What the rig says about the neighbourhood of a pair of pixels.
+//! The local relation of the two images around a pair of pixels.
 
 use nalgebra::{Matrix2, Vector2};
 use seafix_geometry::{Pixel, Point, StereoPixels, StereoRig, UncertainPixels};
 
-/// The views' relation around one pair, to first order.
+/// The first-order relation of the two images around one pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Local {
-    /// Derivative of the right pixel by the left one, on a surface parallel to the left image.
+    /// The derivative of the right pixel by the left one, on a surface parallel to the left image.
     pub(super) shape: Matrix2<f64>,
-    /// How the right pixel moves with depth, in the pixels of the left image; of unit length.
+    /// The direction of motion of the right pixel with depth, in pixels of the left image; of unit length.
     pub(super) epipolar: Vector2<f64>,
 }
 
-/// A window whose border the shape moves by less than this (px) is not worth deforming.
+/// The shift of the window's border (px) below which a deformation is ignored.
 const NEGLIGIBLE: f64 = 0.02;
 
 impl Local {
-    /// Around `pair`, as far as `half` pixels. Between rectified images, or where the pair is no point, the
-    /// shape is the identity.
+    /// The relation around `pair`, for windows of half-side `half` (px).
+    ///
+    /// The shape is the identity for rectified images, or if the pair determines no point.
     pub(super) fn new(rig: &StereoRig, pair: &StereoPixels, half: f64) -> Self {
         let plain = Self { shape: Matrix2::identity(), epipolar: Vector2::x() };
         if rig.is_rectified() { plain } else { Self::unrectified(rig, pair, half).unwrap_or(plain) }

@@ -1,4 +1,4 @@
-//! Refinement of matched places between the two images.
+//! Refinements of matched pixels.
 
 mod covariance;
 mod direct;
@@ -27,12 +27,51 @@ pub use warp::Warp;
 pub use window::Weight;
 pub use zncc_parabola::ZnccParabola;
 
-/// Says more exactly where the right image shows the left place of each match, and how well that is known.
+/// A refinement: aligns the right pixel of each match to the left one and determines their covariance.
 ///
-/// Both detectors err; the error of the disparity is what the depth suffers from.
+/// Detection errors are independent in the two images; the refinement removes them from the disparity, hence from the
+/// depth.
+///
+/// ```
+/// # use nalgebra::{UnitQuaternion, Vector3};
+/// # use seafix_geometry::{Pinhole, Transform};
+/// use seafix_geometry::{Pixel, StereoPixels, StereoRig, UncertainPixels};
+/// use seafix_vision::{Image, Pair, Refinement, UncertainPixel, Workspace};
+///
+/// /// Accepts each pair unchanged, with independent errors of 0.2 px.
+/// #[derive(Debug)]
+/// struct Unchanged;
+///
+/// impl Refinement for Unchanged {
+///     fn refine_into(
+///         &self,
+///         pairs: &[Pair],
+///         _: &Image,
+///         _: &Image,
+///         _: &StereoRig,
+///         _: &mut Workspace,
+///         pixels: &mut Vec<UncertainPixels>,
+///     ) {
+///         pixels.clear();
+///         pixels.extend(pairs.iter().map(|pair| {
+///             let at = StereoPixels { left: pair.left.at, right: pair.right.at };
+///             UncertainPixels::independent(at, 0.2)
+///         }));
+///     }
+/// }
+///
+/// # let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[]).unwrap();
+/// # let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
+/// # let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+/// let image = Image::new(1024, 768, vec![0.0; 1024 * 768]).unwrap();
+/// let pixel = |u| UncertainPixel::independent(Pixel { u, v: 300.0 }, 0.5);
+/// let pair = Pair { left: pixel(500.0), right: pixel(460.0) };
+/// let refined = Unchanged.refine(&[pair], &image, &image, &rig);
+/// assert_eq!(refined[0].at.right, Pixel { u: 460.0, v: 300.0 });
+/// ```
 pub trait Refinement: Send + Sync + std::fmt::Debug {
-    /// Replaces `pixels` by the refined places of `pairs`, in their order, with their joint covariance; those that are
-    /// left out are missing.
+    /// Replaces `pixels` by the refined pixels of `pairs`, in their order, with their joint covariance; rejected pairs
+    /// are missing.
     fn refine_into(
         &self,
         pairs: &[Pair],
@@ -43,7 +82,7 @@ pub trait Refinement: Send + Sync + std::fmt::Debug {
         pixels: &mut Vec<UncertainPixels>,
     );
 
-    /// The refined places of `pairs`, in their order.
+    /// The refined pixels of the accepted `pairs`, in their order.
     fn refine(&self, pairs: &[Pair], left: &Image, right: &Image, rig: &StereoRig) -> Vec<UncertainPixels> {
         let mut pixels = Vec::new();
         self.refine_into(pairs, left, right, rig, &mut Workspace::default(), &mut pixels);
@@ -51,30 +90,30 @@ pub trait Refinement: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All refinements.
+/// The registry of refinements.
 pub static REFINEMENTS: Registry<dyn Refinement> =
     Registry::new("refinement", &[entry!(Direct), entry!(Unrefined), entry!(ZnccParabola)]);
 
-/// Reads the choice of a refinement; settings without a name are those of `direct`.
+/// Deserialises the choice of a refinement; settings without a name are those of `direct`.
 ///
 /// # Errors
-/// What is neither a name nor a table.
+/// A value that is neither a name nor a table.
 pub fn read_refinement<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Choice, D::Error> {
     Choice::deserialize_or(deserializer, Direct::NAME)
 }
 
-/// What becomes of a pair that could not be aligned.
+/// Treatment of a pair whose alignment fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unaligned {
-    /// The detectors' places stay.
+    /// The pair keeps the detectors' positions.
     Keep,
-    /// It is left out.
+    /// The pair is rejected.
     #[default]
     Drop,
 }
 
-/// Two places found each for itself.
+/// The joint covariance of two independently detected pixels.
 fn apart(pair: &Pair) -> UncertainPixels {
     let mut covariance = Matrix4::zeros();
     covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&pair.left.covariance);
@@ -82,8 +121,9 @@ fn apart(pair: &Pair) -> UncertainPixels {
     UncertainPixels { at: StereoPixels { left: pair.left.at, right: pair.right.at }, covariance }
 }
 
-/// A place found in the left image and aligned to the right one, which errs with it: `right` is known so well relative to
-/// the left place, and moves by `shape` when that does.
+/// The joint covariance of a left pixel and the right pixel that is aligned to it.
+///
+/// `right` holds the covariance given the left pixel; `shape` is the derivative of the right pixel by the left one.
 fn together(left: &UncertainPixel, right: &UncertainPixel, shape: &Matrix2<f64>) -> UncertainPixels {
     let place = left.covariance;
     let across = place * shape.transpose();

@@ -2,13 +2,13 @@
 
 use crate::Image;
 
-/// Taps to either side of the prefilter; what is cut off is 1e-4 of a pixel's value.
+/// The number of the prefilter's taps on either side; the truncated part is 1e-4 of a pixel's value.
 const REACH: usize = 7;
 
-/// The coefficients c of the cubic B-spline Σ c_ij β(x − i) β(y − j) that passes through the pixels of
-/// one rectangle of an image, continued as a mirror image beyond its border.
+/// The cubic B-spline Σ c_ij β(x − i) β(y − j) through the pixels of one rectangle of an image.
 ///
-/// The prefilter is applied as its impulse response √3 (√3 − 2)^|k|, cut off and scaled to sum 1.
+/// The image is mirrored at its border. The prefilter is its impulse response √3 (√3 − 2)^|k|, truncated and scaled to
+/// sum 1.
 ///
 /// Source: Unser, *Splines: a perfect fit for signal and image processing*, 1999.
 #[derive(Debug, Default)]
@@ -22,7 +22,7 @@ pub(super) struct Spline {
     across: Vec<f32>,
 }
 
-/// The pixels of the rectangle of `width` × `height` at `corner`, mirrored at the border.
+/// Copies the pixels of the rectangle of `width` × `height` at `corner`, mirrored at the border.
 pub(super) fn copy(image: &Image, corner: [isize; 2], width: usize, height: usize, out: &mut Vec<f32>) {
     let ([x, y], w) = (corner, image.width() as isize);
     out.clear();
@@ -37,7 +37,7 @@ pub(super) fn copy(image: &Image, corner: [isize; 2], width: usize, height: usiz
     }
 }
 
-/// The pixel that the mirror image shows at `i`, of `n`.
+/// The index within `n` pixels of the mirrored position `i`.
 fn mirrored(i: isize, n: usize) -> usize {
     let period = (2 * n as isize - 2).max(1);
     let i = i.rem_euclid(period);
@@ -45,7 +45,7 @@ fn mirrored(i: isize, n: usize) -> usize {
 }
 
 impl Spline {
-    /// Makes this the spline of the rectangle with these first and last columns and rows.
+    /// Computes the spline of the rectangle with these first and last columns and rows.
     pub(super) fn load(&mut self, image: &Image, first: [isize; 2], last: [isize; 2]) {
         let reach = REACH as isize;
         self.corner = first;
@@ -58,12 +58,12 @@ impl Spline {
         prefilter(&self.raw, self.width, self.height, &mut self.across, &mut self.coefficients);
     }
 
-    /// Makes this cover nothing.
+    /// Clears the spline, so that it covers nothing.
     pub(super) fn forget(&mut self) {
         self.coefficients.clear();
     }
 
-    /// Whether the spline is known at all places between these two corners.
+    /// Whether the spline covers the rectangle between these two corners.
     pub(super) fn covers(&self, first: [f64; 2], last: [f64; 2]) -> bool {
         let size = [self.width, self.height];
         !self.coefficients.is_empty()
@@ -73,8 +73,9 @@ impl Spline {
             })
     }
 
-    /// The values on a grid with steps of one pixel from `at`, `columns` (a multiple of 8) by `rows`. Where the
-    /// spline is not known they mean nothing.
+    /// Computes the values on a grid with steps of one pixel from `at`, `columns` (a multiple of 8) by `rows`.
+    ///
+    /// Values outside the spline are meaningless.
     pub(super) fn grid(&self, at: [f64; 2], columns: usize, rows: usize, across: &mut Vec<f32>, out: &mut [f32]) {
         let [(x, tx), (y, ty)] = [0, 1].map(|i| split(at[i] - self.corner[i] as f64));
         across.resize(columns * (rows + 3), 0.0);
@@ -83,8 +84,10 @@ impl Spline {
         separable(&self.coefficients[first..], self.width, [wx, wy], columns, across, &mut out[..columns * rows]);
     }
 
-    /// The values on a grid that is stretched and sheared along its rows: pixel i of row j lies at
-    /// `at` + (`step` i + `drift` j, j). `columns` is a multiple of 8; values where the spline is not known mean nothing.
+    /// Computes the values on a grid that is stretched and sheared along its rows.
+    ///
+    /// Pixel i of row j lies at `at` + (`step` i + `drift` j, j). `columns` is a multiple of 8; values outside the
+    /// spline are meaningless.
     pub(super) fn sheared(
         &self,
         at: [f64; 2],
@@ -101,7 +104,7 @@ impl Spline {
         shear(rows, weights(ty), line, columns, &mut across[..self.width], out);
     }
 
-    /// The value at a place that the spline covers.
+    /// The value at a position that the spline covers.
     pub(super) fn at(&self, place: [f32; 2]) -> f32 {
         let (x, y) = (place[0] as usize, place[1] as usize);
         let (wx, wy) = (weights(place[0] - x as f32), weights(place[1] - y as f32));
@@ -113,13 +116,13 @@ impl Spline {
         wy[0] * row(0) + wy[1] * row(1) + (wy[2] * row(2) + wy[3] * row(3))
     }
 
-    /// Where the rectangle begins.
+    /// The first column and row of the rectangle.
     pub(super) fn corner(&self) -> [isize; 2] {
         self.corner
     }
 }
 
-/// A coordinate inside the rectangle as a whole and a fraction.
+/// The integer and the fractional part of a coordinate inside the rectangle.
 fn split(at: f64) -> (usize, f32) {
     let full = at.floor();
     (full as usize, (at - full) as f32)
@@ -134,7 +137,7 @@ fn weights(t: f32) -> [f32; 4] {
     [a, b, 1.0 - a - b - d, d]
 }
 
-/// √3 (√3 − 2)^k for k = 0 … 7, scaled to sum 1 over both sides.
+/// The response √3 (√3 − 2)^k for k = 0 … 7, scaled to sum 1 over both sides.
 const fn response() -> [f32; REACH + 1] {
     let (mut taps, mut k) = ([0.0; REACH + 1], 1);
     let mut exact = [1.0; REACH + 1];
@@ -152,7 +155,7 @@ const fn response() -> [f32; REACH + 1] {
     taps
 }
 
-/// Pixels to coefficients, along the rows and then along the columns.
+/// Converts pixels to coefficients, along the rows and then along the columns.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn prefilter(raw: &[f32], width: usize, height: usize, across: &mut [f32], out: &mut [f32]) {
     const TAPS: [f32; REACH + 1] = response();
@@ -186,7 +189,7 @@ fn prefilter(raw: &[f32], width: usize, height: usize, across: &mut [f32], out: 
     }
 }
 
-/// A grid of one fraction: along the rows and then along the columns.
+/// Computes a grid with one fraction for all positions, along the rows and then along the columns.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn separable(
     coefficients: &[f32],
@@ -213,7 +216,7 @@ fn separable(
     }
 }
 
-/// A sheared grid: down the four rows of coefficients, then at each place along the row.
+/// Computes a sheared grid: down the four rows of coefficients, then at each position along the row.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn shear(
     coefficients: &[f32],
@@ -275,7 +278,7 @@ mod tests {
                 }
             }
         }
-        // Between them, and the same as sample by sample.
+        // Values between pixels equal those of single samples.
         spline.grid([11.3, 8.6], 8, 3, &mut across, &mut out[..24]);
         assert!((f64::from(out[9]) - value(12.3, 9.6)).abs() < 0.15);
         assert!((out[9] - spline.at([12.3 + 1.0, 9.6 + 1.0])).abs() < 1e-3);

@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 use super::{Refinement, apart};
 use crate::{Image, Pair, Workspace};
 
-/// Leaves both places where detector, locator and matcher put them.
+/// No refinement: keeps the pixels of detector, locator and matcher.
 ///
-/// They err independently, each as it was found: a fitted corner as its fit says, any other by the `sigma-px` of the
-/// triangulation.
+/// Their errors are independent: a fitted corner has the covariance of its fit, any other key point the `sigma-px` of
+/// the triangulation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Unrefined {}
 
 impl Component for Unrefined {
     const NAME: &'static str = "none";
-    const SUMMARY: &'static str = "leaves every match where it was found, with independent errors";
+    const SUMMARY: &'static str = "no refinement: keeps each match, with independent errors";
     const SOURCE: &'static str = "common usage";
 }
 

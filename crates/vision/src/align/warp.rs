@@ -1,41 +1,40 @@
-//! How a window may deform between the views.
+//! Models of a window's deformation between the views.
 
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// How the window of the left image may be laid over the right one, beside moving.
+/// Deformation of the left window in the right image, beside its translation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Warp {
-    /// Not at all: two parameters.
+    /// No deformation; two parameters.
     #[default]
     Translation,
-    /// As a plane is seen by both cameras, to first order: along the epipolar line, by an amount that
-    /// changes from place to place; four parameters.
+    /// The first-order deformation of a plane: along the epipolar line, linear in position; four parameters.
     Slanted,
-    /// As the images show it: by moving alone, and slanted where the moving window ends with a residual that only a slant
-    /// explains.
+    /// Translation, or slanted if the residual of the translation shows a significant slant.
     AsSeen,
-    /// Any way, to first order; six parameters. At the corners of boxes, with another surface behind, they
-    /// are noisier than two.
+    /// Any first-order deformation; six parameters.
+    ///
+    /// At the corners of boxes in front of another surface they are noisier than two.
     Affine,
 }
 
-/// What the columns of the Jacobian are made of: the parameters of x ↦ x + δ + Δ x, beside δ the entries of Δ.
+/// A deformation model x ↦ x + δ + Δ x, whose parameters are δ and those of Δ.
 pub(crate) trait Model<const P: usize> {
-    /// Σ_k g_k ∂(Δx)_k / ∂(parameter), for each parameter, at x with gradient g.
+    /// The derivative Σ_k g_k ∂(Δx)_k / ∂(parameter) for each parameter, at x with gradient g.
     fn columns(&self, x: [f32; 2], gradient: [f32; 2]) -> [f32; P];
-    /// Δ of these parameters.
+    /// The Δ of these parameters.
     fn shape(&self, parameters: &[f64; P]) -> Matrix2<f64>;
-    /// The parameters of this Δ; 0 for those of δ.
+    /// The parameters of Δ, with zero for those of δ.
     fn parameters(&self, shape: &Matrix2<f64>) -> [f64; P];
 }
 
-/// δ alone.
+/// The model of δ alone.
 pub(crate) struct Translation;
-/// Δ = e sᵀ: along the direction e (of unit length) by s · x.
+/// The model Δ = e sᵀ: along the direction e (of unit length) by s · x.
 pub(super) struct Slanted(pub(super) Vector2<f64>);
-/// Δ of four entries.
+/// The model of all four entries of Δ.
 pub(super) struct Affine;
 
 impl Model<2> for Translation {

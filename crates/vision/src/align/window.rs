@@ -10,35 +10,35 @@ use super::{
 };
 use crate::Image;
 
-/// How the pixels of a window count.
+/// Weights of a window's pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weight {
-    /// All the same; those cut by the border of the window in part.
+    /// Equal weights, in proportion for pixels that the window's border cuts.
     Uniform,
-    /// By a Gaussian of standard deviation side / 3, the middle most.
+    /// A Gaussian of standard deviation side / 3 about the centre.
     #[default]
     Gaussian,
 }
 
-/// The pixels around a place, row by row, each row filled up with weight 0 to a multiple of 8.
+/// The pixels around a position in row-major order, with each row padded by zero weights to a multiple of 8.
 #[derive(Debug, Default)]
 pub(super) struct Grid {
-    /// From the place to the first pixel.
+    /// The offset from the position to the first pixel.
     pub(super) first: [f64; 2],
-    /// Pixels in a row that count.
+    /// The number of pixels in a row without padding.
     pub(super) side: usize,
-    /// Pixels in a row altogether.
+    /// The number of pixels in a row with padding.
     pub(super) columns: usize,
     /// The first pixel in the image.
     corner: [isize; 2],
-    /// Σ = 1.
+    /// The weights, with sum 1.
     pub(super) weights: Vec<f32>,
     axes: [Vec<f32>; 2],
 }
 
 impl Grid {
-    /// The grid of a window with this half side (px, whole) around `centre`.
+    /// Sets the grid of a window with this half-side (px, integer) around `centre`.
     pub(super) fn place(&mut self, centre: &Vector2<f64>, half: usize, weight: Weight) {
         let reach = half as f64 + 1.0;
         self.side = 2 * half + 2;
@@ -65,53 +65,54 @@ impl Grid {
         y[..self.side].iter().for_each(|y| self.weights.extend(x.iter().map(|x| x * y)));
     }
 
-    /// The greatest steps from the place, with a pixel to spare.
+    /// The largest offset from the position, with a margin of one pixel.
     pub(super) fn reach(&self) -> f64 {
         self.side as f64 / 2.0
     }
 }
 
-/// The left window, T̃: mean subtracted, scaled to unit variance; and its derivatives by P parameters,
-/// orthogonal to what the free mean and scale can do.
+/// The left window T̃ with zero mean and unit variance, and its derivatives by P parameters.
+///
+/// The derivatives are orthogonal to the effects of the free mean and scale.
 #[derive(Debug, Default)]
 pub(super) struct Template {
     raw: Vec<f32>,
-    /// T̃ times the weights.
+    /// The weighted values T̃.
     pub(super) values: Vec<f32>,
-    /// Columns of the Jacobian J̃, one after the other.
+    /// The columns of the Jacobian J̃ in sequence.
     pub(super) jacobian: Vec<f32>,
-    /// The same times the weights.
+    /// The weighted columns of J̃.
     pub(super) weighted: Vec<f32>,
 }
 
-/// What the template tells of an alignment to it.
+/// The normal equations of an alignment to the template.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Normal<const P: usize> {
-    /// Σ w J̃ᵀJ̃.
+    /// The information Σ w J̃ᵀJ̃.
     pub(super) information: SMatrix<f64, P, P>,
-    /// What white noise of variance 1 (of the normalised grey values) adds to it.
+    /// The contribution to `information` of white noise of variance 1 (of the normalised grey levels).
     pub(super) noise: SMatrix<f64, P, P>,
-    /// Σ w² J̃ᵀJ̃.
+    /// The matrix Σ w² J̃ᵀJ̃.
     pub(super) spread: SMatrix<f64, P, P>,
-    /// What the same noise adds to that.
+    /// The contribution to `spread` of white noise of variance 1.
     pub(super) noise_spread: SMatrix<f64, P, P>,
-    /// Variance of the window (squares of grey levels).
+    /// The variance of the window (squared grey levels).
     pub(super) variance: f64,
 }
 
 impl<const P: usize> Normal<P> {
-    /// What is known of the deformation beforehand, when noise has this variance: it is small.
+    /// The prior information of the deformation, which is small, for noise of this variance.
     ///
-    /// In some windows, such as the corner of a chessboard that scales along both its edges, a
-    /// deformation changes nothing; noise would still seem to tell it, the same in every step. The prior tells a
-    /// tenth of what noise seems to, which is nothing beside a texture.
+    /// A deformation leaves some windows unchanged, such as the corner of a chessboard scaled along both its edges.
+    /// Noise would still seem to determine it, equally in every step. The prior has a tenth of that apparent
+    /// information, which is negligible beside a texture's.
     pub(super) fn prior(&self, noise: f64) -> SMatrix<f64, P, P> {
         SMatrix::from_fn(|i, j| if i == j && i >= 2 { 0.1 * noise * self.noise[(i, j)] } else { 0.0 })
     }
 }
 
 impl Normal<4> {
-    /// What is left of a slanted window's where the window only moves.
+    /// The normal equations of translation alone, from those of a slanted window.
     pub(super) fn moving(&self) -> Normal<2> {
         let part = |all: &SMatrix<f64, 4, 4>| all.fixed_view::<2, 2>(0, 0).into_owned();
         Normal {
@@ -124,11 +125,11 @@ impl Normal<4> {
     }
 }
 
-/// Below a hundredth of a grey level there is nothing to align.
+/// The minimum variance of a window: a contrast of a hundredth of a grey level.
 pub(super) const MIN_VARIANCE: f64 = 1e-4;
 
 impl Template {
-    /// Takes the window on `grid`; `None` where the image ends or is flat.
+    /// Takes the window on `grid`; `None` if the window leaves the image or is flat.
     pub(super) fn take<const P: usize>(
         &mut self,
         image: &Image,
@@ -137,7 +138,7 @@ impl Template {
         model: &impl Model<P>,
     ) -> Option<Normal<P>> {
         let size = [image.width(), image.height()];
-        // Derivatives need two pixels more.
+        // Derivatives need a margin of two pixels.
         let inside = (0..2).all(|i| {
             let (first, last) = (grid.corner[i] - 2, grid.corner[i] + grid.side as isize + 1);
             let (first, last) = if beyond { ((first + last) / 2, (first + last) / 2) } else { (first, last) };
@@ -164,17 +165,17 @@ impl Template {
 
 /// The derivative (8 (I₁ − I₋₁) − (I₂ − I₋₂)) / 12 at a pixel.
 const DERIVATIVE: [f32; 2] = [8.0 / 12.0, -1.0 / 12.0];
-/// What it makes of white noise of variance 1.
+/// The variance of the derivative of white noise of variance 1.
 const DERIVATIVE_NOISE: f32 = 2.0 * (DERIVATIVE[0] * DERIVATIVE[0] + DERIVATIVE[1] * DERIVATIVE[1]);
 
-/// Σ f(w) JᵀJ where the gradients are nothing but noise of variance 1 before the derivative.
+/// The sum Σ f(w) JᵀJ for gradients of noise alone, of variance 1 before the derivative.
 fn derivative_noise<const P: usize>(
     grid: &Grid,
     model: &impl Model<P>,
     weight: impl Fn(f32) -> f32,
 ) -> SMatrix<f64, P, P> {
-    // Weights are products of the axes' weights; with the moments of second degree go all there are: those of
-    // odd degree in x or y vanish, or nearly.
+    // Weights are products of the axes' weights. Moments of second degree suffice: odd ones in x or y vanish, or
+    // nearly.
     let [x, y] = [0, 1].map(|i| {
         let weights = grid.axes[i].iter().map(|w| weight(*w));
         let squares = weights.clone().enumerate().map(|(k, w)| {
@@ -195,7 +196,7 @@ fn derivative_noise<const P: usize>(
     sum * (0.25 * f64::from(total * DERIVATIVE_NOISE))
 }
 
-/// Fills the template from its raw pixels; what scaled it.
+/// Computes the template from its raw pixels; returns its scale.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn derive<const P: usize, M: Model<P>>(
     template: &mut Template,

@@ -1,4 +1,4 @@
-//! Whole pixels compared by correlation, and the paraboloid through the nine best.
+//! Subpixel refinement by the paraboloid through nine correlations.
 
 use nalgebra::Matrix2;
 use seafix_component::{Component, in_range};
@@ -12,30 +12,33 @@ use crate::{
     matching::correlate::{Template, WIDEST},
 };
 
-/// What most stereo programs do: the window around the left place is compared with those around the whole pixels near
-/// the right place, by zero-normalised cross correlation c, and the right place becomes the vertex of the
-/// paraboloid through the nine correlations around the greatest.
+/// The vertex of the paraboloid through nine correlations at integer pixels, as in most stereo programs.
 ///
-/// With n pixels in the window and H = −∂²c the covariance is 2 (1 − c) / n · H⁻¹, as of any least-squares fit, and
-/// `floor-px`² besides: correlations are no paraboloid, which pulls the vertex towards whole pixels, and windows are
-/// not deformed, whatever the rig. That error is the same in every frame, so that no number of pixels averages it.
+/// The window around the left pixel is compared with those around the integer pixels near the right one, by
+/// zero-normalised cross-correlation c. The right pixel becomes the vertex of the paraboloid through the nine
+/// correlations around the maximum.
 ///
-/// Where the best is at the edge of the search, or less than `min-correlation`, the pair is most often a false match.
+/// The covariance, for n pixels in the window and H = −∂²c, is that of a least-squares fit, 2 (1 − c) / n · H⁻¹, plus
+/// `floor-px`². The latter covers a bias: correlations are no paraboloid, which pulls the vertex towards integer
+/// pixels, and windows are not deformed, whatever the rig. That error is the same in every frame and does not average
+/// out.
 ///
-/// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi,
-/// *Precise sub-pixel estimation on area-based matching*, ICCV 2001.
+/// A pair is most often a false match if its maximum lies at the edge of the search or is below `min-correlation`.
+///
+/// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi, *Precise
+/// sub-pixel estimation on area-based matching*, ICCV 2001.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccParabola {
-    /// Side of the window (px), odd, 3 to 51.
+    /// Side of the window (px); odd, 3 to 51.
     pub window: usize,
-    /// How far around the right place is searched (whole px along each axis), 1 to 7.
+    /// Half-width of the search around the right pixel (integer px along each axis), 1 to 7.
     pub reach: usize,
-    /// The least zero-normalised cross correlation.
+    /// Minimum zero-normalised cross-correlation.
     pub min_correlation: f64,
-    /// Standard deviation of what the paraboloid is off by where surfaces slant as those of boxes and walls do (px).
+    /// Standard deviation of the paraboloid's bias (px); the default is for the slants of boxes and walls.
     pub floor_px: f64,
-    /// What becomes of a pair that could not be aligned.
+    /// Treatment of a pair whose refinement fails.
     pub unaligned: Unaligned,
 }
 
@@ -47,7 +50,7 @@ impl Default for ZnccParabola {
 
 impl Component for ZnccParabola {
     const NAME: &'static str = "zncc-parabola";
-    const SUMMARY: &'static str = "the vertex of the paraboloid through nine correlations of whole pixels";
+    const SUMMARY: &'static str = "the vertex of the paraboloid through nine correlations at integer pixels";
     const SOURCE: &'static str = "Tian and Huhns, Algorithms for subpixel registration, CVGIP 1986";
 
     fn check(&self) -> Result<(), String> {
@@ -61,9 +64,9 @@ impl Component for ZnccParabola {
     }
 }
 
-/// A row of the search and one pixel beyond either end are compared at once.
+/// The largest half-width of a search: a row with one pixel beyond either end is compared at once.
 const MAX_REACH: usize = 7;
-/// Matches that are refined one after the other.
+/// The number of matches in a piece of the work.
 const PIECE: usize = 64;
 
 #[derive(Debug, Default)]
@@ -99,15 +102,15 @@ impl Refinement for ZnccParabola {
 }
 
 impl ZnccParabola {
-    /// Where the right image shows the left place, given that.
+    /// The right position of the left pixel, given that pixel.
     fn place(&self, left: &Image, right: &Image, pair: &Pair, template: &mut Template) -> Option<UncertainPixel> {
         let full = |at: f64| (0.0..1e9).contains(&at.round()).then(|| at.round() as usize);
         let begin = [full(pair.left.at.u)?, full(pair.left.at.v)?];
-        // The left place lies beside its pixel; the right one lies beside another by as much.
+        // The left position has an offset from its integer pixel; the right one has the same offset from another.
         let beside = [pair.left.at.u - begin[0] as f64, pair.left.at.v - begin[1] as f64];
         let around = [full(pair.right.at.u - beside[0])?, full(pair.right.at.v - beside[1])?];
         template.take(left, begin, self.window / 2)?;
-        // Nine are needed around the best: one pixel more than the search.
+        // One pixel more than the search, for the nine correlations around the best.
         let (wide, side) = (self.reach + 1, 2 * self.reach + 3);
         let corner = [around[0].checked_sub(wide)?, around[1].checked_sub(wide)?];
         let mut rows = [[-1.0_f32; 2 * MAX_REACH + 3]; 2 * MAX_REACH + 3];

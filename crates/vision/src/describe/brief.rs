@@ -1,4 +1,4 @@
-//! BRIEF: which of two places is the brighter, 256 times.
+//! The BRIEF descriptor: 256 comparisons of brightness.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -7,18 +7,18 @@ use super::comparisons::{self, Settings};
 use super::{Descriptor, Descriptors};
 use crate::{Image, Keypoint, Workspace};
 
-/// BRIEF-256, upright: a bit for each of 256 pairs of places, set where the first is the darker.
+/// BRIEF-256, upright: one bit for each of 256 pairs of points, set if the first is darker.
 ///
-/// The places are drawn from a Gaussian of 31/5 steps around the key point; what is compared are means
-/// over squares of 5 steps, at the key point's fraction of a pixel. Distances are counted in bits that differ.
-/// Light and contrast drop out, and so does any rising curve of brightness.
+/// The points are drawn from a Gaussian of 31/5 steps around the key point. Means over squares of 5 steps are compared,
+/// at the key point's subpixel position. Distances are Hamming distances. The descriptor is invariant under any
+/// increasing function of brightness, hence under offset and contrast.
 ///
-/// Source: Calonder, Lepetit, Strecha and Fua, *BRIEF: binary robust independent elementary features*,
-/// ECCV 2010 (its pattern G II).
+/// Source: Calonder, Lepetit, Strecha and Fua, *BRIEF: binary robust independent elementary features*, ECCV 2010 (its
+/// pattern G II).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Brief {
-    /// The step of the pattern (px): the window is 35 steps wide. 0: half the key point's own scale.
+    /// Step of the pattern (px), whose window is 35 steps wide; 0: half the key point's own scale.
     pub scale: f64,
 }
 

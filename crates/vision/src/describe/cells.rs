@@ -1,15 +1,14 @@
-//! Means of an image over a grid of square cells, at any fraction of a pixel.
+//! Means of an image over a grid of square cells at subpixel positions.
 
 use multiversion::multiversion;
 use seafix_geometry::Pixel;
 
 use crate::Image;
 
-/// Means over `N`×`N` cells, column by column, `cells[column][row]`; of a column's `LANES` values the
-/// first `N` count.
+/// The means over `N`×`N` cells, `cells[column][row]`; the first `N` of a column's `LANES` values are valid.
 pub(super) type Cells<const N: usize, const LANES: usize> = [[f32; LANES]; N];
 
-/// A square grid of cells around a place.
+/// A square grid of cells around a position.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
     at: Pixel,
@@ -17,17 +16,16 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Around `at`, its cells `step` px wide; what is no size counts as 0: cells without extent.
+    /// A grid around `at` with cells `step` px wide; an invalid size counts as 0: cells without extent.
     pub(super) fn new(at: Pixel, step: f64) -> Self {
         Self { at, step: step.max(0.0) }
     }
 
-    /// The means over the cells, pixels being squares of constant grey and the outermost ones
-    /// continuing beyond the border; less the grey at the centre, so that nothing is lost to rounding
-    /// where the image is bright, and a constant image gives zeros.
+    /// Computes the means over the cells of an upright grid, less the grey level at the centre.
     ///
-    /// Summed from the pixels themselves: with a thousand key points that is cheaper than an integral
-    /// image, and exact.
+    /// Pixels are squares of constant grey, and the border pixels continue beyond the border. The subtraction avoids
+    /// rounding where the image is bright and gives zeros for a constant image. Pixels are summed directly, which for a
+    /// thousand key points is cheaper than an integral image, and exact.
     pub(super) fn upright<const N: usize, const LANES: usize>(
         &self,
         image: &Image,
@@ -40,8 +38,9 @@ impl Grid {
         upright(pixels, width, self.grey(pixels, width), &across, &down, sums, cells);
     }
 
-    /// The same over a grid turned so that its columns follow each other along (cos, sin) in the image:
-    /// each cell's mean is that of bilinear samples at most 2 px apart.
+    /// Computes the means over a grid whose columns follow each other along (cos, sin) in the image.
+    ///
+    /// Each cell's mean is that of bilinear samples at most 2 px apart.
     pub(super) fn turned<const N: usize, const LANES: usize>(
         &self,
         pixels: &[f32],
@@ -54,7 +53,7 @@ impl Grid {
         line.resize((N * samples).next_multiple_of(BLOCK), 0.0);
         *cells = [[0.0; LANES]; N];
         let pitch = self.step / samples as f64;
-        // Offsets from a whole pixel keep their precision in single precision.
+        // Offsets from an integer pixel keep their accuracy in single precision.
         let full = [libm::floor(self.at.u), libm::floor(self.at.v)];
         let offset = |i: usize| (i as f64 - 0.5 * (N * samples - 1) as f64) * pitch;
         let grey = self.grey(pixels, width);
@@ -73,9 +72,9 @@ impl Grid {
         }
     }
 
-    /// The grey of the pixel nearest to the centre.
+    /// The grey level of the pixel nearest to the centre.
     fn grey(&self, pixels: &[f32], width: usize) -> f32 {
-        // A cast saturates, and not-a-number gives 0.
+        // A cast saturates, and NaN gives 0.
         let nearest = |x: f64, pixels: usize| ((x + 0.5) as usize).min(pixels - 1);
         pixels[nearest(self.at.v, pixels.len() / width) * width + nearest(self.at.u, width)]
     }
@@ -90,14 +89,14 @@ impl Grid {
         if first == last {
             return Span { first, last, head: 1.0, body, tail: 0.0 };
         }
-        // Beyond the border `from` or `to` lies outside its pixel, which then weighs as much more.
+        // Beyond the border `from` or `to` lies outside its pixel, whose weight grows accordingly.
         let head = ((first + 1) as f64 - from) / self.step;
         let tail = (to - last as f64) / self.step;
         Span { first, last, head: head as f32, body, tail: tail as f32 }
     }
 }
 
-/// The pixels of a cell along one axis: the weight of the first, of each between, and of the last.
+/// The pixels of a cell along one axis: the weights of the first, of each between, and of the last.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     first: usize,
@@ -107,10 +106,10 @@ struct Span {
     tail: f32,
 }
 
-/// Numbers that are worked on side by side.
+/// The number of values that are processed side by side.
 const BLOCK: usize = 16;
 
-/// At most so many samples along a cell's side, however large it is.
+/// The maximum number of samples along a cell's side.
 const MAX_SAMPLES: usize = 64;
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
@@ -123,7 +122,7 @@ fn upright<const N: usize, const LANES: usize>(
     sums: &mut Vec<f32>,
     cells: &mut Cells<N, LANES>,
 ) {
-    // Whole blocks of columns, moved to the left where they would reach beyond the border.
+    // Complete blocks of columns, shifted left if they would exceed the border.
     let wide = (across[N - 1].last + 1 - across[0].first).next_multiple_of(BLOCK).min(width);
     let left = across[0].first.min(width - wide);
     let row = |y: usize| &pixels[y * width + left..][..wide];
@@ -157,7 +156,7 @@ fn upright<const N: usize, const LANES: usize>(
     }
 }
 
-/// Bilinear samples along a line, `pace` apart, beginning at `start` from a whole pixel.
+/// Computes bilinear samples along a line with spacing `pace`, from `start` relative to an integer pixel.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn sample(pixels: &[f32], width: usize, full: [i32; 2], start: [f32; 2], pace: [f32; 2], line: &mut [f32]) {
     let last = [width as i32 - 1, (pixels.len() / width) as i32 - 1];
@@ -168,7 +167,7 @@ fn sample(pixels: &[f32], width: usize, full: [i32; 2], start: [f32; 2], pace: [
         for axis in 0..2 {
             for i in 0..BLOCK {
                 let place = start[axis] + (block * BLOCK + i) as i32 as f32 * pace[axis];
-                // The greatest whole number not above: a cast rounds towards zero.
+                // The floor: a cast rounds towards zero.
                 let cut = place as i32;
                 let floor = cut.saturating_sub(i32::from(cut as f32 > place));
                 weight[axis][i] = place - floor as f32;
@@ -221,9 +220,9 @@ mod tests {
         // Half of the first, all of the second and half of the third column.
         assert_eq!(upright::<1>(&image, 1.0, 0.5, 2.0), [[3.5 - 5.0]]);
         assert_eq!(upright::<2>(&image, 0.5, 0.5, 1.0), [[1.0 - 5.0, 4.0 - 5.0], [2.0 - 5.0, 5.0 - 5.0]]);
-        // From −2 to 0 the first column continues.
+        // The first column continues from −2 to 0.
         assert_eq!(upright::<1>(&image, -1.5, 0.5, 2.0), [[2.5 - 4.0]]);
-        // Beyond the corner there is but the last pixel.
+        // Only the last pixel exists beyond the corner.
         assert_eq!(upright::<1>(&image, 40.0, 30.0, 3.0), [[0.0]]);
         // A cell of a quarter of a pixel lies inside one.
         assert_eq!(upright::<1>(&image, 1.1, 0.1, 0.25), [[0.0]]);
@@ -244,7 +243,7 @@ mod tests {
                     assert!(error.abs() < 1e-4, "{along:?} {step} {i} {j}: {error}");
                     if along == [1.0, 0.0] && step != 0.7 {
                         let upright = upright::<4>(&ramp, u, v, step)[i][j];
-                        // Constant pixels: a cell inside a few sees their steps.
+                        // Pixels are constant, so a cell of a few pixels sees their steps.
                         assert!((f64::from(upright) - f64::from(cells[i][j])).abs() < 1.0, "{step}: {upright}");
                     }
                 }

@@ -1,4 +1,4 @@
-//! The comparisons of brightness that BRIEF and ORB are made of.
+//! The comparisons of brightness of BRIEF and ORB.
 
 use std::sync::OnceLock;
 
@@ -8,39 +8,39 @@ use super::cells::{Cells, Grid};
 use super::{Descriptors, halves::Halves};
 use crate::{Image, Keypoint, Workspace};
 
-/// What distinguishes the descriptors.
+/// The settings that distinguish the descriptors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// The step of the pattern (px); 0: half the key point's own scale.
     pub(super) scale: f64,
-    /// Whether the pattern turns with its surroundings.
+    /// Whether the pattern is rotated to the orientation of its surroundings.
     pub(super) turned: bool,
 }
 
-/// Comparisons.
+/// The number of comparisons.
 const BITS: usize = 256;
-/// How far from the centre the places compared lie at most (steps).
+/// The largest distance of a point from the centre (steps).
 const RADIUS: usize = 15;
-/// Places along a side.
+/// The number of points along a side.
 const SIDE: usize = 2 * RADIUS + 1;
-/// Cells along the side of the square that smooths a place.
+/// The number of cells along the side of the square that smooths a point.
 const SMOOTH: usize = 5;
-/// Cells along a side.
+/// The number of cells along a side.
 const CELLS: usize = SIDE + SMOOTH - 1;
-/// Their memory along the side.
+/// The length of a column of cells in memory.
 const LANES: usize = 40;
-/// Key points described by one thread at a time.
+/// The number of key points in a piece of the work.
 const PIECE: usize = 64;
 
-/// What stays in memory.
+/// The working memory of the descriptors.
 #[derive(Debug, Default)]
 struct Scratch {
     halves: Halves,
-    /// One for each piece.
+    /// The buffer of each piece.
     pieces: Vec<Vec<f32>>,
 }
 
-/// Replaces `described` by the bits of every key point.
+/// Replaces `described` by the bits of each key point.
 pub(super) fn describe(
     settings: &Settings,
     image: &Image,
@@ -78,8 +78,7 @@ pub(super) fn describe(
     });
 }
 
-/// (cos, sin) of the direction from the centre to the centroid of brightness within the radius; (1, 0)
-/// where there is none.
+/// The direction (cos, sin) from the centre to the centroid of brightness within the radius; (1, 0) if undefined.
 fn towards_centroid(cells: &Cells<CELLS, LANES>) -> [f64; 2] {
     let margin = (SMOOTH - 1) / 2;
     let offset = |i: usize| i as i32 - RADIUS as i32;
@@ -95,11 +94,11 @@ fn towards_centroid(cells: &Cells<CELLS, LANES>) -> [f64; 2] {
         }
     }
     let length = (moments[0] * moments[0] + moments[1] * moments[1]).sqrt();
-    // Not so for not-a-number either.
+    // The condition is false for NaN too.
     if length > 0.0 && length < f64::INFINITY { moments.map(|moment| moment / length) } else { [1.0, 0.0] }
 }
 
-/// Sums over the squares around all places, column by column.
+/// The sums over the squares around all points, column by column.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn smooth(cells: &Cells<CELLS, LANES>) -> [f32; SIDE * SIDE] {
     let mut places = [0.0; SIDE * SIDE];
@@ -119,8 +118,9 @@ fn smooth(cells: &Cells<CELLS, LANES>) -> [f32; SIDE * SIDE] {
     places
 }
 
-/// The pairs of places compared, drawn once: their coordinates are those of a Gaussian of SIDE/5 steps,
-/// rounded; what falls outside the circle is drawn again, and so is a pair of one place with itself.
+/// The compared pairs of points, drawn once from a Gaussian of SIDE/5 steps and rounded.
+///
+/// Points outside the circle and pairs of a point with itself are drawn again.
 fn pattern() -> &'static [[u16; 2]; BITS] {
     static PATTERN: OnceLock<[[u16; 2]; BITS]> = OnceLock::new();
     PATTERN.get_or_init(|| {
@@ -152,8 +152,9 @@ fn gaussian(index: u64) -> [f64; 2] {
     [radius * cos, radius * sin]
 }
 
-/// 64 bits of a counter: SplitMix64 (Steele, Lea and Flood, *Fast splittable pseudorandom number
-/// generators*, 2014) from the seed 0x5EAF_1C50.
+/// 64 random bits of a counter by SplitMix64 from the seed 0x5EAF_1C50.
+///
+/// Source: Steele, Lea and Flood, *Fast splittable pseudorandom number generators*, 2014.
 fn mixed(counter: u64) -> u64 {
     let z = 0x5EAF_1C50_u64.wrapping_add(counter.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     let z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -179,7 +180,7 @@ mod tests {
         (0..BITS).map(|i| words[i / 64] >> (i % 64) & 1 == 1).collect()
     }
 
-    /// Column and row of a place.
+    /// The column and the row of a point.
     fn place(index: u16) -> [i32; 2] {
         [i32::from(index) / SIDE as i32, i32::from(index) % SIDE as i32]
     }
@@ -191,7 +192,7 @@ mod tests {
         for axis in 0..2 {
             let mean = places.iter().map(|p| f64::from(p[axis])).sum::<f64>() / 512.0;
             let square = places.iter().map(|p| f64::from(p[axis] * p[axis])).sum::<f64>() / 512.0;
-            // The circle cuts the Gaussian of 6.2 off at 2.4 of its standard deviation.
+            // The circle truncates the Gaussian of 6.2 at 2.4 standard deviations.
             assert!(mean.abs() < 0.8 && (square.sqrt() - 5.6).abs() < 0.4, "{mean} {}", square.sqrt());
         }
         assert_eq!(mixed(0), mixed(0));

@@ -1,30 +1,30 @@
-//! Gradients in a turned window around a key point, and the direction of most of them.
+//! Gradients in a rotated window around a key point, and their dominant direction.
 
 use super::sample::bilinear;
 use crate::{Keypoint, scale_space::Octave};
 
-/// Cells along a side.
+/// The number of cells along a side.
 pub(super) const CELLS: usize = 4;
-/// Samples along the side of a cell.
+/// The number of samples along the side of a cell.
 const PER_CELL: usize = 4;
-/// Gradients along a side: half a cell more on either side, which the outermost cells share in.
+/// The number of gradients along a side, including half a cell on either side that the outermost cells share.
 pub(super) const SIDE: usize = (CELLS + 1) * PER_CELL;
-/// Directions.
+/// The number of directions of a histogram.
 pub(super) const DIRECTIONS: usize = 8;
-/// From gradient to gradient (σ): a cell is 3σ wide.
+/// The spacing of the gradients (σ); a cell is 3σ wide.
 pub(super) const STEP: f64 = 3.0 / PER_CELL as f64;
-/// Gradients along the side of the window for the direction: 4.5 σ either way.
+/// The number of gradients along the side of the window for the direction: 4.5 σ on either side.
 const AROUND: usize = 19;
-/// From gradient to gradient there (σ).
+/// The spacing of the gradients in that window (σ).
 const AROUND_STEP: f64 = 0.5;
-/// Standard deviation of that window (σ).
+/// The standard deviation of that window's Gaussian (σ).
 const AROUND_SIGMA: f64 = 1.5;
-/// Bins of its histogram.
+/// The number of bins of the direction's histogram.
 const BINS: usize = 36;
 
-/// What is the same for all key points.
+/// The weights common to all key points.
 pub(super) struct Window {
-    /// How much a sample counts for each cell along one axis, the Gaussian included.
+    /// The weight of a sample for each cell along one axis, including the Gaussian.
     pub(super) cells: [[f32; CELLS]; SIDE],
     /// The Gaussian of the direction's window along one axis.
     around: [f32; AROUND],
@@ -45,17 +45,17 @@ impl Window {
     }
 }
 
-/// Where a key point lies in its level.
+/// The position of a key point in its scale-space level.
 pub(super) struct LevelPosition<'a> {
     pixels: &'a [f32],
     width: usize,
     at: [f32; 2],
-    /// σ in pixels of the octave.
+    /// The scale σ (px of the octave).
     sigma: f64,
 }
 
 impl<'a> LevelPosition<'a> {
-    /// The levels begin at row `first` of the octave.
+    /// The position of a key point; the levels begin at row `first` of the octave.
     pub(super) fn new(
         levels: &'a Octave,
         (octave, first): (i32, usize),
@@ -68,7 +68,7 @@ impl<'a> LevelPosition<'a> {
         Self { pixels: levels.level(level), width: levels.width(), at, sigma: scale.max(0.1) / pixel }
     }
 
-    /// The brightness at the corners of a grid of squares, `step` σ wide and turned to `direction`.
+    /// The brightness at the corners of a grid of squares, `step` σ wide and rotated to `direction`.
     pub(super) fn grid<const N: usize>(&self, step: f64, direction: [f32; 2]) -> [[f32; N]; N] {
         let step = (step * self.sigma) as f32;
         let [cos, sin] = direction.map(|part| part * step);
@@ -83,7 +83,7 @@ impl<'a> LevelPosition<'a> {
         })
     }
 
-    /// The direction (cosine, sine) in which most of the brightness around grows.
+    /// The dominant direction (cosine, sine) of the gradients around the key point.
     pub(super) fn direction(&self, window: &Window) -> [f32; 2] {
         let corners: [[f32; AROUND + 1]; AROUND + 1] = self.grid(AROUND_STEP, [1.0, 0.0]);
         let mut histogram = [0.0_f32; BINS];
@@ -112,7 +112,7 @@ impl<'a> LevelPosition<'a> {
     }
 }
 
-/// Magnitude and direction (in turns, 0 to 1) of the gradients in the squares between two rows of corners.
+/// The magnitudes and directions (in turns, 0 to 1) of the gradients in the squares between two rows of corners.
 #[inline(always)]
 pub(super) fn gradients<const C: usize, const N: usize>(upper: &[f32; C], lower: &[f32; C]) -> ([f32; N], [f32; N]) {
     let (mut magnitude, mut turn) = ([0.0; N], [0.0; N]);
@@ -125,15 +125,15 @@ pub(super) fn gradients<const C: usize, const N: usize>(upper: &[f32; C], lower:
     (magnitude, turn)
 }
 
-/// The angle of (x, y) in turns, 0 to 1; to 1.3e-5 of a turn, in operations that are exact everywhere.
+/// The angle of (x, y) in turns, 0 to 1, accurate to 1.3e-5, by operations that are exact on every machine.
 #[inline(always)]
 fn turn_of(x: f32, y: f32) -> f32 {
     let (a, b) = (x.abs(), y.abs());
     let (small, great) = if a < b { (a, b) } else { (b, a) };
-    // Of no gradient the angle is zero.
+    // The angle of a zero gradient is zero.
     let t = small / (great + f32::MIN_POSITIVE);
     let s = t * t;
-    // atan t / 2π, least greatest error on 0 to 1.
+    // atan t / 2π with minimax error on 0 to 1.
     let eighth = t * (0.159_029_8 + s * (-0.051_116_57 + s * (0.023_278_67 - s * 0.006_204_87)));
     let quarter = if a < b { 0.25 - eighth } else { eighth };
     let half = if x < 0.0 { 0.5 - quarter } else { quarter };

@@ -1,4 +1,4 @@
-//! An image at half its size, and half of that, for windows much larger than a pixel.
+//! Successive halves of an image, for windows much larger than a pixel.
 
 use multiversion::multiversion;
 use seafix_geometry::Pixel;
@@ -6,20 +6,21 @@ use seafix_geometry::Pixel;
 use super::cells::Grid;
 use crate::Image;
 
-/// Smaller and smaller images, each pixel the mean of 2×2 of the one before; where a side is odd the last
-/// pixel counts twice.
+/// Successive halves of an image, in which each pixel is the mean of 2×2 of the one before.
+///
+/// The last pixel of an odd side counts twice.
 #[derive(Debug, Default)]
 pub(super) struct Halves {
     levels: Vec<(usize, Vec<f32>)>,
     filled: usize,
 }
 
-/// Cells of at least twice this width (px) are taken from the next smaller image.
+/// The threshold of the cell width (px): cells of at least twice this width use the next smaller image.
 const FINEST: f64 = 3.0;
-/// No more images are made.
+/// The maximum number of halves.
 const MAX: usize = 16;
 
-/// How often to halve for cells of this width.
+/// The number of halvings for cells of this width.
 fn halvings(step: f64) -> usize {
     (0..MAX).take_while(|&level| step >= 2.0 * FINEST * (1_u64 << level) as f64).count()
 }
@@ -38,7 +39,7 @@ impl Halves {
         }
     }
 
-    /// The grid, and the pixels and the width of the image in which its cells are a few pixels wide.
+    /// The grid, with the pixels and the width of the image in which its cells are a few pixels wide.
     pub(super) fn at<'a>(&'a self, image: &'a Image, at: Pixel, step: f64) -> (Grid, &'a [f32], usize) {
         let level = halvings(step).min(self.filled);
         let pixel = (1_u64 << level) as f64;
@@ -91,7 +92,7 @@ mod tests {
             grid.turned(pixels, width, [0.6, 0.8], &mut Vec::new(), &mut cells);
             let slope = f64::from(cells[1][0] - cells[0][0]) / step;
             assert!((slope - (2.0 * 0.6 + 0.8)).abs() < 1e-4, "{step}: {slope}");
-            // Cells are given less the grey of the pixel at the centre.
+            // Cells are relative to the grey level of the pixel at the centre.
             let pixel = (256 / width) as f64;
             let nearest = |x: f64| libm::round((x - 0.5 * (pixel - 1.0)) / pixel) as usize;
             let grey = pixels[nearest(130.6) * width + nearest(120.3)];

@@ -1,4 +1,4 @@
-//! Descriptors: what the surroundings of a key point look like.
+//! Descriptors of key points.
 
 mod brief;
 mod cells;
@@ -21,17 +21,18 @@ pub use zncc_patch::ZnccPatch;
 
 use crate::{Image, Keypoint, Workspace};
 
-/// One descriptor a key point, all of one kind and length: numbers, compared by their Euclidean
-/// distance, or bits, compared by how many differ (Hamming).
+/// Descriptors of one kind and length, one for each key point.
+///
+/// Numbers are compared by their Euclidean distance, bits by their Hamming distance.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Descriptors {
-    /// Vectors of so many numbers each.
+    /// Vectors of numbers.
     Numbers(Table<f32>),
-    /// Strings of so many words of 64 bits each.
+    /// Bit strings in words of 64 bits.
     Bits(Table<u64>),
 }
 
-/// Rows of equal length, one after the other.
+/// A table of rows of equal length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table<T> {
     length: usize,
@@ -45,39 +46,39 @@ impl<T> Default for Table<T> {
 }
 
 impl<T: Copy + Default> Table<T> {
-    /// Rows of `length` values each.
+    /// A table with rows of `length` values each.
     ///
     /// # Panics
-    /// When the values do not fill whole rows.
+    /// If the values do not fill complete rows.
     pub fn new(length: usize, values: Vec<T>) -> Self {
         assert!(length > 0 && values.len().is_multiple_of(length), "rows of {length} do not fill {}", values.len());
         Self { length, values }
     }
 
-    /// Makes it `rows` rows of `length` values, keeping its memory; what they hold is not said.
+    /// Resizes the table to `rows` rows of `length` values and reuses its memory; the contents are unspecified.
     pub fn reset(&mut self, rows: usize, length: usize) -> &mut [T] {
-        assert!(length > 0, "a row has a value");
+        assert!(length > 0, "a row without values");
         self.length = length;
         self.values.resize(rows * length, T::default());
         &mut self.values
     }
 
-    /// Values in a row.
+    /// The length of a row.
     pub fn length(&self) -> usize {
         self.length
     }
 
-    /// How many rows there are.
+    /// The number of rows.
     pub fn len(&self) -> usize {
         self.values.len() / self.length
     }
 
-    /// Whether there is none.
+    /// Whether the table is empty.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Row `index`.
+    /// The row `index`.
     pub fn row(&self, index: usize) -> &[T] {
         &self.values[index * self.length..][..self.length]
     }
@@ -95,29 +96,29 @@ impl Default for Descriptors {
 }
 
 impl Descriptors {
-    /// Makes them `count` vectors of `length` numbers, keeping the memory; what they hold is not said.
+    /// Resizes to `count` vectors of `length` numbers and reuses the memory; the contents are unspecified.
     pub fn numbers_mut(&mut self, count: usize, length: usize) -> &mut [f32] {
         if let Self::Bits(_) = self {
             *self = Self::default();
         }
         match self {
             Self::Numbers(table) => table.reset(count, length),
-            Self::Bits(_) => unreachable!("made numbers above"),
+            Self::Bits(_) => unreachable!("numbers were set above"),
         }
     }
 
-    /// Makes them `count` strings of `words` words, keeping the memory; what they hold is not said.
+    /// Resizes to `count` strings of `words` words and reuses the memory; the contents are unspecified.
     pub fn bits_mut(&mut self, count: usize, words: usize) -> &mut [u64] {
         if let Self::Numbers(_) = self {
             *self = Self::Bits(Table::default());
         }
         match self {
             Self::Bits(table) => table.reset(count, words),
-            Self::Numbers(_) => unreachable!("made bits above"),
+            Self::Numbers(_) => unreachable!("bits were set above"),
         }
     }
 
-    /// How many there are.
+    /// The number of descriptors.
     pub fn len(&self) -> usize {
         match self {
             Self::Numbers(table) => table.len(),
@@ -125,12 +126,12 @@ impl Descriptors {
         }
     }
 
-    /// Whether there is none.
+    /// Whether there are no descriptors.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The numbers; `None` where they are bits.
+    /// The vectors; `None` for bits.
     pub fn numbers(&self) -> Option<&Table<f32>> {
         match self {
             Self::Numbers(table) => Some(table),
@@ -138,7 +139,7 @@ impl Descriptors {
         }
     }
 
-    /// The bits; `None` where they are numbers.
+    /// The bit strings; `None` for numbers.
     pub fn bits(&self) -> Option<&Table<u64>> {
         match self {
             Self::Bits(table) => Some(table),
@@ -147,12 +148,34 @@ impl Descriptors {
     }
 }
 
-/// Describes the surroundings of key points.
+/// A descriptor: describes the surroundings of key points.
+///
+/// ```
+/// use seafix_geometry::Pixel;
+/// use seafix_vision::{Descriptor, Descriptors, Image, Keypoint, Workspace};
+///
+/// /// The grey level of the nearest pixel, for key points inside the image.
+/// #[derive(Debug)]
+/// struct Grey;
+///
+/// impl Descriptor for Grey {
+///     fn describe_into(&self, image: &Image, keypoints: &[Keypoint], _: &mut Workspace, described: &mut Descriptors) {
+///         let numbers = described.numbers_mut(keypoints.len(), 1);
+///         for (number, keypoint) in numbers.iter_mut().zip(keypoints) {
+///             *number = image.row(keypoint.at.v.round() as usize)[keypoint.at.u.round() as usize];
+///         }
+///     }
+/// }
+///
+/// let image = Image::new(2, 1, vec![10.0, 20.0]).unwrap();
+/// let keypoint = Keypoint { at: Pixel { u: 1.0, v: 0.0 }, response: 1.0, scale: 1.0 };
+/// assert_eq!(Grey.describe(&image, &[keypoint]).numbers().unwrap().row(0), [20.0]);
+/// ```
 pub trait Descriptor: Send + Sync + std::fmt::Debug {
     /// Replaces `described` by one descriptor for each key point, in their order.
     fn describe_into(&self, image: &Image, keypoints: &[Keypoint], work: &mut Workspace, described: &mut Descriptors);
 
-    /// One descriptor for each key point of one image, in their order.
+    /// The descriptors of the key points, in their order.
     fn describe(&self, image: &Image, keypoints: &[Keypoint]) -> Descriptors {
         let mut described = Descriptors::default();
         self.describe_into(image, keypoints, &mut Workspace::default(), &mut described);
@@ -160,6 +183,6 @@ pub trait Descriptor: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All descriptors.
+/// The registry of descriptors.
 pub static DESCRIPTORS: Registry<dyn Descriptor> =
     Registry::new("descriptor", &[entry!(Brief), entry!(Orb), entry!(Sift), entry!(Surf), entry!(ZnccPatch)]);

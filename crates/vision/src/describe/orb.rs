@@ -1,4 +1,4 @@
-//! ORB's descriptor: BRIEF, turned to the centroid of brightness.
+//! The ORB descriptor: BRIEF, rotated to the centroid of brightness.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -7,18 +7,17 @@ use super::comparisons::{self, Settings};
 use super::{Descriptor, Descriptors};
 use crate::{Image, Keypoint, Workspace};
 
-/// BRIEF-256 turned to its surroundings: the pattern's first axis points from the key point to the centroid
-/// of the brightness within 15 steps around it.
+/// ORB's descriptor: BRIEF-256, rotated by the direction from the key point to the centroid of brightness.
 ///
-/// The pattern is BRIEF's, drawn from a Gaussian and kept within the circle; ORB's own, learned on
-/// photographs, is not used.
+/// The centroid is that within 15 steps around the key point. Limit: the pattern is BRIEF's, drawn from a Gaussian and
+/// kept within the circle, not ORB's own, which is learned on photographs.
 ///
-/// Source: Rublee, Rabaud, Konolige and Bradski, *ORB: an efficient alternative to SIFT or SURF*, ICCV
-/// 2011; Rosin, *Measuring corner properties*, 1999.
+/// Source: Rublee, Rabaud, Konolige and Bradski, *ORB: an efficient alternative to SIFT or SURF*, ICCV 2011; Rosin,
+/// *Measuring corner properties*, 1999.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Orb {
-    /// The step of the pattern (px): the window is 35 steps wide. 0: half the key point's own scale.
+    /// Step of the pattern (px), whose window is 35 steps wide; 0: half the key point's own scale.
     pub scale: f64,
 }
 
@@ -30,7 +29,7 @@ impl Default for Orb {
 
 impl Component for Orb {
     const NAME: &'static str = "orb";
-    const SUMMARY: &'static str = "BRIEF turned to the centroid of brightness around the key point";
+    const SUMMARY: &'static str = "BRIEF rotated to the centroid of brightness around the key point";
     const SOURCE: &'static str =
         "Rublee, Rabaud, Konolige and Bradski, ORB: an efficient alternative to SIFT or SURF, ICCV 2011";
 

@@ -1,7 +1,8 @@
-//! Brightness between pixels.
+//! Bilinear interpolation of brightness.
 
-/// The bilinear interpolation of `pixels`, rows of `width`, at (u, v); beyond the border the nearest
-/// pixel counts.
+/// The bilinear interpolation of `pixels` (rows of `width`) at (u, v).
+///
+/// The nearest pixel is repeated beyond the border.
 #[inline(always)]
 pub(super) fn bilinear(pixels: &[f32], width: usize, u: f32, v: f32) -> f32 {
     let height = pixels.len() / width;
@@ -13,7 +14,7 @@ pub(super) fn bilinear(pixels: &[f32], width: usize, u: f32, v: f32) -> f32 {
     upper + down * (lower - upper)
 }
 
-/// The two pixels of `size` around `at`, and how far it is from the first to the second.
+/// The two of `size` pixels around `at`, and the position between them (0 to 1).
 #[inline(always)]
 fn around(at: f32, size: usize) -> (usize, usize, f32) {
     let at = at.clamp(0.0, (size - 1) as f32);

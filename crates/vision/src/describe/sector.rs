@@ -6,32 +6,32 @@ use seafix_geometry::Pixel;
 use super::cells::{Cells, Grid};
 use crate::Image;
 
-/// SURF's orientation: where most of the gradient around a key point points to.
+/// SURF's orientation: the dominant gradient direction around a key point.
 ///
-/// At the 113 places of a grid of pitch s within 6 s, Haar wavelets of 4 s give gradients, weighted by
-/// a Gaussian of 2.5 s. A sector of 60° turns around in steps of 5°; the gradients in it are summed,
-/// and the longest sum is the orientation.
+/// Haar wavelets of 4 s give gradients at the 113 points of a grid of pitch s within 6 s, weighted by a Gaussian of 2.5
+/// s. A sector of 60° rotates in steps of 5°, and the gradients in it are summed; the longest sum is the orientation.
 ///
 /// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006.
 #[derive(Debug)]
 pub(super) struct Sectors {
-    /// The Gaussian, place by place; 0 for those that only fill up the last block.
+    /// The Gaussian weight of each point; 0 for the padding of the last block.
     weights: [f32; PLACES],
-    /// Where the sectors point to.
+    /// The directions of the sectors.
     centres: [[f32; 2]; SECTORS],
 }
 
-/// Places within the circle, and as many as fill blocks of 16.
+/// The number of points within the circle.
 const WITHIN: usize = 113;
+/// The number of points with padding to blocks of 16.
 const PLACES: usize = WITHIN.next_multiple_of(16);
-/// Places along the diameter.
+/// The number of points along the diameter.
 const ACROSS: usize = 13;
-/// Cells along the side that the wavelets of all places cover.
+/// The number of cells along the side of the square that all wavelets cover.
 const SIDE: usize = ACROSS + 3;
-/// Steps of the sector in a turn; a multiple of four, that a quarter turn is a whole number of them.
+/// The number of sectors in a turn, a multiple of four, so that a quarter turn is an integer number of steps.
 const SECTORS: usize = 72;
 
-/// Column and row of each place.
+/// The column and the row of each point.
 const DISC: [[usize; 2]; WITHIN] = {
     let mut disc = [[0; 2]; WITHIN];
     let (mut found, mut i) = (0, 0);
@@ -67,20 +67,20 @@ impl Default for Sectors {
 }
 
 impl Sectors {
-    /// (cos, sin) of the orientation at a place; (1, 0) where nothing changes.
+    /// The orientation (cos, sin) at a position; (1, 0) in a flat region.
     pub(super) fn orientation(&self, image: &Image, at: Pixel, step: f64, sums: &mut Vec<f32>) -> [f64; 2] {
         let mut cells = [[0.0; SIDE]; SIDE];
         Grid::new(at, step).upright(image, sums, &mut cells);
         let [x, y] = longest(&cells, &self.weights, &self.centres).map(f64::from);
         let length = (x * x + y * y).sqrt();
-        // Not so for not-a-number either.
+        // The condition is false for NaN too.
         if length > 0.0 && length < f64::INFINITY { [x / length, y / length] } else { [1.0, 0.0] }
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn longest(cells: &Cells<SIDE, SIDE>, weights: &[f32; PLACES], centres: &[[f32; 2]; SECTORS]) -> [f32; 2] {
-    // Gradients at all places of the square: [column][row].
+    // The gradients at all points of the square, [column][row].
     let mut gradients = [[[0.0_f32; ACROSS]; 2]; ACROSS];
     for (x, gradients) in gradients.iter_mut().enumerate() {
         let [a, b, c, d] = [&cells[x], &cells[x + 1], &cells[x + 2], &cells[x + 3]];
@@ -101,7 +101,7 @@ fn longest(cells: &Cells<SIDE, SIDE>, weights: &[f32; PLACES], centres: &[[f32; 
         gx[i] = gradients[x][0][y];
         gy[i] = gradients[x][1][y];
     }
-    // A gradient g is in the sector around c when g·c > |g| cos 30°.
+    // A gradient g lies in the sector around c if g·c > |g| cos 30°.
     let mut min = [0.0; PLACES];
     for i in 0..PLACES {
         gx[i] *= weights[i];
@@ -132,7 +132,7 @@ fn longest(cells: &Cells<SIDE, SIDE>, weights: &[f32; PLACES], centres: &[[f32; 
     [best[1], best[2]]
 }
 
-/// cos 30°: half the sector.
+/// The cosine of half the sector, 30°.
 const COS_30: f32 = 0.866_025_4;
 
 #[cfg(test)]
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn of_two_directions_the_stronger_wins() {
-        // Left of the key point a ramp to the right, right of it one twice as steep downwards.
+        // A ramp to the right on the left of the key point, and one twice as steep downwards on its right.
         let [cos, sin] = orientation(|u, v| if u < 30.0 { u } else { 30.0 + 2.0 * (v - 30.0) });
         assert!(sin > 0.98, "{cos} {sin}");
     }

@@ -1,4 +1,4 @@
-//! The scale-invariant feature transform's descriptor.
+//! The SIFT descriptor.
 
 use multiversion::multiversion;
 use seafix_component::{Component, in_range};
@@ -13,27 +13,30 @@ use crate::{
     scale_space::{INTERVALS, ScaleSpace, Strip, octaves, sigma},
 };
 
-/// Histograms of gradient directions in 4×4 cells of 3σ, 8 directions each, weighted by a Gaussian of
-/// two cells and by the gradient's magnitude, each sample shared among the neighbouring cells and
-/// directions; norm one, no number above 0.2, norm one again.
+/// SIFT's descriptor: histograms of 8 gradient directions in 4×4 cells of 3σ.
 ///
-/// The image is taken under the Gaussian nearest to the key point's scale σ, whatever detector found it,
-/// and sampled on a grid that is turned with the key point: 20 × 20 gradients, ¾ σ apart, from
-/// differences across the grid's own squares. The direction it is turned by is the greatest of a histogram of the
-/// gradient directions around, under a Gaussian of 1.5 σ; a key point with two strong directions keeps
-/// the stronger (Lowe would describe it twice). Where nothing changes all numbers are zero.
+/// Samples are weighted by the gradient's magnitude and a Gaussian of two cells, and shared among neighbouring cells
+/// and directions. The vector is scaled to norm one, clipped at 0.2 and scaled to norm one again.
 ///
-/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004; Arandjelović
-/// and Zisserman, *Three things everyone should know to improve object retrieval*, CVPR 2012 (`root`).
+/// The image is smoothed by the Gaussian nearest to the key point's scale σ, whatever its detector, and sampled on a
+/// rotated grid: 20 × 20 gradients, ¾ σ apart, from differences across the grid's own squares. The rotation is the peak
+/// of a histogram of the gradient directions around the key point, under a Gaussian of 1.5 σ.
+///
+/// Limits: a key point with two strong directions keeps the stronger (Lowe would describe it twice). All numbers are
+/// zero in a flat region.
+///
+/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004; Arandjelović and Zisserman,
+/// *Three things everyone should know to improve object retrieval*, CVPR 2012 (`root`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sift {
-    /// Whether the window stays upright, for the two views of one instant, or turns with the image.
+    /// Whether the window is upright, for the two views of one instant, or rotated with the image.
     pub upright: bool,
-    /// Whether the square roots of the numbers are taken (RootSIFT): their Euclidean distance compares
-    /// histograms as Hellinger's distance does.
+    /// Whether to take the square roots of the numbers (RootSIFT).
+    ///
+    /// The Euclidean distance then equals the Hellinger distance of the histograms.
     pub root: bool,
-    /// The σ of every key point (px); 0: each its own.
+    /// Scale σ of every key point (px); 0: the key point's own.
     pub scale: f64,
 }
 
@@ -45,7 +48,7 @@ impl Default for Sift {
 
 impl Component for Sift {
     const NAME: &'static str = "sift";
-    const SUMMARY: &'static str = "128 numbers: histograms of gradient directions in 16 cells";
+    const SUMMARY: &'static str = "SIFT: histograms of gradient directions in 16 cells, 128 numbers";
     const SOURCE: &'static str = "Lowe, Distinctive image features from scale-invariant keypoints, IJCV 2004";
 
     fn check(&self) -> Result<(), String> {
@@ -53,12 +56,12 @@ impl Component for Sift {
     }
 }
 
-/// Numbers in the descriptor.
+/// The length of the descriptor.
 const LENGTH: usize = CELLS * CELLS * DIRECTIONS;
-/// The greatest number before the second normalisation.
+/// The largest number before the second normalisation.
 const MAX: f64 = 0.2;
 
-/// Key points that one thread describes at a time.
+/// The number of key points in a piece of the work.
 const PIECE: usize = 16;
 
 #[derive(Debug, Default)]
@@ -91,14 +94,14 @@ impl Descriptor for Sift {
                     let here = keypoints[piece * PIECE..].iter();
                     for (numbers, keypoint) in numbers.chunks_exact_mut(LENGTH).zip(here) {
                         let (own, level) = level(scale(keypoint), coarsest);
-                        // What lies beyond the image belongs to its last rows.
+                        // Key points beyond the image belong to its border rows.
                         let row = ((keypoint.at.v / pixel).max(0.0) as usize).min(height(octave) - 1);
                         if own != octave || !rows.contains(&row) {
                             continue;
                         }
                         let place = LevelPosition::new(levels, (octave, first), level, keypoint, scale(keypoint));
                         let direction = if self.upright { [1.0, 0.0] } else { place.direction(&window) };
-                        let numbers: &mut [f32; LENGTH] = numbers.try_into().expect("a row has this length");
+                        let numbers: &mut [f32; LENGTH] = numbers.try_into().expect("a row has LENGTH numbers");
                         histograms(&place, direction, &window, numbers);
                         normalise(numbers, self.root);
                     }
@@ -112,7 +115,7 @@ impl Descriptor for Sift {
 /// The octave and the level in it whose Gaussian is nearest to σ.
 fn level(scale: f64, coarsest: i32) -> (i32, usize) {
     let intervals = INTERVALS as f64;
-    // Level 1 of octave −1 is the first that the detector looks at.
+    // Level 1 of octave −1 is the first that the detector searches.
     let finest = sigma(-1, 1.0);
     let index = libm::round(intervals * libm::log2(scale.max(finest) / sigma(0, 0.0)));
     let octave = libm::floor((index - 1.0) / intervals).clamp(-1.0, f64::from(coarsest));
@@ -120,7 +123,7 @@ fn level(scale: f64, coarsest: i32) -> (i32, usize) {
     (octave as i32, level as usize)
 }
 
-/// The histograms of all cells, row by row.
+/// Computes the histograms of all cells, row by row.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn histograms(place: &LevelPosition<'_>, direction: [f32; 2], window: &Window, numbers: &mut [f32; LENGTH]) {
     let corners: [[f32; SIDE + 1]; SIDE + 1] = place.grid(STEP, direction);
@@ -132,7 +135,7 @@ fn histograms(place: &LevelPosition<'_>, direction: [f32; 2], window: &Window, n
             let direction = turn[i] * DIRECTIONS as f32;
             let mut fractions = [0.0; DIRECTIONS];
             for (k, fraction) in fractions.iter_mut().enumerate() {
-                // How far the direction is from this one, the shorter way round.
+                // The angular distance from this direction, the shorter of both.
                 let away = (direction - k as f32).abs();
                 let away = if away > 4.0 { 8.0 - away } else { away };
                 let near = 1.0 - away;
@@ -153,12 +156,12 @@ fn histograms(place: &LevelPosition<'_>, direction: [f32; 2], window: &Window, n
     numbers.copy_from_slice(cells.as_flattened());
 }
 
-/// Norm one, nothing above 0.2, norm one again; then the roots, if asked for.
+/// Scales to norm one, clips at 0.2, scales to norm one again, and takes the roots with `root`.
 fn normalise(numbers: &mut [f32; LENGTH], root: bool) {
     let sum = |numbers: &[f32; LENGTH], of: fn(f64) -> f64| numbers.iter().map(|&x| of(f64::from(x))).sum::<f64>();
     let square = |x: f64| x * x;
     let norm = sum(numbers, square).sqrt();
-    // Smoothing leaves rounding errors of 1e-5 grey levels where nothing changes.
+    // Smoothing leaves rounding errors of 1e-5 grey levels in flat regions.
     if !(norm > 1e-2) {
         numbers.fill(0.0);
         return;
@@ -218,7 +221,7 @@ mod tests {
         sift.describe_into(&image, &keypoints, &mut work, &mut found);
         let full = sift.describe(&image, &keypoints);
         let worst = (0..keypoints.len()).map(|i| distance(&found, i, &full, i)).fold(0.0, f32::max);
-        // Places are counted from the strip on: another rounding.
+        // Positions are relative to the strip, with another rounding.
         assert!(keypoints.len() > 30 && worst < 1e-3, "{}: {worst}", keypoints.len());
     }
 
@@ -238,7 +241,7 @@ mod tests {
                     assert!(if k == bin { *value > 0.1 } else { *value < 1e-3 }, "{bin}: {cell:?}");
                 }
             }
-            // Turned with the image every ramp is the same.
+            // All ramps are equal after rotation with the image.
             let turned = Sift { upright: false, root: false, ..Sift::default() }.describe(&ramp, &point);
             let first = turned.numbers().unwrap().row(0).chunks_exact(DIRECTIONS).all(|cell| cell[0] > 0.1);
             assert!(first, "{bin}");
@@ -272,7 +275,7 @@ mod tests {
     #[test]
     fn a_turn_of_the_image_turns_the_window() {
         let before = image(140, 140, waves);
-        // By 30° about the middle.
+        // A rotation by 30° about the middle.
         let (cos, sin) = (0.75_f64.sqrt(), 0.5);
         let to =
             |x: f64, y: f64| (70.0 + cos * (x - 70.0) - sin * (y - 70.0), 70.0 + sin * (x - 70.0) + cos * (y - 70.0));

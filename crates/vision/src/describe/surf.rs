@@ -1,4 +1,4 @@
-//! The SURF descriptor at given key points.
+//! The SURF descriptor.
 
 use multiversion::multiversion;
 use seafix_component::{Component, in_range};
@@ -9,29 +9,28 @@ use super::{Descriptor, Descriptors};
 use super::{halves::Halves, sector::Sectors};
 use crate::{Image, Keypoint, Workspace};
 
-/// SURF: sums of Haar wavelet responses around the key point, 64 or 128 numbers.
+/// SURF's descriptor: sums of Haar wavelet responses around the key point, 64 or 128 numbers.
 ///
-/// The square window of 20 s around the key point is cut into 4×4 sub-regions. In each, at 5×5 places
-/// one s apart, a Haar wavelet of 2 s gives dx and dy, weighted by a Gaussian of 3.3 s about the key
-/// point; the sub-region contributes Σ dx, Σ dy, Σ |dx|, Σ |dy|; extended, each sum is taken apart by
-/// the sign of the other derivative. The vector is scaled to unit length: brightness offset and
-/// contrast drop out. Where nothing changes it is zero.
+/// The square window of 20 s around the key point has 4×4 sub-regions. In each, at 5×5 points one s apart, a Haar
+/// wavelet of 2 s gives dx and dy, weighted by a Gaussian of 3.3 s about the key point. The sub-region contributes the
+/// sums of dx, dy, |dx| and |dy|; extended, each sum is split by the sign of the other derivative. The vector is scaled
+/// to unit length, so it is invariant under brightness offset and contrast. It is zero in a flat region.
 ///
-/// Wavelets, window and sub-regions are placed exactly, at the key point's fraction of a pixel; beyond the
-/// border the outermost pixels continue. Upright they are sums of whole pixels and their parts. Turned
-/// to the orientation of the surroundings (the sliding sector of Bay et al.) they are sums of bilinear samples.
-/// The cameras of a rig stand upright to each other; between frames the vehicle may have turned.
+/// Wavelets, window and sub-regions are at the key point's subpixel position; border pixels continue beyond the border.
+/// Upright windows are sums of pixels and their parts. Windows rotated to the orientation of the surroundings (the
+/// sliding sector of Bay et al.) are sums of bilinear samples. Use upright windows for the two cameras of a rig, and
+/// rotated ones between frames, since the vehicle may have turned.
 ///
-/// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006;
-/// Bay, Ess, Tuytelaars and Van Gool, CVIU 2008.
+/// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006; Bay, Ess, Tuytelaars and Van
+/// Gool, CVIU 2008.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Surf {
-    /// s, the step between wavelets (px): the window is 20 s wide. 0: the key point's own scale.
+    /// Step s between wavelets (px), whose window is 20 s wide; 0: the key point's own scale.
     pub scale: f64,
-    /// Whether the window stands upright, or turns with its surroundings.
+    /// Whether the window is upright, or rotated to the orientation of its surroundings.
     pub upright: bool,
-    /// 128 numbers instead of 64.
+    /// Whether the descriptor has 128 numbers instead of 64.
     pub extended: bool,
 }
 
@@ -43,7 +42,7 @@ impl Default for Surf {
 
 impl Component for Surf {
     const NAME: &'static str = "surf";
-    const SUMMARY: &'static str = "SURF: sums of Haar wavelets around the key point, upright or turned, 64 or 128";
+    const SUMMARY: &'static str = "SURF: sums of Haar wavelets around the key point, upright or rotated, 64 or 128";
     const SOURCE: &'static str = "Bay, Tuytelaars and Van Gool, SURF: speeded up robust features, ECCV 2006";
 
     fn check(&self) -> Result<(), String> {
@@ -51,24 +50,24 @@ impl Component for Surf {
     }
 }
 
-/// Sub-regions along a side.
+/// The number of sub-regions along a side.
 const REGIONS: usize = 4;
-/// Wavelets along the side of a sub-region.
+/// The number of wavelets along the side of a sub-region.
 const SAMPLES: usize = 5;
-/// Wavelets along the side of the window.
+/// The number of wavelets along the side of the window.
 const SIDE: usize = REGIONS * SAMPLES;
-/// Cells along the side: a wavelet spans two by two, and neighbours overlap by one.
+/// The number of cells along the side: a wavelet spans two by two, and neighbours overlap by one.
 const CELLS: usize = SIDE + 1;
-/// Their memory along the side.
+/// The length of a column of cells in memory.
 const LANES: usize = 24;
-/// Key points described by one thread at a time.
+/// The number of key points in a piece of the work.
 const PIECE: usize = 64;
 
-/// What stays in memory.
+/// The working memory of the descriptor.
 #[derive(Debug, Default)]
 struct Scratch {
     halves: Halves,
-    /// One for each piece.
+    /// The buffer of each piece.
     pieces: Vec<Vec<f32>>,
 }
 
@@ -110,7 +109,7 @@ impl Descriptor for Surf {
     }
 }
 
-/// The sums over each sub-region, row by row: 4 each, or 8 taken apart by sign.
+/// Computes the sums over each sub-region, row by row: 4 each, or 8 split by sign.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn haar_sums<const PARTS: usize>(cells: &Cells<CELLS, LANES>, weights: &[f32; SIDE], row: &mut [f32]) {
     for region in 0..REGIONS {
@@ -126,7 +125,7 @@ fn haar_sums<const PARTS: usize>(cells: &Cells<CELLS, LANES>, weights: &[f32; SI
                         sum[y] += part;
                     }
                 } else {
-                    // Σ dx and Σ |dx| where dy ≥ 0, the same where dy < 0; then Σ dy by the sign of dx.
+                    // Σ dx and Σ |dx| for dy ≥ 0, the same for dy < 0; then Σ dy by the sign of dx.
                     let (down, up) = if dy >= 0.0 { (dx, 0.0) } else { (0.0, dx) };
                     let (east, west) = if dx >= 0.0 { (dy, 0.0) } else { (0.0, dy) };
                     let parts = [down, down.abs(), up, up.abs(), east, east.abs(), west, west.abs()];
@@ -148,7 +147,7 @@ fn haar_sums<const PARTS: usize>(cells: &Cells<CELLS, LANES>, weights: &[f32; SI
     }
 }
 
-/// To unit length; all zero where nothing changes, or where the image is no longer finite.
+/// Scales to unit length; all zero in a flat region or for an image that is not finite.
 fn normalise(row: &mut [f32]) {
     let norm = row.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
     let finite = norm > 0.0 && norm < f64::INFINITY;

@@ -1,4 +1,4 @@
-//! The surroundings themselves, normalised.
+//! The normalised window as a descriptor.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -9,25 +9,24 @@ use crate::{
     gaussian::{half_kernel_into, smooth_into},
 };
 
-/// The window around the key point with mean zero and norm one.
+/// The window around the key point with zero mean and unit norm.
 ///
-/// The scalar product of two such windows is their zero-mean normalised cross-correlation ρ, so that
-/// their Euclidean distance is √(2 (1 − ρ)). It stands still under gain and offset of brightness and
-/// under nothing else: for the two views of one instant, not for a vehicle that has turned.
+/// The scalar product of two such windows is their zero-normalised cross-correlation ρ, so their Euclidean distance is
+/// √(2 (1 − ρ)). It is invariant under gain and offset of brightness, but not under rotation: use it for the two views
+/// of one instant, not for a vehicle that has turned.
 ///
-/// The window is square, upright, sampled at `window`² places `step` apart from the image under a
-/// Gaussian; beyond the border the nearest pixel is repeated. Where nothing changes, or nothing
-/// can be told, all numbers are zero.
+/// The window is square and upright, sampled at `window`² points `step` apart from the image under a Gaussian; the
+/// nearest pixel is repeated beyond the border. All numbers are zero in a flat region, or if values overflow.
 ///
 /// Source: Lewis, *Fast normalized cross-correlation*, Vision Interface, 1995.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccPatch {
-    /// Samples along a side; odd.
+    /// Number of samples along a side; odd.
     pub window: usize,
-    /// From sample to sample (px).
+    /// Spacing of the samples (px).
     pub step: f64,
-    /// Standard deviation of the Gaussian (px); 0: the image as it is.
+    /// Standard deviation of the Gaussian (px); 0: no smoothing.
     pub sigma: f64,
 }
 
@@ -39,7 +38,7 @@ impl Default for ZnccPatch {
 
 impl Component for ZnccPatch {
     const NAME: &'static str = "zncc-patch";
-    const SUMMARY: &'static str = "the window itself, mean zero and norm one: distances are correlations";
+    const SUMMARY: &'static str = "the window itself, zero mean and unit norm: distances are correlations";
     const SOURCE: &'static str = "Lewis, Fast normalized cross-correlation, Vision Interface, 1995";
 
     fn check(&self) -> Result<(), String> {
@@ -59,7 +58,7 @@ struct Scratch {
     pieces: Vec<()>,
 }
 
-/// Key points that one thread describes at a time.
+/// The number of key points in a piece of the work.
 const PIECE: usize = 32;
 
 impl Descriptor for ZnccPatch {
@@ -98,12 +97,12 @@ impl ZnccPatch {
     }
 }
 
-/// Makes the mean zero and the norm one; all zero where nothing changes or can be told.
+/// Scales to zero mean and unit norm; all zero in a flat region or if values overflow.
 fn normalise(patch: &mut [f32]) {
     let mean = patch.iter().map(|&value| f64::from(value)).sum::<f64>() / patch.len() as f64;
     let squares = patch.iter().map(|&value| (f64::from(value) - mean) * (f64::from(value) - mean)).sum::<f64>();
-    // Smoothing leaves rounding errors of 1e-5 grey levels where nothing changes; brightness near the
-    // greatest number there is overflows.
+    // Smoothing leaves rounding errors of 1e-5 grey levels in flat regions; brightness near the largest finite number
+    // overflows.
     if squares > 1e-6 * patch.len() as f64 && squares.is_finite() {
         let scale = 1.0 / squares.sqrt();
         patch.iter_mut().for_each(|value| *value = ((f64::from(*value) - mean) * scale) as f32);
@@ -153,7 +152,7 @@ mod tests {
         let product: f32 = a.row(0).iter().zip(c.row(0)).map(|(a, c)| a * c).sum();
         let distance: f32 = a.row(0).iter().zip(c.row(0)).map(|(a, c)| (a - c) * (a - c)).sum();
         assert!((distance - 2.0 * (1.0 - product)).abs() < 1e-5 && product < 0.9);
-        assert!(a.row(2).iter().all(|value| *value == 0.0), "far outside nothing changes");
+        assert!(a.row(2).iter().all(|value| *value == 0.0), "a window far outside is not flat");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Corners by the structure tensor: what the detectors that rest on it share.
+//! Corner detection by the structure tensor, shared by Harris' and Shi and Tomasi's detectors.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -14,13 +14,13 @@ use super::{
 };
 use crate::{Image, Threads, Workspace};
 
-/// The greatest responses of a structure tensor, to a fraction of a pixel.
+/// The maxima of a structure tensor's response, with subpixel positions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corners {
     pub(super) tensor: Tensor,
-    /// The weakest response worth keeping, relative to the strongest of the image.
+    /// The minimum response, relative to the strongest of the image.
     pub(super) quality: f64,
-    /// No corner has a stronger one within this distance (px).
+    /// The radius (px) of non-maximum suppression.
     pub(super) radius: usize,
     pub(super) budget: Budget,
 }
@@ -33,26 +33,26 @@ struct Scratch {
     selection: select::Scratch,
 }
 
-/// The memory of a band of rows, and the corners in it.
+/// The working memory of a band of rows, with its corners.
 #[derive(Debug, Default)]
 struct Band {
     stream: Stream,
-    /// The response at a few rows: they stay in the second-level cache until their corners are found.
+    /// The response of a few rows, which stay in the second-level cache until their corners are found.
     response: Vec<f32>,
     marks: Vec<u8>,
-    /// At whole pixels, row by row, and from there to where the response peaks.
+    /// The corners at integer pixels in row-major order, with the offsets to the vertices of the response.
     found: Vec<(Keypoint, [f64; 2])>,
 }
 
-/// A window narrower than a pixel's neighbours holds one gradient, which is no corner's.
+/// The range of the window's standard deviation (px); a narrower window holds one gradient alone.
 pub(super) const SIGMAS: RangeInclusive<f64> = 0.3..=100.0;
-/// Corners this far apart are a handful in an image; the disc around each takes memory and time.
+/// The largest radius (px): beyond it an image has a handful of corners, and the disc takes memory and time.
 pub(super) const MAX_RADIUS: usize = 1000;
-/// Rows whose corners are sought at a time.
+/// The number of rows that are searched at a time.
 const ROWS: usize = 32;
 
 impl Corners {
-    /// Whether the settings can be.
+    /// Checks the settings' ranges.
     pub(super) fn check(&self) -> Result<(), String> {
         let Self { tensor: Tensor { sigma, .. }, quality, radius, budget: Budget { features, cells, .. } } = *self;
         in_range(SIGMAS.contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")?;
@@ -71,7 +71,7 @@ impl Corners {
         let Some(weights) = self.tensor.weights(image, weights) else { return };
         let radius = self.radius.min(width.max(height));
         disc.set(radius);
-        // Few bands: each begins with rows that belong to the one before.
+        // Few bands, since each repeats rows of the one before.
         let rows = match threads {
             Threads::One => height,
             Threads::Pool => height.div_ceil(2 * rayon::current_num_threads()).max(ROWS),
@@ -89,10 +89,10 @@ impl Corners {
         found.extend(all().map(|(corner, _)| *corner).filter(|corner| corner.response >= min));
         self.budget.keep(found, [width, height], selection);
         for corner in found {
-            // Bands follow each other, and in each the corners are in order.
+            // Bands follow each other, and each holds its corners in order.
             let before = |other: &Keypoint| (other.at.v, other.at.u) < (corner.at.v, corner.at.u);
             let reaches = |band: &&Band| band.found.last().is_some_and(|(last, _)| !before(last));
-            let of_band = &bands.iter().find(reaches).expect("every corner is one of a band's").found;
+            let of_band = &bands.iter().find(reaches).expect("every corner belongs to a band").found;
             let [dx, dy] = of_band[of_band.partition_point(|(other, _)| before(other))].1;
             corner.at.u += dx;
             corner.at.v += dy;
@@ -100,14 +100,14 @@ impl Corners {
         }
     }
 
-    /// The weakest response worth keeping where this is the strongest.
+    /// The minimum response for this strongest response.
     fn min(&self, strongest: f32) -> f32 {
         (f64::from(strongest) * self.quality) as f32
     }
 }
 
 impl Band {
-    /// Finds the corners in some rows, but for those that are too weak already beside the strongest of the band so far.
+    /// Finds the corners in some rows, except those below the threshold of the band's strongest response so far.
     fn search(
         &mut self,
         corners: &Corners,
@@ -118,11 +118,11 @@ impl Band {
     ) {
         let Self { stream, response, marks, found } = self;
         let (width, height) = (image.width(), image.height());
-        // Rows above and below that decide about a corner.
+        // The rows above and below that affect a corner.
         let around = radius.max(1);
         found.clear();
         stream.begin();
-        // The rows of the image that `response` holds.
+        // The image rows in `response`.
         let mut held = 0..0;
         for first in rows.clone().step_by(ROWS) {
             let last = (first + ROWS).min(rows.end);

@@ -1,4 +1,4 @@
-//! Extrema of differences of Gaussians: SIFT's detector.
+//! SIFT's detector: extrema of differences of Gaussians.
 
 use std::cmp::Ordering;
 
@@ -16,32 +16,31 @@ use crate::{
     scale_space::{INTERVALS, LEVELS, Octave, ScaleSpace, Strip, octaves, sigma},
 };
 
-/// Blobs: the extrema, over place and scale, of the difference of Gaussians
-/// D(x, y, σ) = (G_kσ − G_σ) ∗ I, k = 2^(1/3), nearly σ² ∇²G up to a factor.
+/// SIFT's detector: blobs at extrema, over position and scale, of the difference of Gaussians.
 ///
-/// An extremum among its 26 neighbours is placed by the quadratic through them, and starts again from
-/// the next sample when that lies nearer. It stays if |D| there is `contrast` at least, and if the
-/// ratio of its principal curvatures is below `edge`: along an edge a place is ill defined. Its response
-/// is |D| (grey levels), its scale the σ of the extremum.
+/// D(x, y, σ) = (G_kσ − G_σ) ∗ I with k = 2^(1/3) is nearly σ² ∇²G ∗ I up to a factor. An extremum among its 26
+/// neighbours moves to the vertex of the quadratic through them; the fit is repeated from the next sample if the vertex
+/// is nearer to that. An extremum is accepted if |D| is at least `contrast` and the ratio of its principal curvatures
+/// is below `edge`, since positions along an edge are ill determined. The response is |D| (grey levels), the scale is
+/// the σ of the extremum.
 ///
-/// Nothing is found nearer to the border than five pixels of its octave.
+/// Limit: nothing is detected within five pixels (of the octave) of the border.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Dog {
-    /// Whether the image is doubled first: four times the points and the time, scales from 0.9 px
-    /// instead of 1.8 px on.
+    /// Doubles the image first: four times the key points and the time, scales from 0.9 px instead of 1.8 px.
     pub double: bool,
-    /// The weakest |D| worth keeping (grey levels).
+    /// Minimum |D| (grey levels).
     pub contrast: f64,
-    /// The greatest ratio of principal curvatures.
+    /// Maximum ratio of principal curvatures.
     pub edge: f64,
-    /// At most so many key points.
+    /// Maximum number of key points.
     pub features: usize,
-    /// Which, when there are more.
+    /// Selection of key points beyond that number.
     pub selection: Selection,
-    /// Cells along the longer side of the image over which a balanced selection spreads the key points.
+    /// Number of cells along the longer side of the image, for a balanced selection.
     pub cells: usize,
 }
 
@@ -58,7 +57,7 @@ impl Component for Dog {
 
     fn check(&self) -> Result<(), String> {
         let Self { double: _, contrast, edge, features, selection: _, cells } = *self;
-        // Rounding alone leaves differences of 1e-4 grey levels.
+        // Rounding alone causes differences of 1e-4 grey levels.
         in_range((0.01..=255.0).contains(&contrast), "contrast", contrast, "a number from 0.01 to 255 (grey levels)")?;
         in_range((1.0..=1e6).contains(&edge), "edge", edge, "a number from 1 to 1e6")?;
         in_range(features > 0, "features", features, "at least 1")?;
@@ -73,31 +72,31 @@ struct Scratch {
     select: select::Scratch,
 }
 
-/// What some rows of an octave show.
+/// The working memory of a band of an octave's rows.
 #[derive(Debug, Default)]
 struct Band {
     rows: Vec<f32>,
-    /// (level, x, y)
+    /// The samples (level, x, y).
     samples: Vec<[usize; 3]>,
     found: Vec<Keypoint>,
 }
 
-/// Rows of an octave that one thread works on at a time.
+/// The number of an octave's rows that one thread searches at a time.
 const ROWS: usize = 32;
-/// Nothing is looked for nearer to the border (px of the octave).
+/// The border without detections (px of the octave).
 const BORDER: usize = 5;
 
 impl Detector for Dog {
     fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {
         let threads = work.threads();
         found.clear();
-        // Two kinds of memory at a time: each is taken out of its place and put back.
+        // Two buffers of the workspace are needed at once: each is taken out and put back.
         let mut space = std::mem::take(work.get::<ScaleSpace>());
         let Scratch { bands, pieces, select } = work.get();
         space.look_at(image);
         for octave in -i32::from(self.double)..octaves(image.width(), image.height()) {
             space.sweep(octave, LEVELS - 1, threads, |levels, Strip { rows, first }| {
-                // As the strip counts them; the octave's own border is the strip's where that ends.
+                // Rows in the strip's numbering; the octave's own border applies if the strip ends there.
                 let begin = (rows.start - first).max(BORDER);
                 let end = (rows.end - first).min(levels.height().saturating_sub(BORDER));
                 if begin >= end || levels.width() <= 2 * BORDER {
@@ -112,7 +111,7 @@ impl Detector for Dog {
                 bands[..count].iter().for_each(|band| found.extend(&band.found));
             });
         }
-        // Samples that lead to one extremum find it twice, bit by bit the same.
+        // Several samples may lead to one extremum, bit for bit.
         let place = |a: &Keypoint| [a.at.v, a.at.u, f64::from(a.scale)];
         found.sort_unstable_by(|a, b| {
             let parts = place(a).into_iter().zip(place(b));
@@ -126,12 +125,12 @@ impl Detector for Dog {
 }
 
 impl Dog {
-    /// The key points of these rows of an octave, of which there are levels from row `first` on.
+    /// The key points of these rows of an octave, whose levels begin with row `first`.
     fn search(&self, octave: &Octave, number: i32, first: usize, rows: std::ops::Range<usize>, band: &mut Band) {
         let Band { rows: scratch, samples, found } = band;
         samples.clear();
         found.clear();
-        // The quadratic moves |D| by little: what is far below the threshold need not be refined.
+        // The quadratic changes |D| little, so samples far below the threshold need no refinement.
         let min = 0.5 * self.contrast as f32;
         extrema::extrema(octave, rows, BORDER, min, scratch, samples);
         found.extend(samples.iter().filter_map(|&at| self.refine(octave, number, first, at)));
@@ -175,7 +174,7 @@ impl Dog {
                     scale: sigma(number, level as f64 + step.z) as f32,
                 });
             }
-            // The nearest sample; far steps are those of a quadratic that does not hold.
+            // The nearest sample; a long step comes from a quadratic that does not hold.
             let moved = |sample: usize, part: f64, low: usize, high: usize| {
                 let to = sample as f64 + part.clamp(-2.0, 2.0).round();
                 (part.is_finite() && (low as f64..=high as f64).contains(&to)).then_some(to as usize)
@@ -227,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_blob_is_found_where_it_is_and_as_large_as_it_is() {
-        // D of a blob of σ is greatest where t = σ / √k, k the step between the two Gaussians.
+        // D of a blob of σ is largest at t = σ / √k, with k the ratio of the two Gaussians.
         for [u, v, sigma, height] in
             [[90.3, 61.8, 3.0, 80.0], [88.0, 60.5, 6.0, 120.0], [71.4, 66.6, 10.0, -60.0], [80.0, 60.0, 1.6, 90.0]]
         {

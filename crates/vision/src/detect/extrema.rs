@@ -6,16 +6,16 @@ use multiversion::multiversion;
 
 use crate::scale_space::{INTERVALS, LEVELS, Octave};
 
-/// Differences of neighbouring levels.
+/// The number of differences of neighbouring levels.
 const DIFFERENCES: usize = LEVELS - 1;
-/// Samples compared side by side.
+/// The number of samples that are compared side by side.
 const LANES: usize = 16;
 
-/// Adds to `found` the (level, x, y), row by row, of the samples of these rows whose difference
-/// D = level + 1 − level exceeds `min` and their 26 neighbours', or lies as far below; of equal ones
-/// the first. `border` columns on either side and as many rows are not looked at.
+/// Appends the extrema (level, x, y) of these rows to `found` in row-major order.
 ///
-/// `ring` is scratch: the differences of three rows.
+/// The difference D = level + 1 − level of an extremum exceeds `min` and its 26 neighbours, or is as far below; of
+/// equal samples the first counts. `border` columns and rows on each side are skipped. `ring` is scratch for the
+/// differences of three rows.
 pub(super) fn extrema(
     octave: &Octave,
     rows: Range<usize>,
@@ -50,7 +50,7 @@ pub(super) fn extrema(
 fn in_row(rows: &[&[f32]; 3], border: usize, min: f32, mut maybe: impl FnMut(usize)) {
     let width = rows[1].len();
     for x in (border..width - border).step_by(LANES) {
-        // The last samples are looked at with some of those before them.
+        // The last block overlaps the one before.
         let first = x.min((width - border).saturating_sub(LANES));
         if width < LANES + 2 {
             (x..(x + LANES).min(width - border)).for_each(&mut maybe);
@@ -68,7 +68,7 @@ fn in_row(rows: &[&[f32]; 3], border: usize, min: f32, mut maybe: impl FnMut(usi
     }
 }
 
-/// Which of the samples from `first` on are extrema among the nine of their level.
+/// The bit mask of the samples from `first` on that are extrema among the nine of their level.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn extremal(rows: &[&[f32]; 3], first: usize, min: f32) -> u32 {
     let [above, here, below] = rows.map(|row| &row[first - 1..first + LANES + 1]);
@@ -102,7 +102,7 @@ fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Whether a sample exceeds `min` and its 26 neighbours, either sign, and equals none before it.
+/// Whether a sample exceeds `min` and its 26 neighbours, with either sign, and equals none before it.
 fn beyond(levels: [&[&[f32]; 3]; 3], min: f32, x: usize) -> bool {
     let value = levels[1][1][x];
     let sign = if value < 0.0 { -1.0 } else { 1.0 };
@@ -125,7 +125,7 @@ mod tests {
     fn it_finds_what_comparing_all_neighbours_finds() {
         for (width, height) in [(150, 90), (11, 30), (12, 12), (27, 64), (34, 16)] {
             let value = |i: usize| {
-                // Squares of 5 px: structure that outlasts the first levels.
+                // Squares of 5 px, a structure that survives the first levels.
                 let square = i % width / 5 + 1000 * (i / width / 5);
                 let h = (square as u32).wrapping_mul(0x9E37_79B1);
                 let h = (h ^ (h >> 15)).wrapping_mul(0x85EB_CA77);

@@ -1,4 +1,4 @@
-//! Features from the accelerated segment test.
+//! The FAST detector: features from the accelerated segment test.
 
 use multiversion::multiversion;
 use seafix_component::{Component, in_range};
@@ -14,29 +14,29 @@ use crate::{Image, Workspace};
 
 /// FAST-9/16: pixels that differ from an arc of the circle around them.
 ///
-/// Of the 16 pixels on a circle of radius 3 px, 9 in a row are all brighter than the centre by more than
-/// the threshold, or all darker. The response is the greatest threshold at which that still holds (grey
-/// levels): the largest, over the 16 arcs, of the smallest difference on the arc. Where the responses of
-/// the nine pixels around a maximum describe a peak, the corner is its vertex.
+/// A pixel is a corner if 9 consecutive ones of the 16 pixels on a circle of radius 3 px are all brighter than the
+/// centre by more than the threshold, or all darker. The response is the largest threshold that the pixel passes (grey
+/// levels): the maximum over the 16 arcs of the minimum difference on the arc. The corner is the vertex of the
+/// quadratic through the nine responses around a maximum, if they have one.
 ///
-/// Nothing is found within 4 px of the border. Every number is a difference of two pixels, so a quarter
-/// turn of the image turns the corners exactly.
+/// Limit: nothing is detected within 4 px of the border. Each value is a difference of two pixels, so a quarter turn of
+/// the image turns the corners exactly.
 ///
 /// Source: Rosten and Drummond, *Machine learning for high-speed corner detection*, ECCV 2006.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Fast {
-    /// What the arc must differ by (grey levels).
+    /// Minimum difference between the arc and the centre (grey levels).
     pub threshold: f64,
-    /// Whether a corner is placed to a fraction of a pixel.
+    /// Whether corners have subpixel positions.
     pub subpixel: bool,
-    /// No corner has a stronger one within this distance (px).
+    /// Radius of non-maximum suppression (px).
     pub radius: usize,
-    /// At most so many corners.
+    /// Maximum number of corners.
     pub features: usize,
-    /// Which, when there are more.
+    /// Selection of corners beyond that number.
     pub selection: Selection,
-    /// Cells along the longer side of the image over which a balanced selection spreads the corners.
+    /// Number of cells along the longer side of the image, for a balanced selection.
     pub cells: usize,
 }
 
@@ -60,7 +60,7 @@ impl Component for Fast {
     }
 }
 
-/// The circle, from the top clockwise: (dx, dy).
+/// The circle (dx, dy), clockwise from the top.
 const CIRCLE: [(isize, isize); 16] = [
     (0, -3),
     (1, -3),
@@ -80,10 +80,10 @@ const CIRCLE: [(isize, isize); 16] = [
     (-1, -3),
 ];
 
-/// The circle, and one pixel more for the neighbours that place a corner.
+/// The radius of the circle, and one pixel for the neighbours of the subpixel fit.
 const MARGIN: usize = 4;
 
-/// The standard deviation of a disc of radius 3 along either axis (px).
+/// The standard deviation of a disc of radius 3 px along either axis (px).
 const SCALE: f32 = 1.5;
 
 #[derive(Debug, Default)]
@@ -131,7 +131,7 @@ impl Detector for Fast {
     }
 }
 
-/// The response at a pixel that is not nearer to the border than the circle.
+/// The response at a pixel, which is at least the circle's radius from the border.
 fn response_at(image: &Image, x: usize, y: usize) -> f32 {
     let pixel = |(dx, dy)| image.row(y.wrapping_add_signed(dy))[x.wrapping_add_signed(dx)];
     response(CIRCLE.map(|step| pixel(step) - pixel((0, 0))))
@@ -147,11 +147,10 @@ fn more(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The greatest threshold that the differences d of some arc of nine all exceed, or all fall below when
-/// negated.
+/// The largest threshold that the differences d of some arc of nine all exceed, with either sign.
 #[inline(always)]
 fn response(d: [f32; 16]) -> f32 {
-    // Two arcs that begin side by side share eight pixels: those from each odd place.
+    // Two neighbouring arcs share eight pixels: those from each odd position.
     let shared = |pick: fn(f32, f32) -> f32| -> [f32; 8] {
         let two: [f32; 8] = std::array::from_fn(|i| pick(d[2 * i + 1], d[(2 * i + 2) % 16]));
         let four: [f32; 8] = std::array::from_fn(|i| pick(two[i], two[(i + 1) % 8]));
@@ -167,7 +166,7 @@ fn response(d: [f32; 16]) -> f32 {
     more(bright, -dark)
 }
 
-/// Pixels of a row that are rejected or answered together.
+/// The number of pixels of a row that are tested together.
 const BLOCK: usize = 32;
 
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
@@ -175,7 +174,7 @@ fn row_response(rows: &[&[f32]; 7], min: f32, out: &mut [f32]) {
     row_response_in_any_lanes(rows, min, out);
 }
 
-/// The responses above `min` of a row, of which the three above and below are given; others stay.
+/// Writes the responses above `min` of the middle one of seven rows; other values stay.
 #[inline(always)]
 fn row_response_in_any_lanes(rows: &[&[f32]; 7], min: f32, out: &mut [f32]) {
     let end = out.len() - MARGIN;
@@ -187,7 +186,7 @@ fn row_response_in_any_lanes(rows: &[&[f32]; 7], min: f32, out: &mut [f32]) {
         }
         return;
     }
-    // The last block ends with the row and repeats some of the block before it.
+    // The last block ends with the row and overlaps the block before.
     for left in (MARGIN..end).step_by(BLOCK).map(|left| left.min(end - BLOCK)) {
         let block = |step| -> &[f32; BLOCK] { from(left, step).first_chunk().expect("within the row") };
         let centre = block((0, 0));
@@ -201,14 +200,14 @@ fn row_response_in_any_lanes(rows: &[&[f32]; 7], min: f32, out: &mut [f32]) {
     }
 }
 
-/// Whether any pixel may pass the test: an arc of nine holds two neighbours of the four compass points.
+/// Whether any pixel may pass the test: an arc of nine holds two neighbouring compass points.
 #[inline(always)]
 fn passes(centre: &[f32; BLOCK], [n, e, s, w]: [&[f32; BLOCK]; 4], min: f32) -> bool {
     let mut any = [0_u32; BLOCK];
     for x in 0..BLOCK {
         let c = centre[x];
         let (n, e, s, w) = (n[x] - c, e[x] - c, s[x] - c, w[x] - c);
-        // Two neighbours: one of north and south, one of east and west.
+        // Two neighbours are one of north and south, and one of east and west.
         let bright = less(more(n, s), more(e, w));
         let dark = more(less(n, s), less(e, w));
         any[x] = u32::from((bright > min) | (-dark > min));
@@ -228,7 +227,7 @@ mod tests {
         (0..n).map(value).collect()
     }
 
-    /// The test as the paper states it.
+    /// The test as the paper defines it.
     fn is_corner(d: &[f32; 16], threshold: f32) -> bool {
         (0..16).any(|first| {
             let arc = || (first..first + 9).map(|i| d[i % 16]);
@@ -241,10 +240,10 @@ mod tests {
         let bright = std::array::from_fn(|i| if (3..12).contains(&i) { 30.0 + i as f32 } else { -5.0 });
         assert_eq!(response(bright), 33.0);
         assert_eq!(response(bright.map(|d| -d)), 33.0);
-        assert!(response(std::array::from_fn(|i| if i < 8 { 50.0 } else { 0.0 })) <= 0.0, "eight are not enough");
+        assert!(response(std::array::from_fn(|i| if i < 8 { 50.0 } else { 0.0 })) <= 0.0, "an arc of eight passes");
         for start in 0..16 {
             let arc: [f32; 16] = std::array::from_fn(|i| if (i + start) % 16 < 9 { 10.0 } else { 0.0 });
-            assert_eq!(response(arc), 10.0, "nine from anywhere are");
+            assert_eq!(response(arc), 10.0, "an arc of nine fails");
         }
         for d in random_values(16 * 500).as_chunks::<16>().0 {
             let d = d.map(|d| d - 128.0);

@@ -1,4 +1,4 @@
-//! Detectors of man-made corners: candidates that a model explains.
+//! Detectors of man-made corners by the fit of a corner model.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -14,28 +14,27 @@ use crate::{
     locate::{FITTED, Shape, fit_into},
 };
 
-/// How corners are found by their model.
+/// The settings of a detector that fits a corner model to Harris' candidates.
 ///
-/// Candidates are the maxima of [`Harris`](super::Harris)' response; a model of the corner is fitted to the pixels
-/// around each, and those that it explains are the corners, where the fit places them. The response is how well that
-/// place is known, the inverse of the greater eigenvalue of its covariance (px⁻²): sharp edges of high contrast that
-/// cross at a right angle come first.
+/// Candidates are the maxima of [`Harris`](super::Harris)' response. A corner model is fitted to the pixels around
+/// each; a good fit gives the corner and its position. The response is the inverse of the larger eigenvalue of the
+/// position's covariance (px⁻²), so sharp edges of high contrast at a right angle come first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FittedCorners {
-    /// Standard deviation of the window in which candidates are sought (px).
+    /// Standard deviation of the window for candidates (px).
     pub sigma: f64,
-    /// The weakest candidate worth a fit, relative to the strongest response of the image.
+    /// Minimum response of a candidate, relative to the strongest of the image.
     pub quality: f64,
-    /// At most so many candidates, spread over the image.
+    /// Maximum number of candidates, spread over the image.
     pub candidates: usize,
-    /// The fit, and when it is believed.
+    /// The model fit and its acceptance.
     pub fit: CornerFit,
-    /// At most so many corners.
+    /// Maximum number of corners.
     pub features: usize,
-    /// Which, when there are more.
+    /// Selection of corners beyond that number.
     pub selection: Selection,
-    /// Cells along the longer side of the image over which a balanced selection spreads the corners.
+    /// Number of cells along the longer side of the image, for a balanced selection.
     pub cells: usize,
 }
 
@@ -55,9 +54,9 @@ impl Default for FittedCorners {
 
 /// Harris' constant k.
 const K: f32 = 0.04;
-/// No candidate has a stronger one within this distance (px).
+/// The radius of non-maximum suppression of candidates (px).
 const RADIUS: usize = 3;
-/// Corners nearer to each other than this are one (px).
+/// The distance (px) below which two corners are the same.
 const SAME: f64 = 1.0;
 
 #[derive(Debug, Default)]
@@ -104,7 +103,7 @@ impl FittedCorners {
     }
 }
 
-/// Several candidates end at one corner: the best fit stays.
+/// Merges candidates that converge to one corner and keeps the best fit.
 fn one_each(found: &mut Vec<Keypoint>) {
     let order = |a: &Keypoint, b: &Keypoint| a.at.v.total_cmp(&b.at.v).then(a.at.u.total_cmp(&b.at.u));
     found.sort_unstable_by(order);
@@ -114,7 +113,7 @@ fn one_each(found: &mut Vec<Keypoint>) {
         let near = (0..kept).rev().take_while(|&k| corner.at.v - found[k].at.v < SAME);
         match near.into_iter().find(|&k| found[k].at.distance(&corner.at) < SAME) {
             Some(k) if corner.response > found[k].response => {
-                // In its order: it moves by less than SAME.
+                // The order stays: the corner moves by less than SAME.
                 found[k] = corner;
                 found[..kept].sort_unstable_by(order);
             }
@@ -128,7 +127,7 @@ fn one_each(found: &mut Vec<Keypoint>) {
     found.truncate(kept);
 }
 
-/// A detector of one shape of corner.
+/// Defines a detector of one corner shape.
 macro_rules! detector {
     ($(#[$doc:meta])* $name:ident, $kebab:literal, $shape:expr, $summary:literal) => {
         $(#[$doc])*
@@ -155,19 +154,19 @@ macro_rules! detector {
 }
 
 detector!(
-    /// Corners of chequer-boards: two edges that cross, each placed by the fit of [`XCorner`](crate::XCorner).
+    /// Corners of chequerboards: two crossing edges, fitted by [`XCorner`](crate::XCorner).
     XCorners,
     "x-corner",
     Shape::Crossing,
-    "corners of chequer-boards: Harris' candidates that two crossing edges explain"
+    "corners of chequerboards: Harris' candidates that fit two crossing edges"
 );
 
 detector!(
-    /// Corners of boxes: two edges that end where they meet, each placed by the fit of [`LCorner`](crate::LCorner).
+    /// Corners of boxes: two edges that end at their intersection, fitted by [`LCorner`](crate::LCorner).
     LCorners,
     "l-corner",
     Shape::Wedge,
-    "corners of boxes: Harris' candidates that two edges which end there explain"
+    "corners of boxes: Harris' candidates that fit two edges with a common end"
 );
 
 #[cfg(test)]
@@ -175,11 +174,11 @@ mod tests {
     use super::*;
     use seafix_geometry::Pixel;
 
-    /// A grid of blurred corners 24 px apart, at fractions of a pixel: dark squares on bright ground, or a board.
+    /// A grid of blurred corners 24 px apart at subpixel positions: dark squares on bright ground, or a chequerboard.
     fn grid(board: bool) -> (Image, Vec<Pixel>) {
         let cover = |i: usize, edge: f64| 0.5 * libm::erfc((edge - i as f64) / (0.8 * std::f64::consts::SQRT_2));
         let edges: Vec<f64> = (0..7).map(|k| 20.0 + 24.3 * f64::from(k)).collect();
-        // −1 to 1, its sign changing at each edge.
+        // A wave from −1 to 1 with a change of sign at each edge.
         let wave = |i: usize| {
             edges
                 .iter()

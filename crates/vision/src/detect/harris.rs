@@ -11,37 +11,38 @@ use super::{
 };
 use crate::{Image, Workspace};
 
-/// Harris' corners: places whose surroundings change in every direction.
+/// Harris' corner detector.
 ///
-/// The gradient g (grey levels/px, Sobel's operator) gives the structure tensor A = w ∗ g gᵀ, integrated
-/// with a window w; the response is R = det A − k (tr A)² (grey levels⁴/px⁴): positive at corners,
-/// negative along edges, zero where nothing changes. A corner is a maximum of R, placed to a fraction of
-/// a pixel by the quadratic through its nine responses. That is a place to find again, not yet where
-/// edges meet: the response peaks 1 to 2 px inside a convex corner.
+/// The gradient g (grey levels/px, Sobel's operator) gives the structure tensor A = w ∗ g gᵀ with a window w. The
+/// response R = det A − k (tr A)² (grey levels⁴/px⁴) is positive at corners, negative along edges and zero in flat
+/// regions. A corner is a maximum of R, with the subpixel position of the vertex of the quadratic through its nine
+/// responses.
 ///
-/// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; an image
-/// too small for that has no corner.
+/// Limits: the position is repeatable, but not the intersection of the edges; the response peaks 1 to 2 px inside a
+/// convex corner. Nothing is detected nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; a
+/// smaller image has no corner.
 ///
 /// Source: Harris and Stephens, *A combined corner and edge detector*, Alvey Vision Conference, 1988.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Harris {
-    /// The weights that integrate the structure tensor.
+    /// Window that integrates the structure tensor.
     pub window: Window,
     /// Standard deviation of the window (px).
     pub sigma: f64,
-    /// Harris' constant k: how strongly a straight edge is rejected; 0.04 to 0.06 is common.
+    /// Harris' constant k, the penalty of straight edges; 0.04 to 0.06 is common.
     pub k: f64,
-    /// The weakest response worth keeping, relative to the strongest of the image. The response goes
-    /// with the fourth power of contrast: 1e-4 keeps a tenth of the strongest contrast.
+    /// Minimum response, relative to the strongest of the image.
+    ///
+    /// The response grows with the fourth power of contrast: 1e-4 admits a tenth of the strongest contrast.
     pub quality: f64,
-    /// No corner has a stronger one within this distance (px).
+    /// Radius of non-maximum suppression (px).
     pub radius: usize,
-    /// At most so many corners.
+    /// Maximum number of corners.
     pub features: usize,
-    /// Which, when there are more.
+    /// Selection of corners beyond that number.
     pub selection: Selection,
-    /// Cells along the longer side of the image over which a balanced selection spreads the corners.
+    /// Number of cells along the longer side of the image, for a balanced selection.
     pub cells: usize,
 }
 
@@ -67,7 +68,7 @@ impl Component for Harris {
         "Harris and Stephens, A combined corner and edge detector, Alvey Vision Conference, 1988";
 
     fn check(&self) -> Result<(), String> {
-        // From k = 1/4 on no response is positive.
+        // No response is positive from k = 1/4 on.
         in_range((0.0..0.25).contains(&self.k), "k", self.k, "a number from 0 to below 0.25")?;
         self.corners().check()
     }
@@ -92,7 +93,7 @@ mod tests {
     use super::*;
     use seafix_geometry::Pixel;
 
-    /// Smooth blobs and ramps of many frequencies, 8 bits.
+    /// Cells and noise of many frequencies, 8 bits.
     fn texture(width: usize, height: usize) -> Image {
         let value = |x: usize, y: usize| {
             let hash = |x: usize, y: usize| {
@@ -101,20 +102,20 @@ mod tests {
                 h = h.wrapping_mul(0x2C1B_3C6D);
                 (h ^ (h >> 13)) % 200
             };
-            // Cells of 7 px: corners where four cells meet.
+            // Cells of 7 px, with corners at the meeting points of four cells.
             hash(x / 7, y / 7) as f32 + (hash(x, y) % 5) as f32
         };
         Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
     }
 
-    /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; blurred by one pixel's area.
+    /// A bright quarter of the plane, x ≥ `x` and y ≥ `y`, blurred by the area of one pixel.
     fn quadrant(x: f64, y: f64, size: usize) -> Image {
         let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
         let pixel = |i: usize| 50.0 + 100.0 * cover(i % size, x) * cover(i / size, y);
         Image::new(size, size, (0..size * size).map(|i| pixel(i) as f32).collect()).unwrap()
     }
 
-    /// Two opposite quarters brighter: the corner of a chessboard, at (x, y).
+    /// Two opposite bright quarters: the corner of a chequerboard at (x, y).
     fn crossing(x: f64, y: f64, size: usize) -> Image {
         let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
         let pixel = |i: usize| {
@@ -146,7 +147,7 @@ mod tests {
         let vast = Harris { sigma: 1e300, radius: usize::MAX, cells: usize::MAX, ..Harris::default() };
         assert!(vast.detect(&texture(60, 50)).is_empty());
         let ramp = Image::new(64, 48, (0..64 * 48).map(|i| (i % 64) as f32).collect()).unwrap();
-        assert_eq!(Harris::default().detect(&ramp), [], "a straight edge is no corner");
+        assert_eq!(Harris::default().detect(&ramp), [], "a straight edge is not a corner");
     }
 
     #[test]

@@ -6,38 +6,38 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Keypoint, integral::Integral};
 use seafix_geometry::Pixel;
 
-/// An octave: the image with 2ᵒ×2ᵒ pixels added up to one, and filters of sides 9, 15, 21, … of these.
+/// An octave: the image with 2ᵒ×2ᵒ pixels summed to one, under box filters of sides 9, 15, 21, ….
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Octave<'a> {
     pub(super) integral: &'a Integral,
-    /// Its number o; 0 is the image itself.
+    /// The number o; 0 is the image itself.
     pub(super) number: usize,
-    /// The integral's unit (grey levels).
+    /// The unit of the integral image (grey levels).
     pub(super) unit: f32,
-    /// Scales in which maxima are sought; one more below and one above to compare with.
+    /// The number of scales with maxima; one more below and above serves for comparison.
     pub(super) layers: usize,
-    /// The least determinant (grey levels²).
+    /// The minimum determinant (grey levels²).
     pub(super) min: f32,
 }
 
-/// The third of the side of a layer's filter: the width of its lobes.
+/// A third of the side of a layer's filter: the width of its lobes.
 pub(super) fn lobe(layer: usize) -> usize {
     3 + 2 * layer
 }
 
-/// How far the filter of a layer reaches from its centre.
+/// The distance from the centre of a layer's filter to its border.
 fn reach(layer: usize) -> usize {
     (3 * lobe(layer) - 1) / 2
 }
 
-/// What a search keeps in memory.
+/// The working memory of a search.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// Three rows of determinants of each layer.
+    /// Three rows of determinants for each layer.
     rows: Vec<f32>,
-    /// Sums along the columns: those of xx, of yy and of xy.
+    /// The sums along the columns for xx, yy and xy.
     columns: [Vec<u32>; 3],
-    /// Where a row may have maxima.
+    /// The columns of possible maxima in a row.
     hits: Vec<usize>,
 }
 
@@ -58,7 +58,7 @@ impl Octave<'_> {
             }
             let Some(centre) = y.checked_sub(1).filter(|y| rows.contains(y)) else { continue };
             for layer in 1..=self.layers {
-                // One more, so that all 26 neighbours are known.
+                // One row more, so that all 26 neighbours exist.
                 let margin = reach(layer + 1) + 1;
                 if centre < margin || centre + margin >= height || 2 * margin >= width {
                     continue;
@@ -72,7 +72,7 @@ impl Octave<'_> {
         }
     }
 
-    /// The determinants of a row, wherever the whole filter lies in the image.
+    /// Computes the determinants of a row at all pixels whose filter lies in the image.
     fn determinants(&self, layer: usize, y: usize, columns: &mut [Vec<u32>; 3], out: &mut [f32]) {
         let (lobe, reach) = (lobe(layer), reach(layer));
         let row = |y: usize| self.integral.row(y);
@@ -84,8 +84,8 @@ impl Octave<'_> {
         lobes([row(y + 1 - lobe), row(y + lobe)], xx);
         second([row(top), row(top + lobe), row(top + 2 * lobe), row(bottom)], yy);
         mixed([row(y - lobe), row(y), row(y + 1), row(y + lobe + 1)], xy);
-        // A sum over the pixels of a lobe of xx and yy, 2·lobe − 1 long, becomes their mean; that of xy, as
-        // large as on a quadratic surface the second derivatives in any direction ask for.
+        // The sum over a lobe of xx or yy, 2·lobe − 1 long, becomes its mean. The factor of xy makes the determinant of
+        // a quadratic surface the same in every direction.
         let pixels = (lobe << self.number) as f32 * ((2 * lobe - 1) << self.number) as f32;
         let mean = self.unit / pixels;
         let balance = (lobe * lobe) as f32 / ((lobe + 1) * (lobe + 1)) as f32;
@@ -94,12 +94,13 @@ impl Octave<'_> {
         determinants(xx, yy, xy, lobe, [mean, mixed_mean], &mut out[reach..][..n]);
     }
 
-    /// The maximum at a pixel, to a fraction of a pixel and of a scale; `None` if it is none, or if the
-    /// quadratic through its neighbours has its vertex elsewhere.
+    /// The subpixel maximum at a pixel, in position and scale.
+    ///
+    /// `None` if the pixel is no maximum, or if the quadratic through its neighbours has its vertex elsewhere.
     fn peak(&self, near: &[[&[f32]; 3]; 3], layer: usize, x: usize, y: usize) -> Option<Keypoint> {
         let at = |dl: usize, dy: usize, dx: usize| near[dl][dy][x + dx - 1];
         let response = at(1, 1, 1);
-        // Of equal ones the first counts.
+        // The first of equal values counts.
         let is_greatest = (0..27).all(|i| {
             let other = at(i / 9, i / 3 % 3, i % 3);
             i == 13 || if i < 13 { other < response } else { other <= response }
@@ -116,8 +117,9 @@ impl Octave<'_> {
     }
 }
 
-/// The vertex of the quadratic through 27 values, from the middle one along x, y and the third
-/// dimension: Newton's step, derivatives by central differences. `None` if it is more than 1 away.
+/// The vertex of the quadratic through 27 values, relative to the middle one along x, y and the third dimension.
+///
+/// It is Newton's step with derivatives by central differences. `None` if it is longer than 1.
 ///
 /// Source: Brown and Lowe, *Invariant features from interest point groups*, BMVC 2002.
 fn vertex(at: impl Fn(usize, usize, usize) -> f64) -> Option<[f64; 3]> {
@@ -144,7 +146,7 @@ fn vertex(at: impl Fn(usize, usize, usize) -> f64) -> Option<[f64; 3]> {
     step.iter().all(|d| d.abs() <= 1.0).then(|| step.into())
 }
 
-/// The difference of two rows: the sums along the columns of the lobes of xx.
+/// Computes the difference of two rows: the sums along the columns of the lobes of xx.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn lobes([top, bottom]: [&[u32]; 2], out: &mut [u32]) {
     for ((out, top), bottom) in out.iter_mut().zip(top).zip(bottom) {
@@ -152,7 +154,7 @@ fn lobes([top, bottom]: [&[u32]; 2], out: &mut [u32]) {
     }
 }
 
-/// Three lobes one below the other, weighing 1, −2, 1: the whole less three times the middle.
+/// Weighs three stacked lobes by 1, −2, 1: the sum of all less three times the middle.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn second([a, b, c, d]: [&[u32]; 4], out: &mut [u32]) {
     for ((((out, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
@@ -160,7 +162,7 @@ fn second([a, b, c, d]: [&[u32]; 4], out: &mut [u32]) {
     }
 }
 
-/// Two lobes one below the other, a pixel between them: the lower less the upper.
+/// Computes the lower less the upper of two stacked lobes, one pixel apart.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn mixed([a, b, c, d]: [&[u32]; 4], out: &mut [u32]) {
     for ((((out, a), b), c), d) in out.iter_mut().zip(a).zip(b).zip(c).zip(d) {
@@ -168,7 +170,7 @@ fn mixed([a, b, c, d]: [&[u32]; 4], out: &mut [u32]) {
     }
 }
 
-/// Determinants from the sums along the columns.
+/// Computes the determinants from the sums along the columns.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn determinants(xx: &[u32], yy: &[u32], xy: &[u32], lobe: usize, [mean, mixed]: [f32; 2], out: &mut [f32]) {
     let n = out.len();
@@ -187,7 +189,7 @@ fn determinants(xx: &[u32], yy: &[u32], xy: &[u32], lobe: usize, [mean, mixed]: 
     }
 }
 
-/// Columns of at least this value that no direct neighbour exceeds, beyond a margin at either end.
+/// Finds the columns of at least `min` that no direct neighbour exceeds, except within a margin at either end.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn candidates(near: &[[&[f32]; 3]; 3], min: f32, margin: usize, hits: &mut Vec<usize>) {
     hits.clear();
@@ -221,7 +223,7 @@ fn candidates(near: &[[&[f32]; 3]; 3], min: f32, margin: usize, hits: &mut Vec<u
     }
 }
 
-/// Columns looked at together.
+/// The number of columns that are tested together.
 const BLOCK: usize = 64;
 
 #[cfg(test)]
@@ -229,7 +231,7 @@ mod tests {
     use super::*;
     use crate::Image;
 
-    /// The determinant at the centre of a 64×64 image, by the filter of a layer.
+    /// The determinant at the centre of a 64×64 image by the filter of a layer.
     fn determinant(layer: usize, number: usize, f: impl Fn(i32, i32) -> i32) -> f32 {
         let image = Image::new(64, 64, (0..64 * 64).map(|i| f(i % 64, i / 64) as f32).collect()).unwrap();
         let mut integral = Integral::default();
@@ -250,7 +252,7 @@ mod tests {
     fn a_quadratic_surface_has_its_determinant_in_every_direction() {
         for layer in 0..4 {
             for number in 0..2 {
-                // A lobe's width apart, second differences of means are the second derivative × width².
+                // Second differences of means, a lobe's width apart, are the second derivative × width².
                 let width = (lobe(layer) << number) as f32;
                 if 3.0 * width > 62.0 {
                     continue;
@@ -277,7 +279,7 @@ mod tests {
         };
         let found = vertex(value(0.3, -0.2, 0.45)).unwrap();
         assert!(found.iter().zip([0.3, -0.2, 0.45]).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
-        assert_eq!(vertex(value(0.3, 1.2, 0.0)), None, "the maximum is elsewhere");
+        assert_eq!(vertex(value(0.3, 1.2, 0.0)), None, "the vertex is more than one sample away");
         assert_eq!(vertex(|_, _, _| 1.0), None, "nothing curves");
     }
 }

@@ -4,11 +4,10 @@ use multiversion::multiversion;
 
 use crate::Image;
 
-/// Sums of the pixels above and to the left of every pixel's corner, in whole units, modulo 2³².
+/// The integral image in integer units, modulo 2³².
 ///
-/// The unit is a power of two of a grey level, so small that the pixels are exact where they are whole
-/// grey levels, so large that no sum over a rectangle of the largest area reaches 2³⁰; differences are
-/// therefore exact although the sums themselves overflow.
+/// The unit is a power of two of a grey level. It is so small that integer grey levels are exact, and so large that no
+/// sum over a rectangle of the largest area reaches 2³⁰. Differences are therefore exact although the sums overflow.
 ///
 /// Source: Viola and Jones, *Rapid object detection using a boosted cascade of simple features*, 2001.
 #[derive(Debug, Default)]
@@ -19,10 +18,10 @@ pub(super) struct Integral {
 }
 
 impl Integral {
-    /// Of an image, for rectangles of at most `area` pixels; returns the unit in grey levels.
+    /// Integrates an image for rectangles of at most `area` pixels; returns the unit (grey levels).
     pub(super) fn fill(&mut self, image: &Image, area: f64) -> f32 {
         let [darkest, brightest] = range(image.pixels());
-        // As many units as fit a grey level; bounded so that the scaling itself stays finite.
+        // The largest number of units in a grey level, bounded so that the scaling stays finite.
         let max = (1_u32 << 30) as f64 / area - 1.0;
         let units = power_below(max / (f64::from(brightest) - f64::from(darkest))).clamp(UNITS[0], UNITS[1]) as f32;
         self.reset(image.width(), image.height());
@@ -36,7 +35,7 @@ impl Integral {
         1.0 / units
     }
 
-    /// Of another's image with 2×2 pixels added up to one.
+    /// Integrates the image of `other` with 2×2 pixels summed to one.
     pub(super) fn fill_half(&mut self, other: &Self) {
         self.reset(other.width / 2, other.height / 2);
         for (row, y) in self.sums.chunks_exact_mut(self.width + 1).zip((0..).step_by(2)) {
@@ -46,33 +45,33 @@ impl Integral {
         }
     }
 
-    /// Sets the size; the first row is zero.
+    /// Sets the size and clears the first row.
     fn reset(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
         self.sums.resize((width + 1) * (height + 1), 0);
         self.sums[..=width].fill(0);
     }
 
-    /// Pixels along x and y.
+    /// The numbers of pixels along x and y.
     pub(super) fn size(&self) -> [usize; 2] {
         [self.width, self.height]
     }
 
-    /// The sums above pixel row `y`, at the left corner of every pixel and at the right one of the last.
+    /// The sums above pixel row `y`: at the left corner of every pixel, and at the right corner of the last.
     pub(super) fn row(&self, y: usize) -> &[u32] {
         &self.sums[y * (self.width + 1)..][..=self.width]
     }
 }
 
-/// The fewest and the most units of a grey level.
+/// The smallest and the largest number of units in a grey level.
 const UNITS: [f64; 2] = [f64::from_bits((1023 - 120) << 52), f64::from_bits((1023 + 100) << 52)];
 
-/// The greatest power of two that is not above a positive number.
+/// The largest power of two that does not exceed a positive number.
 fn power_below(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & (0x7FF << 52))
 }
 
-/// The least and the greatest.
+/// The minimum and the maximum.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn range(pixels: &[f32]) -> [f32; 2] {
     let (mut min, mut greatest) = ([pixels[0]; 16], [pixels[0]; 16]);
@@ -90,7 +89,7 @@ fn range(pixels: &[f32]) -> [f32; 2] {
     both
 }
 
-/// A row of the integral from the row above.
+/// Computes a row of the integral from the row above.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn sum_row(pixels: &[f32], units: f32, darkest: f32, above: &[u32], row: &mut [u32]) {
     row[0] = 0;
@@ -134,7 +133,7 @@ mod tests {
         let image = Image::new(300, 200, pixels).unwrap();
         let mut integral = Integral::default();
         let unit = integral.fill(&image, 400.0);
-        assert!(over(&integral, [0, 300], [0, 200]) as f32 * unit < 1e6, "the whole has overflowed");
+        assert!(over(&integral, [0, 300], [0, 200]) as f32 * unit < 1e6, "the total sum does not overflow");
         for (x, y) in [(0, 0), (280, 180), (133, 77)] {
             let expected: f32 = (y..y + 20).map(|y| image.row(y)[x..x + 20].iter().sum::<f32>()).sum();
             assert_eq!(over(&integral, [x, x + 20], [y, y + 20]) as f32 * unit, expected);

@@ -1,4 +1,4 @@
-//! Detectors: where in an image there is something to find again.
+//! Detectors of key points.
 
 mod corners;
 mod dog;
@@ -29,18 +29,41 @@ pub use tensor::Window;
 
 use crate::{Image, Workspace};
 
-/// A place in an image that can be found again.
+/// A key point: a pixel that can be detected again in another image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keypoint {
-    /// Where, to a fraction of a pixel.
+    /// The position (px), with subpixel resolution.
     pub at: Pixel,
-    /// How strong, in the detector's own measure; larger is stronger.
+    /// The strength in the detector's own measure; larger is stronger.
     pub response: f32,
-    /// The size of the structure (px): the standard deviation of the Gaussian it was found at.
+    /// The size of the structure (px): the standard deviation of the Gaussian of its detection.
     pub scale: f32,
 }
 
-/// Finds the key points of an image.
+/// A detector of key points.
+///
+/// ```
+/// use seafix_geometry::Pixel;
+/// use seafix_vision::{Detector, Image, Keypoint, Workspace};
+///
+/// /// The brightest pixel as the only key point.
+/// #[derive(Debug)]
+/// struct Brightest;
+///
+/// impl Detector for Brightest {
+///     fn detect_into(&self, image: &Image, _: &mut Workspace, found: &mut Vec<Keypoint>) {
+///         found.clear();
+///         let brightest = image.pixels().iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+///         found.extend(brightest.map(|(i, &response)| {
+///             let at = Pixel { u: (i % image.width()) as f64, v: (i / image.width()) as f64 };
+///             Keypoint { at, response, scale: 1.0 }
+///         }));
+///     }
+/// }
+///
+/// let image = Image::new(3, 2, vec![0.0, 0.0, 0.0, 0.0, 0.0, 200.0]).unwrap();
+/// assert_eq!(Brightest.detect(&image)[0].at, Pixel { u: 2.0, v: 1.0 });
+/// ```
 pub trait Detector: Send + Sync + std::fmt::Debug {
     /// Replaces `found` by the image's key points, strongest first.
     fn detect_into(&self, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>);
@@ -53,7 +76,7 @@ pub trait Detector: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All detectors.
+/// The registry of detectors.
 pub static DETECTORS: Registry<dyn Detector> = Registry::new(
     "detector",
     &[

@@ -1,4 +1,4 @@
-//! Maxima of a response over an image: which, and where to a fraction of a pixel.
+//! Maxima of a response over an image, with subpixel positions.
 
 use multiversion::multiversion;
 use seafix_geometry::Pixel;
@@ -6,16 +6,16 @@ use seafix_geometry::Pixel;
 use super::Keypoint;
 use crate::Threads;
 
-/// Which maxima count.
+/// The criteria of a maximum.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peaks {
-    /// The least response.
+    /// The minimum response.
     pub(super) min: f32,
-    /// No other within this distance is greater (px).
+    /// The radius of non-maximum suppression (px).
     pub(super) radius: usize,
 }
 
-/// What the search for maxima keeps in mind while it works.
+/// The working memory of a search.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     bands: Vec<Band>,
@@ -28,7 +28,7 @@ struct Band {
     found: Vec<Keypoint>,
 }
 
-/// How far a disc reaches sideways in its middle row, the next, and so on (px).
+/// The half-widths of a disc's rows, from the middle row outwards (px).
 #[derive(Debug, Default)]
 pub(super) struct Disc(Vec<usize>);
 
@@ -40,9 +40,10 @@ impl Disc {
 }
 
 impl Peaks {
-    /// Replaces `found` by the pixels with a positive response of at least `min` that none within the
-    /// radius exceeds, row by row; of equal ones within the radius the first counts. Never at the border
-    /// of the image.
+    /// Replaces `found` by the maxima in row-major order: positive pixels of at least `min` that none within the radius
+    /// exceeds.
+    ///
+    /// The first of equal pixels within the radius counts. Border pixels are never maxima.
     pub(super) fn find(
         &self,
         response: &[f32],
@@ -74,8 +75,9 @@ impl Peaks {
     }
 }
 
-/// Calls `visit` with x and y of each such pixel in some rows, neither the first nor the last; the disc around it may
-/// reach beyond the rows that are there only where the image ends.
+/// Calls `visit` with x and y of each maximum in some rows, neither the first nor the last.
+///
+/// The disc may extend beyond the available rows only at the border of the image.
 pub(super) fn in_rows(
     response: &[f32],
     width: usize,
@@ -99,8 +101,7 @@ pub(super) fn in_rows(
     }
 }
 
-/// Marks by 1 the inner pixels of a row that are at least `min` and greatest of their nine; of equals
-/// the first.
+/// Marks the inner pixels of a row that are at least `min` and the largest of their nine; of equals the first.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn mark(above: &[f32], here: &[f32], below: &[f32], min: f32, marks: &mut [u8]) {
     mark_in_any_lanes(above, here, below, min, marks);
@@ -112,7 +113,7 @@ fn mark_in_any_lanes(above: &[f32], here: &[f32], below: &[f32], min: f32, marks
     let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..n + 2]];
     let [h0, h1, h2] = [&here[..n], &here[1..=n], &here[2..n + 2]];
     let [b0, b1, b2] = [&below[..n], &below[1..=n], &below[2..n + 2]];
-    // Not f32::max: this one is a single instruction.
+    // A single instruction, unlike f32::max.
     let max = |a: f32, b: f32| if a > b { a } else { b };
     for x in 0..n {
         let r = h1[x];
@@ -122,7 +123,7 @@ fn mark_in_any_lanes(above: &[f32], here: &[f32], below: &[f32], min: f32, marks
     }
 }
 
-/// Calls `visit` with the index of every byte that is 1; the others are 0.
+/// Calls `visit` with the index of each byte that is 1; the others are 0.
 fn each(marks: &[u8], mut visit: impl FnMut(usize)) {
     let (words, rest) = marks.as_chunks::<8>();
     for (index, word) in words.iter().enumerate() {
@@ -146,7 +147,7 @@ fn is_greatest(response: &[f32], width: usize, [x, y]: [usize; 2], chords: &[usi
     };
     let below = |others: &[f32]| others.iter().all(|&other| other < r);
     let no_larger = |others: &[f32]| others.iter().all(|&other| other <= r);
-    // The nearest rows first: they are the likeliest to hold a greater one.
+    // The nearest rows first: they most probably hold a larger value.
     chords.iter().enumerate().all(|(dy, &chord)| {
         if dy == 0 {
             let (left, right) = row(y, chord);
@@ -159,10 +160,10 @@ fn is_greatest(response: &[f32], width: usize, [x, y]: [usize; 2], chords: &[usi
     })
 }
 
-/// The vertex of the quadratic through the nine values around a pixel (px from that pixel), row by row,
-/// never more than a pixel away; the pixel itself where the nine describe no maximum.
+/// The vertex of the quadratic through nine values in row-major order, relative to the middle pixel (px).
 ///
-/// Newton's step −H⁻¹ g with the derivatives by central differences.
+/// It is Newton's step −H⁻¹ g with derivatives by central differences, at most a pixel long; zero if the nine have no
+/// maximum.
 pub(crate) fn vertex(nine: [[f32; 3]; 3]) -> [f64; 2] {
     let [[nw, n, ne], [w, centre, e], [sw, s, se]] = nine.map(|row| row.map(f64::from));
     let gx = 0.5 * (e - w);
@@ -181,7 +182,7 @@ pub(crate) fn vertex(nine: [[f32; 3]; 3]) -> [f64; 2] {
     [0.0, 0.0]
 }
 
-/// From an inner pixel to the vertex around it.
+/// The offset from an inner pixel to its vertex.
 pub(super) fn to_vertex(response: &[f32], width: usize, [x, y]: [usize; 2]) -> [f64; 2] {
     let row = |y: usize| std::array::from_fn(|i| response[y * width + x - 1 + i]);
     vertex([row(y - 1), row(y), row(y + 1)])
@@ -197,7 +198,7 @@ mod tests {
         found
     }
 
-    /// Plateaus and noise, reproducible.
+    /// Plateaus and noise with a fixed seed.
     fn random_values(n: usize, levels: u32) -> Vec<f32> {
         let hash = |i: usize| {
             let h = (i as u32).wrapping_mul(0x9E37_79B1);

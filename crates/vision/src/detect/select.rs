@@ -1,45 +1,45 @@
-//! Which key points stay when there are more than the budget.
+//! The selection of key points beyond a maximum number.
 
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
 use super::Keypoint;
 
-/// Which key points stay when there are more than the budget.
+/// Selection of key points beyond a maximum number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Selection {
-    /// The strongest of the whole image.
+    /// The strongest of the image.
     Strongest,
-    /// The strongest of every cell, then the second of every cell, and so on: the image is cut into square
-    /// cells.
+    /// The strongest of each square cell, then the second of each cell, and so on.
     #[default]
     Balanced,
-    /// Those with the greatest distance to any point that is clearly stronger, 0.9 Rⱼ > Rᵢ: adaptive
-    /// non-maximal suppression (Brown, Szeliski and Winder, *Multi-image matching using multi-scale
-    /// oriented patches*, CVPR 2005). It takes no notice of where a grid's lines fall.
+    /// The points with the largest distance to a clearly stronger one, 0.9 Rⱼ > Rᵢ: adaptive non-maximal suppression.
+    ///
+    /// Unlike cells, it does not depend on the position of a grid. Source: Brown, Szeliski and Winder, *Multi-image
+    /// matching using multi-scale oriented patches*, CVPR 2005.
     Adaptive,
 }
 
-/// At most so many key points, and which.
+/// The maximum number of key points and their selection.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Budget {
     pub(super) features: usize,
     pub(super) selection: Selection,
-    /// Cells along the longer side of the image, for [`Selection::Balanced`].
+    /// The number of cells along the longer side of the image, for [`Selection::Balanced`].
     pub(super) cells: usize,
 }
 
-/// What a selection keeps in mind while it works.
+/// The working memory of a selection.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// What decides first (the greater stays), the place in the order of strength, and the point.
+    /// The rank (the largest is kept first), the index by strength, and the point.
     ranked: Vec<(f64, usize, Keypoint)>,
     taken: Vec<usize>,
     near: Near,
 }
 
-/// A point is clearly stronger than those below this share of its response.
+/// The factor 0.9 of a clearly stronger response.
 const CLEARLY: f32 = 0.9;
 
 fn stronger(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
@@ -48,8 +48,7 @@ fn stronger(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
 }
 
 impl Budget {
-    /// Keeps what the budget allows of the points of an image of this width and height, and puts the
-    /// strongest first; equals go row by row.
+    /// Keeps the selected points of an image of this width and height, strongest first; equals in row-major order.
     pub(super) fn keep(&self, found: &mut Vec<Keypoint>, size: [usize; 2], scratch: &mut Scratch) {
         if found.len() > self.features {
             match self.selection {
@@ -72,7 +71,7 @@ impl Budget {
         found.sort_unstable_by(stronger);
     }
 
-    /// Replaces `found` by those of the highest rank.
+    /// Replaces `found` by the points of the highest rank.
     fn first(&self, found: &mut Vec<Keypoint>, scratch: &mut Scratch) {
         let ranked = &mut scratch.ranked;
         if self.features < ranked.len() {
@@ -83,7 +82,7 @@ impl Budget {
     }
 }
 
-/// The strongest of a cell ranks 0, its second −1.
+/// Ranks the strongest of a cell 0, its second −1, and so on.
 fn rank_in_cells(sorted: &[Keypoint], [width, height]: [usize; 2], cells: usize, scratch: &mut Scratch) {
     let longer = width.max(height);
     let cells = cells.clamp(1, longer);
@@ -99,7 +98,7 @@ fn rank_in_cells(sorted: &[Keypoint], [width, height]: [usize; 2], cells: usize,
     }));
 }
 
-/// The rank is the squared distance to the nearest that is clearly stronger (px²).
+/// Ranks points by the squared distance to the nearest clearly stronger one (px²).
 fn rank_by_distance(sorted: &[Keypoint], size: [usize; 2], scratch: &mut Scratch) {
     let Scratch { ranked, near, .. } = scratch;
     near.clear(size, sorted.len());
@@ -114,21 +113,23 @@ fn rank_by_distance(sorted: &[Keypoint], size: [usize; 2], scratch: &mut Scratch
     }));
 }
 
-/// Points in the cells of a grid, to find the nearest.
+/// A grid of points for nearest-neighbour queries.
 #[derive(Debug, Default)]
 struct Near {
-    /// Side of a cell (px), and the cells along x and y.
+    /// The side of a cell (px).
     side: f64,
+    /// The numbers of cells along x and y.
     cells: [usize; 2],
-    /// The last point of each cell and, for every point, the one before it in its cell.
+    /// The last point of each cell.
     last: Vec<usize>,
+    /// Each point with the index of the previous one of its cell.
     points: Vec<(Pixel, usize)>,
 }
 
 const NONE: usize = usize::MAX;
 
 impl Near {
-    /// No point yet; about `count` will come.
+    /// Removes all points and sizes the grid for about `count` points.
     fn clear(&mut self, [width, height]: [usize; 2], count: usize) {
         let (width, height) = (width as f64, height as f64);
         self.side = (width * height / count as f64).sqrt().max(1.0);
@@ -150,7 +151,7 @@ impl Near {
         *last = self.points.len() - 1;
     }
 
-    /// The squared distance to the nearest point (px²); infinite when there is none.
+    /// The squared distance to the nearest point (px²); infinite without points.
     fn squared(&self, at: Pixel) -> f64 {
         let [column, row] = self.cell(at);
         let [columns, rows] = self.cells;
@@ -165,7 +166,7 @@ impl Near {
                     best = best.min(self.squared_in(at, y * columns + x));
                 }
             }
-            // Every point of the next ring is farther than this.
+            // All points of the next ring are farther away than this.
             let reach = ring as f64 * self.side;
             if best <= reach * reach {
                 break;
@@ -200,7 +201,7 @@ mod tests {
         found
     }
 
-    /// Points all over 100×80, reproducible.
+    /// Points all over 100×80 px with a fixed seed.
     fn many(n: u32) -> Vec<Keypoint> {
         let hash = |i: u32| {
             let h = i.wrapping_mul(0x9E37_79B1);
@@ -217,7 +218,7 @@ mod tests {
         assert_eq!(columns(Selection::Strongest, 2), [1.0, 3.0, 5.0]);
         assert_eq!(columns(Selection::Balanced, 1), [1.0, 3.0, 5.0]);
         assert_eq!(columns(Selection::Balanced, 2), [1.0, 3.0, 60.0]);
-        // 0.9 · 9 suppresses both 8, at a distance of 2, and 7.5, at 4; 0.9 · 8 suppresses neither.
+        // 0.9 · 9 suppresses 8, at a distance of 2, and 7.5, at 4; 0.9 · 8 suppresses neither.
         assert_eq!(columns(Selection::Adaptive, 2), [1.0, 5.0, 60.0]);
     }
 

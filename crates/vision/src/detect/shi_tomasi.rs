@@ -11,33 +11,33 @@ use super::{
 };
 use crate::{Image, Workspace};
 
-/// Good features to track: places whose displacement is well determined in every direction.
+/// Shi and Tomasi's detector of good features to track.
 ///
-/// The response is the smaller eigenvalue of the structure tensor A = w ∗ g gᵀ (grey levels²/px²) of
-/// [`Harris`](super::Harris), the information that the window holds on the worse determined direction.
-/// It has no constant to choose.
+/// The response is the smaller eigenvalue of the structure tensor A = w ∗ g gᵀ of [`Harris`](super::Harris) (grey
+/// levels²/px²): the information of the window about the displacement in the worse direction. It has no free constant.
 ///
-/// Nothing is found nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; an image
-/// too small for that has no corner.
+/// Limits: nothing is detected nearer to the border than the operator reaches, 3σ + 2 px for the Gaussian; a smaller
+/// image has no corner.
 ///
 /// Source: Shi and Tomasi, *Good features to track*, CVPR 1994.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ShiTomasi {
-    /// The weights that integrate the structure tensor.
+    /// Window that integrates the structure tensor.
     pub window: Window,
     /// Standard deviation of the window (px).
     pub sigma: f64,
-    /// The weakest response worth keeping, relative to the strongest of the image. The response goes
-    /// with the square of contrast: 0.01 keeps a tenth of the strongest contrast.
+    /// Minimum response, relative to the strongest of the image.
+    ///
+    /// The response grows with the square of contrast: 0.01 admits a tenth of the strongest contrast.
     pub quality: f64,
-    /// No corner has a stronger one within this distance (px).
+    /// Radius of non-maximum suppression (px).
     pub radius: usize,
-    /// At most so many corners.
+    /// Maximum number of corners.
     pub features: usize,
-    /// Which, when there are more.
+    /// Selection of corners beyond that number.
     pub selection: Selection,
-    /// Cells along the longer side of the image over which a balanced selection spreads the corners.
+    /// Number of cells along the longer side of the image, for a balanced selection.
     pub cells: usize,
 }
 
@@ -83,7 +83,7 @@ impl Detector for ShiTomasi {
 mod tests {
     use super::*;
 
-    /// `contrast` grey levels between the quarters of a chessboard's crossing at (20, 20).
+    /// A chequerboard crossing at (20, 20) with `contrast` grey levels between its quarters.
     fn crossing(contrast: f32) -> Image {
         let side = |i: usize| (i as f32 - 20.0).clamp(-0.5, 0.5);
         let pixel = |i: usize| 128.0 + 2.0 * contrast * side(i % 41) * side(i / 41);

@@ -1,24 +1,24 @@
-//! The response to a structure tensor in a strip of the image, streamed row by row.
+//! The response of a structure tensor in a strip of the image, streamed row by row.
 
 use multiversion::multiversion;
 
 use super::tensor::{Measure, Weights};
 use crate::Image;
 
-/// What one strip works in, and the strongest response so far.
+/// The working memory of one strip, and the strongest response so far.
 #[derive(Debug)]
 pub(super) struct Band<'a> {
-    /// gx gx, gx gy, gy gy of one row of a strip, with what the window needs on either side.
+    /// The products gx gx, gx gy, gy gy of one row of a strip, with the window's margin on either side.
     pub(super) products: &'a mut [Vec<f32>; 3],
-    /// The three, smoothed along x, of as many rows as the window is high.
+    /// The three products, smoothed along x, of as many rows as the window is high.
     pub(super) ring: &'a mut [Planes],
     pub(super) strongest: &'a mut f32,
 }
 
-/// Columns of a strip: what a window needs of one stays in the first-level cache.
+/// The width of a strip: the rows of a window stay in the first-level cache.
 pub(super) const STRIP: usize = 128;
 
-/// xx, xy, yy of the columns of a strip, on the boundary of a cache line.
+/// The products xx, xy, yy of the columns of a strip, aligned to a cache line.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
 pub(super) struct Planes([f32; 3 * STRIP]);
@@ -27,16 +27,16 @@ impl Planes {
     pub(super) const ZERO: Self = Self([0.0; 3 * STRIP]);
 }
 
-/// A rectangle of the image, at most a strip wide, that the operator does not leave.
+/// A rectangle of the image, at most a strip wide, within the operator's margin.
 #[derive(Clone)]
 pub(super) struct Part<'a> {
     pub(super) image: &'a Image,
     pub(super) weights: &'a Weights,
     pub(super) measure: Measure,
-    /// The image's row that is the first of `out`.
+    /// The image row of the first row of `out`.
     pub(super) first: usize,
     pub(super) rows: std::ops::Range<usize>,
-    /// The first row that the ring does not hold yet.
+    /// The first row that is not yet in the ring.
     pub(super) next: usize,
     pub(super) columns: std::ops::Range<usize>,
 }
@@ -46,10 +46,10 @@ pub(super) fn strip(part: &Part<'_>, out: &mut [f32], band: Band<'_>) {
     strip_in_any_lanes(part, out, band);
 }
 
-/// The response of one part, row by row: products of gradients, smoothed along x into the ring; when the
-/// ring holds all rows of a window they are smoothed along y.
+/// Computes the response of one part, row by row.
 ///
-/// Smoothing works on whole strips; what lies beyond a narrower part is computed and never read.
+/// Products of gradients are smoothed along x into the ring, and along y once the ring holds all rows of a window.
+/// Smoothing covers complete strips; values beyond a narrower part are computed and never read.
 #[inline(always)]
 fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: Band<'_>) {
     let Part { image, weights, measure, first, rows, next, columns } = part;
@@ -63,7 +63,7 @@ fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: Band<'_>) {
         let row = |y: usize| &image.row(y)[columns.start - reach - 1..columns.end + reach + 1];
         gradient_products([row(y - 1), row(y), row(y + 1)], products);
         for (smooth, product) in ring[y % size].0.as_chunks_mut::<STRIP>().0.iter_mut().zip(products.iter()) {
-            let at = |i: usize| product[i..].first_chunk::<STRIP>().expect("as long as a strip and its window");
+            let at = |i: usize| product[i..].first_chunk::<STRIP>().expect("the length of a strip and its window");
             smooth_symmetric(smooth, half, at(reach), |step| [at(reach - step), at(reach + step)]);
         }
         if y < rows.start + reach {
@@ -81,7 +81,7 @@ fn strip_in_any_lanes(part: &Part<'_>, out: &mut [f32], band: Band<'_>) {
     *strongest = greatest[..count].iter().copied().fold(*strongest, f32::max);
 }
 
-/// The response to each tensor, all of whose numbers are to be scaled first.
+/// The response of each tensor after multiplication by `scale`.
 #[inline(always)]
 fn respond(measure: Measure, tensor: &Planes, scale: f32) -> [f32; STRIP] {
     let (planes, _) = tensor.0.as_chunks::<STRIP>();
@@ -105,11 +105,11 @@ fn respond(measure: Measure, tensor: &Planes, scale: f32) -> [f32; STRIP] {
     response
 }
 
-/// gx gx, gx gy, gy gy of a row, without its first and last column.
+/// Computes gx gx, gx gy, gy gy of a row, without its first and last column.
 #[inline(always)]
 fn gradient_products([above, here, below]: [&[f32]; 3], [xx, xy, yy]: &mut [Vec<f32>; 3]) {
     let n = here.len() - 2;
-    // Sobel's operator sums eight differences of one pixel.
+    // Sobel's operator sums eight one-pixel differences.
     const EIGHTH: f32 = 0.125;
     let [a0, a1, a2] = [&above[..n], &above[1..=n], &above[2..n + 2]];
     let [h0, h2] = [&here[..n], &here[2..n + 2]];
@@ -124,8 +124,9 @@ fn gradient_products([above, here, below]: [&[f32]; 3], [xx, xy, yy]: &mut [Vec<
     }
 }
 
-/// out = half[0] · centre + Σ half[step] · (a + b), with the pair a, b at each step from the centre:
-/// both sides of a symmetric kernel at once. The sum runs in the order of the steps.
+/// Computes out = half[0] · centre + Σ half[step] · (a + b), with the pair a, b at each step from the centre.
+///
+/// It is both sides of a symmetric kernel at once, summed in the order of the steps.
 #[inline(always)]
 fn smooth_symmetric<'a, const N: usize>(
     out: &mut [f32; N],
@@ -133,7 +134,7 @@ fn smooth_symmetric<'a, const N: usize>(
     centre: &[f32; N],
     pair: impl Fn(usize) -> [&'a [f32; N]; 2],
 ) {
-    // Several steps at a time: fewer passes over `out`.
+    // Several steps at a time need fewer passes over `out`.
     let (groups, rest) = half[1..].as_chunks::<3>();
     if groups.is_empty() {
         for i in 0..N {

@@ -9,34 +9,32 @@ use super::hessian::{self, Octave, lobe};
 use super::{Detector, Keypoint, Selection, integral::Integral, select, select::Budget};
 use crate::{Image, Threads, Workspace};
 
-/// SURF's key points: blobs, dark or bright, of any size: maxima of the Hessian's determinant over
-/// the image and over scale.
+/// SURF's detector: dark or bright blobs at maxima, over position and scale, of the Hessian's determinant.
 ///
-/// The second derivatives Lxx, Lyy, Lxy of the smoothed image are approximated by box filters of side
-/// L = 9, 15, 21, … px, which stand for Gaussians of σ = 1.2 L/9; the response is Lxx Lyy − (w Lxy)²
-/// (grey levels²: each lobe of a filter counts by its mean), w such that on a quadratic surface it is the
-/// same in every direction. Each octave repeats the filters on the image with 2×2 pixels made one. A
-/// maximum among its 26 neighbours is placed by the quadratic through them, to a fraction of a pixel
-/// and of a scale; [`Keypoint::scale`] is that σ, which is the s of SURF's descriptor.
+/// Box filters of side L = 9, 15, 21, … px approximate the second derivatives Lxx, Lyy, Lxy of the image smoothed with
+/// σ = 1.2 L/9. The response is Lxx Lyy − (w Lxy)² (grey levels², since each lobe of a filter counts by its mean), with
+/// w such that a quadratic surface has the same response in every direction. Each octave repeats the filters on the
+/// image with 2×2 pixels summed to one. A maximum among its 26 neighbours moves to the vertex of the quadratic through
+/// them; [`Keypoint::scale`] is its σ, the s of SURF's descriptor.
 ///
-/// Nothing is found where the next larger filter of the octave would reach beyond the border.
+/// Limit: nothing is detected within reach of the next larger filter of the octave from the border.
 ///
-/// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006;
-/// Bay, Ess, Tuytelaars and Van Gool, CVIU 2008.
+/// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006; Bay, Ess, Tuytelaars and Van
+/// Gool, CVIU 2008.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FastHessian {
-    /// How often the image is halved, plus one.
+    /// Number of octaves, each of half the resolution.
     pub octaves: usize,
-    /// Scales of an octave in which key points are sought.
+    /// Number of scales of an octave with key points.
     pub layers: usize,
-    /// The weakest response worth keeping (grey levels²).
+    /// Minimum response (grey levels²).
     pub threshold: f64,
-    /// At most so many key points.
+    /// Maximum number of key points.
     pub features: usize,
-    /// Which, when there are more.
+    /// Selection of key points beyond that number.
     pub selection: Selection,
-    /// Cells along the longer side of the image over which a balanced selection spreads them.
+    /// Number of cells along the longer side of the image, for a balanced selection.
     pub cells: usize,
 }
 
@@ -61,7 +59,7 @@ impl Component for FastHessian {
     }
 }
 
-/// What stays in memory.
+/// The working memory of the detector.
 #[derive(Debug, Default)]
 struct Scratch {
     octaves: Vec<Integral>,
@@ -69,7 +67,7 @@ struct Scratch {
     selection: select::Scratch,
 }
 
-/// Rows of an octave, and what was found in them.
+/// A band of an octave's rows, with its key points.
 #[derive(Debug, Default)]
 struct Band {
     octave: usize,
@@ -106,7 +104,7 @@ impl Detector for FastHessian {
 }
 
 impl FastHessian {
-    /// The integral images of all octaves; returns their unit (grey levels).
+    /// Computes the integral images of all octaves; returns their unit (grey levels).
     fn fill_octaves(&self, image: &Image, octaves: &mut Vec<Integral>) -> f32 {
         octaves.resize_with(self.octaves.max(octaves.len()), Integral::default);
         let pixel = (1_u64 << (2 * (self.octaves - 1))) as f64;
@@ -120,7 +118,7 @@ impl FastHessian {
     }
 }
 
-/// Cuts all octaves into bands; returns how many.
+/// Divides all octaves into bands; returns their number.
 fn plan(octaves: &[Integral], threads: Threads, bands: &mut Vec<Band>) -> usize {
     let mut count = 0;
     for (octave, integral) in octaves.iter().enumerate() {
@@ -142,7 +140,7 @@ fn plan(octaves: &[Integral], threads: Threads, bands: &mut Vec<Band>) -> usize 
 mod tests {
     use super::*;
 
-    /// Blobs: place, standard deviation (px) and contrast.
+    /// Blobs (x, y, standard deviation (px), contrast).
     fn blobs(width: usize, height: usize, blobs: &[[f64; 4]]) -> Image {
         let grey = |x: f64, y: f64| {
             let blob = |&[u, v, sigma, contrast]: &[f64; 4]| {
@@ -168,7 +166,7 @@ mod tests {
             let point = nearest.unwrap();
             let away = (point.at.u - u).hypot(point.at.v - v);
             assert!(away < 0.03 * sigma, "{point:?}, not {u} {v}");
-            // A blob of Gaussian shape answers best to lobes of 1.68 of its standard deviation.
+            // A Gaussian blob responds most strongly to lobes of 1.68 times its standard deviation.
             let scale = 1.2 / 9.0 * 3.0 * 1.682 * sigma;
             assert!((f64::from(point.scale) / scale - 1.0).abs() < 0.12, "{point:?}, not {scale}");
         }
@@ -193,7 +191,7 @@ mod tests {
     #[test]
     fn a_quarter_turn_of_the_image_turns_the_blobs() {
         let image = blobs(224, 192, &BLOBS);
-        // (x, y) goes to (y, width − 1 − x).
+        // A quarter turn moves (x, y) to (y, width − 1 − x).
         let turned = (0..224 * 192).map(|i| image.row(i % 192)[223 - i / 192]).collect();
         let after = FastHessian::default().detect(&Image::new(192, 224, turned).unwrap());
         let before = FastHessian::default().detect(&image);

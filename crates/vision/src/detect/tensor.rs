@@ -1,32 +1,33 @@
-//! The structure tensor, streamed: from an image to a response at every pixel.
+//! The structure tensor's response at every pixel of an image, streamed.
 
 use serde::{Deserialize, Serialize};
 
 use super::strip::{Band, Part, Planes, STRIP, strip};
 use crate::{Image, gaussian::half_kernel};
 
-/// The weights that integrate the structure tensor.
+/// Window that integrates the structure tensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Window {
-    /// A Gaussian, cut off at 3σ: the same in every direction.
+    /// A Gaussian, cut off at 3σ; the same in every direction.
     #[default]
     Gaussian,
-    /// A square of equal weights and the same variance, σ² = (n² − 1)/12 for n pixels. Of whole grey
-    /// levels the sums are exact, and a quarter turn of the image turns the response to the last bit.
+    /// A square of n×n equal weights with the variance σ² = (n² − 1)/12.
+    ///
+    /// Sums of integer grey levels are exact, so a quarter turn of the image turns the response to the last bit.
     Box,
 }
 
-/// What a structure tensor A says of its pixel.
+/// The response of a structure tensor A.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Measure {
-    /// det A − k (tr A)², Harris and Stephens (grey levels⁴/px⁴).
+    /// Harris and Stephens' det A − k (tr A)² (grey levels⁴/px⁴).
     Harris { k: f32 },
-    /// The smaller eigenvalue, Shi and Tomasi (grey levels²/px²).
+    /// Shi and Tomasi's smaller eigenvalue (grey levels²/px²).
     SmallestEigenvalue,
 }
 
-/// A = w ∗ g gᵀ, the gradient g by Sobel's operator (grey levels/px).
+/// The structure tensor A = w ∗ g gᵀ, with the gradient g by Sobel's operator (grey levels/px).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tensor {
     pub(super) window: Window,
@@ -35,15 +36,15 @@ pub(super) struct Tensor {
     pub(super) measure: Measure,
 }
 
-/// The response, some rows after the other: what the window needs of the rows before stays.
+/// The response by consecutive rows; the window's part of the earlier rows is kept.
 #[derive(Debug, Default)]
 pub(super) struct Stream {
     products: [Vec<f32>; 3],
-    /// Of each strip the rows under the window.
+    /// The rows under the window, for each strip.
     rings: Vec<Planes>,
-    /// The first row of the image that the rings do not hold yet.
+    /// The first image row that is not yet in the rings.
     next: usize,
-    /// The greatest response so far.
+    /// The strongest response so far.
     pub(super) strongest: f32,
 }
 
@@ -51,9 +52,9 @@ pub(super) struct Stream {
 #[derive(Debug)]
 pub(super) struct Weights {
     of: (Window, f64),
-    /// Of the centre, and of each step away from it.
+    /// The weight of the centre, then of each step from it.
     pub(super) half: Vec<f32>,
-    /// What both axes together have to be scaled by.
+    /// The scale factor of both axes together.
     pub(super) scale: f32,
 }
 
@@ -74,17 +75,19 @@ impl Weights {
         self.half.len() - 1
     }
 
-    /// Pixels at the border without a response: the window's and the gradient's.
+    /// The width of the border without a response (px): the window's and the gradient's.
     pub(super) fn margin(&self) -> usize {
         self.reach() + 1
     }
 }
 
 impl Tensor {
-    /// The weights of the window, made anew only if others are `kept`; `None` if the image is too small for the operator.
+    /// The weights of the window, recomputed only if `kept` holds others.
+    ///
+    /// `None` if the image is too small for the operator.
     pub(super) fn weights<'a>(&self, image: &Image, kept: &'a mut Option<Weights>) -> Option<&'a Weights> {
         let shorter = image.width().min(image.height());
-        // Checked before the weights are made: their number is the user's.
+        // Checked before the weights are computed, since the user sets their number.
         if !(2.0 * self.sigma < shorter as f64) {
             return None;
         }
@@ -96,13 +99,15 @@ impl Tensor {
 }
 
 impl Stream {
-    /// What came before is forgotten.
+    /// Resets the stream.
     pub(super) fn begin(&mut self) {
         (self.next, self.strongest) = (0, 0.0);
     }
 
-    /// Fills `out` with the response at whole rows of the image, the first of which is `first`; zero nearer to the
-    /// border than the operator reaches. The rows follow those of the call before, or are the first.
+    /// Fills `out` with the response of complete image rows from `first` on.
+    ///
+    /// The response is zero nearer to the border than the operator reaches. Rows follow those of the last call, or are
+    /// the first.
     pub(super) fn fill(&mut self, image: &Image, tensor: &Tensor, weights: &Weights, first: usize, out: &mut [f32]) {
         let (width, height) = (image.width(), image.height());
         let (margin, reach) = (weights.margin(), weights.reach());
@@ -139,11 +144,11 @@ mod tests {
     use super::*;
     use crate::image::random_image;
 
-    /// The response at every pixel, so many rows at a time.
+    /// The response at every pixel, computed `rows` rows at a time.
     fn response(tensor: &Tensor, image: &Image, rows: usize) -> (Vec<f32>, f32) {
         let mut response = vec![7.0; image.pixels().len()];
         let (mut weights, mut stream) = (None, Stream { strongest: 9.0, ..Stream::default() });
-        let weights = tensor.weights(image, &mut weights).expect("an image large enough");
+        let weights = tensor.weights(image, &mut weights).expect("the image is large enough");
         stream.begin();
         for (index, out) in response.chunks_mut(rows * image.width()).enumerate() {
             stream.fill(image, tensor, weights, index * rows, out);
@@ -151,7 +156,7 @@ mod tests {
         (response, stream.strongest)
     }
 
-    /// The response at a pixel as the definition has it, in f64.
+    /// The response at a pixel by its definition, in f64.
     fn by_definition(tensor: &Tensor, image: &Image, x: usize, y: usize) -> f64 {
         let weights = Weights::new(tensor.window, tensor.sigma);
         let reach = weights.reach() as isize;

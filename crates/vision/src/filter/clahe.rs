@@ -6,26 +6,25 @@ use serde::{Deserialize, Serialize};
 use super::Filter;
 use crate::{Image, Threads, Workspace};
 
-/// Equalises the histogram of each part of the image, with a limit to how much contrast is raised.
+/// Contrast-limited adaptive histogram equalisation (CLAHE).
 ///
-/// The image is cut into tiles. Each has its histogram over 0 to 255, of which no bin keeps more than
-/// `clip` times its even share; what is cut off is spread evenly over all bins. The tile's mapping is
-/// the cumulated histogram, straight within a bin, so that grey levels finer than a bin stay apart.
-/// A pixel is mapped by the four nearest tiles, interpolated between their centres. Values beyond 0 or
-/// 255 count as those.
+/// The image is divided into tiles. Each tile has a histogram over 0 to 255 in which no bin keeps more than `clip`
+/// times the uniform count; the excess is spread evenly over all bins. The tile's mapping is the cumulative histogram,
+/// linear within a bin, so that grey levels finer than a bin remain distinct. A pixel is mapped by the four nearest
+/// tiles, interpolated between their centres. Values outside 0 to 255 are clamped.
 ///
-/// The slope of a mapping, so the gain of contrast and noise, never exceeds `clip` + 1. A constant
-/// image stays constant, at another value in general.
+/// The slope of a mapping, and so the gain of contrast and noise, never exceeds `clip` + 1. A constant image stays
+/// constant, in general with another value.
 ///
 /// Source: Zuiderveld, *Contrast limited adaptive histogram equalization*, Graphics Gems IV, 1994.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Clahe {
-    /// Tiles along the width and along the height.
+    /// Number of tiles along the width and along the height.
     pub tiles: usize,
-    /// The most that a bin keeps, in shares of an even histogram.
+    /// Clip limit of a bin, as a multiple of the uniform count.
     pub clip: f64,
-    /// Bins of a histogram.
+    /// Number of bins of a histogram.
     pub bins: usize,
 }
 
@@ -52,7 +51,7 @@ struct Scratch {
     /// The mapping of each tile at the edges of the bins, tile by tile.
     mappings: Vec<f32>,
     histograms: Vec<Vec<u32>>,
-    /// A band's mappings of one row of pixels.
+    /// The interpolated mappings of one row of pixels, for each band.
     lines: Vec<Vec<f32>>,
 }
 
@@ -89,12 +88,12 @@ impl Filter for Clahe {
 }
 
 impl Clahe {
-    /// How many tiles there are along each axis: no more than pixels.
+    /// The number of tiles along each axis, at most the number of pixels.
     fn grid(&self, image: &Image) -> [usize; 2] {
         [self.tiles.min(image.width()), self.tiles.min(image.height())]
     }
 
-    /// The bin of a value, and how far in it (0 to 1).
+    /// The bin of a value, and its position within the bin (0 to 1).
     #[inline(always)]
     fn bin(&self, value: f32) -> (usize, f32) {
         let at = value.clamp(0.0, 255.0) * (self.bins as f32 / 255.0);
@@ -102,7 +101,7 @@ impl Clahe {
         (bin, at - bin as f32)
     }
 
-    /// The mapping of each tile at the edges of the bins.
+    /// Computes the mapping of each tile at the edges of the bins.
     fn map_tiles(&self, image: &Image, threads: Threads, mappings: &mut Vec<f32>, histograms: &mut Vec<Vec<u32>>) {
         let [columns, rows] = self.grid(image);
         let edges = self.bins + 1;
@@ -130,8 +129,9 @@ impl Clahe {
     }
 }
 
-/// The two tiles whose centres lie around pixel `at` of `size`, and how far it is from the first to the
-/// second (0 to 1); the outermost tile alone beyond its centre.
+/// The two tiles whose centres enclose pixel `at` of `size`, and its position between them (0 to 1).
+///
+/// Beyond the outermost centre it is the outermost tile alone.
 #[inline(always)]
 fn between(at: usize, size: usize, tiles: usize) -> (usize, usize, f32) {
     let place = (at as f32 + 0.5) * (tiles as f32 / size as f32) - 0.5;
@@ -146,11 +146,11 @@ mod tests {
 
     #[test]
     fn one_tile_without_a_limit_is_the_histogram_equalised() {
-        // 40 equally common values from 100 to 139 are spread over 0 to 255.
+        // 40 equally frequent values from 100 to 139 are spread over 0 to 255.
         let image = Image::new(40, 30, (0..1200).map(|i| 100.5 + (i % 40) as f32).collect()).unwrap();
         let out = Clahe { tiles: 1, clip: 1000.0, bins: 255 }.filtered(&image);
         for (x, value) in out.row(7).iter().enumerate() {
-            // In the middle of its bin half of its own share lies below a value.
+            // A value in the middle of its bin has half of the bin's count below it.
             let expected = 255.0 * (x as f32 + 0.5) / 40.0;
             assert!((value - expected).abs() < 1e-3, "{x}: {value}, not {expected}");
         }

@@ -1,4 +1,4 @@
-//! The guided filter: smooths what varies little, keeps edges.
+//! The guided filter, which smooths and preserves edges.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -11,10 +11,9 @@ use crate::{Image, Workspace};
 
 /// The guided filter with the image as its own guide.
 ///
-/// In every window of 2r + 1 pixels the image is fitted by a I + b with
-/// a = var / (var + σ²), b = (1 − a) mean: contrast far below σ goes to its mean, an edge far above
-/// stays. A pixel is given by the mean of a and b over the windows it lies in; clipped at the limits
-/// of its input, 0 and 255.
+/// Each window of 2r + 1 pixels is fitted by a I + b with a = var / (var + σ²) and b = (1 − a) mean: contrast far below
+/// σ is reduced to the mean, and edges far above σ remain. A pixel uses the mean of a and b over all windows that
+/// contain it. Results are clipped to the range of the input, 0 to 255.
 ///
 /// Source: He, Sun and Tang, *Guided image filtering*, ECCV 2010; PAMI 2013.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,7 +21,7 @@ use crate::{Image, Workspace};
 pub struct Guided {
     /// Half the side of the windows (px).
     pub radius: usize,
-    /// The contrast that counts as noise (grey levels, standard deviation); its square is the paper's ε.
+    /// Standard deviation of contrast that counts as noise (grey levels); its square is the paper's ε.
     pub sigma: f64,
 }
 
@@ -34,7 +33,7 @@ impl Default for Guided {
 
 impl Component for Guided {
     const NAME: &'static str = "guided";
-    const SUMMARY: &'static str = "the guided filter: takes noise away, keeps edges";
+    const SUMMARY: &'static str = "the guided filter: noise reduction that preserves edges";
     const SOURCE: &'static str = "He, Sun and Tang, Guided image filtering, PAMI 2013";
 
     fn check(&self) -> Result<(), String> {

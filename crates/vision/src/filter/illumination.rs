@@ -1,4 +1,4 @@
-//! Evens out uneven light.
+//! Correction of uneven illumination.
 
 use seafix_component::{Component, in_range};
 use serde::{Deserialize, Serialize};
@@ -9,33 +9,32 @@ use super::{
 };
 use crate::{Image, Workspace};
 
-/// Divides by the light, or subtracts the veil, both estimated as what of the image is smooth.
+/// Shading correction: division by the lamps' light or subtraction of backscatter, estimated as the smooth background.
 ///
-/// The background B is the image under three means over windows of 2r + 1 pixels, nearly a Gaussian of
-/// standard deviation σ (r = ½ (√(4σ² + 1) − 1)). Lamps multiply what they shine on: `divide` gives
-/// I · min(m / B, gain), m the mean of the image. Light that the water scatters back is added:
-/// `subtract` gives I − B + m. What leaves 0 to 255 is clipped there.
+/// The background B is the image after three means over windows of 2r + 1 pixels, nearly a Gaussian of standard
+/// deviation σ (r = ½ (√(4σ² + 1) − 1)). Lamps multiply, so `divide` gives I · min(m / B, gain) with the image's mean
+/// m. Backscatter adds, so `subtract` gives I − B + m. Results are clipped to 0 to 255.
 ///
-/// Source: Gonzalez and Woods, *Digital image processing*, 2002, shading correction; the windows:
-/// Wells, *Efficient synthesis of Gaussian filters by cascaded uniform filters*, PAMI 1986.
+/// Source: Gonzalez and Woods, *Digital image processing*, 2002, shading correction; the windows: Wells, *Efficient
+/// synthesis of Gaussian filters by cascaded uniform filters*, PAMI 1986.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Illumination {
-    /// Standard deviation of the smoothing (px): larger than what is looked for, smaller than a lamp's cone.
+    /// Standard deviation of the smoothing (px): larger than the structure of interest, smaller than a lamp's cone.
     pub sigma: f64,
-    /// What is done with the background.
+    /// Operation with the background.
     pub operation: Operation,
-    /// The most by which a dark place is brightened, for `divide`.
+    /// Maximum gain of a dark pixel, for `divide`.
     pub gain: f64,
 }
 
-/// What is done with the background.
+/// Operation with the background.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Operation {
-    /// The image is divided by it.
+    /// Division of the image by the background.
     Divide,
-    /// It is subtracted from the image.
+    /// Subtraction of the background from the image.
     Subtract,
 }
 
@@ -47,7 +46,7 @@ impl Default for Illumination {
 
 impl Component for Illumination {
     const NAME: &'static str = "illumination";
-    const SUMMARY: &'static str = "divides by the smooth light of the lamps, or subtracts the veil";
+    const SUMMARY: &'static str = "shading correction: division by the lamps' light or subtraction of backscatter";
     const SOURCE: &'static str = "Gonzalez and Woods, Digital image processing, 2002";
 
     fn check(&self) -> Result<(), String> {
@@ -56,7 +55,7 @@ impl Component for Illumination {
     }
 }
 
-/// Means one after the other: the more, the nearer to a Gaussian.
+/// The number of successive means; more are nearer to a Gaussian.
 const PASSES: usize = 3;
 
 #[derive(Debug, Default)]
@@ -107,7 +106,7 @@ mod tests {
         Image::new(240, 180, (0..240 * 180).map(|i| value((i % 240) as f32, (i / 240) as f32)).collect()).unwrap()
     }
 
-    /// The least and the greatest mean of windows of 8×8 away from the border.
+    /// The smallest and the largest mean of windows of 8×8 px away from the border.
     fn spread(image: &Image) -> (f32, f32) {
         let mean = |x: usize, y: usize| (0..64).map(|i| image.row(y + i / 8)[x + i % 8]).sum::<f32>() / 64.0;
         let means =

@@ -1,11 +1,11 @@
-//! Means over square windows, at the same cost for any size.
+//! Means over square windows, at a cost that does not depend on their size.
 
 use crate::Threads;
 
-/// Rows that one thread works on at a time.
+/// The number of rows that one thread processes at a time.
 const BAND: usize = 128;
 
-/// What [`mean_into`] keeps from call to call.
+/// The memory of [`mean_into`] between calls.
 #[derive(Debug, Default)]
 pub(super) struct Means {
     along: Vec<f32>,
@@ -13,10 +13,9 @@ pub(super) struct Means {
     columns: Vec<Vec<f64>>,
 }
 
-/// Replaces `out` by the means of `source`, rows of `width` pixels, over the windows of
-/// (2 `radius` + 1)² pixels around each; at the border over what of the window there is.
+/// Replaces `out` by the means of `source` (rows of `width` pixels) over windows of (2 `radius` + 1)² pixels.
 ///
-/// Sums run in double precision: those of an image of 8 to 16 bits are exact.
+/// At the border the mean is over the window's part in the image. Sums are in double precision, exact for 8 to 16 bits.
 pub(super) fn mean_into(
     source: &[f32],
     width: usize,
@@ -60,7 +59,7 @@ pub(super) fn mean_into(
     });
 }
 
-/// Means along one row.
+/// Computes the means along one row.
 fn mean_row(source: &[f32], radius: usize, out: &mut [f32]) {
     let width = source.len();
     let mut sum: f64 = source[..radius.min(width)].iter().map(|&value| f64::from(value)).sum();

@@ -1,4 +1,4 @@
-//! The median of each pixel's surroundings.
+//! The median filter.
 
 use multiversion::multiversion;
 use seafix_component::{Component, in_range};
@@ -7,15 +7,13 @@ use serde::{Deserialize, Serialize};
 use super::Filter;
 use crate::{Image, Workspace};
 
-/// Replaces each pixel by the median of the 3×3 or 5×5 around it: single bright or dark pixels go,
-/// drifting particles among them; edges stay where they are, corners are rounded a little. Beyond the
-/// border the nearest pixel is repeated.
+/// The median filter of 3×3 or 5×5 pixels.
 ///
-/// The median comes from a sorting network (Batcher's) of which only what leads to it is kept, for
-/// sixteen pixels at a time.
+/// It removes single bright or dark pixels, drifting particles among them. Edges keep their positions; corners are
+/// rounded a little. The nearest pixel is repeated beyond the border. The median comes from Batcher's sorting network,
+/// reduced to the comparators that lead to it, for sixteen pixels at a time.
 ///
-/// Source: Tukey, *Exploratory data analysis*, 1977; Batcher, *Sorting networks and their applications*,
-/// AFIPS 1968.
+/// Source: Tukey, *Exploratory data analysis*, 1977; Batcher, *Sorting networks and their applications*, AFIPS 1968.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Median {
@@ -31,7 +29,7 @@ impl Default for Median {
 
 impl Component for Median {
     const NAME: &'static str = "median";
-    const SUMMARY: &'static str = "the median of 3×3 or 5×5 pixels: takes single odd pixels away";
+    const SUMMARY: &'static str = "the median of 3×3 or 5×5 pixels: removal of isolated pixels";
     const SOURCE: &'static str = "Tukey, Exploratory data analysis, 1977";
 
     fn check(&self) -> Result<(), String> {
@@ -39,9 +37,9 @@ impl Component for Median {
     }
 }
 
-/// Pixels sorted side by side.
+/// The number of pixels that are sorted side by side.
 const LANES: usize = 16;
-/// Room for the wires of the greatest network, a power of two.
+/// The number of wires of the largest network, a power of two.
 const WIRES: usize = 32;
 
 #[derive(Debug, Default)]
@@ -70,8 +68,10 @@ impl Filter for Median {
     }
 }
 
-/// Replaces `network` by the comparators (least wire, greatest wire) that bring the median of `wires`
-/// values to the wire in the middle: Batcher's odd-even merge sort without what does not lead there.
+/// Replaces `network` by the comparators (lower wire, upper wire) that bring the median of `wires` values to the
+/// middle.
+///
+/// It is Batcher's odd–even merge sort without the comparators that do not lead there.
 fn median_network(wires: usize, network: &mut Vec<[u8; 2]>) {
     network.clear();
     let full = wires.next_power_of_two();
@@ -82,7 +82,7 @@ fn median_network(wires: usize, network: &mut Vec<[u8; 2]>) {
             for start in (apart % sorted..full - apart).step_by(2 * apart) {
                 for low in start..start + apart.min(full - start - apart) {
                     let high = low + apart;
-                    // Wires beyond the last carry +∞: they never move.
+                    // Wires beyond the last carry +∞, which never moves.
                     if low / (2 * sorted) == high / (2 * sorted) && high < wires {
                         network.push([low as u8, high as u8]);
                     }
@@ -105,7 +105,7 @@ fn median_network(wires: usize, network: &mut Vec<[u8; 2]>) {
     network.retain(|[low, high]| low != high);
 }
 
-/// The medians of row `y`.
+/// Computes the medians of row `y`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn median_row(source: &[f32], width: usize, y: usize, radius: usize, network: &[[u8; 2]], out: &mut [f32]) {
     let side = 2 * radius + 1;
@@ -128,7 +128,7 @@ fn median_row(source: &[f32], width: usize, y: usize, radius: usize, network: &[
         out[x] = single(x);
     }
     for block in 0..inner.div_ceil(LANES) {
-        // The first column of the windows; the last block may repeat pixels of the one before.
+        // The first column of the windows; the last block may overlap the one before.
         let x = (block * LANES).min(inner - LANES);
         let mut values = [[0.0; LANES]; WIRES];
         for j in 0..side {

@@ -1,4 +1,4 @@
-//! Locators that fit blurred corners.
+//! Locators that fit a model of blurred corners.
 
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
@@ -10,10 +10,10 @@ use super::{
 };
 use crate::{Image, Keypoint, Threads, Workspace};
 
-/// Where models of corners come from.
+/// The source of the corner models.
 pub(crate) const SOURCE: &str = "Rohr, Recognizing corners by fitting parametric models, IJCV 1992";
 
-/// A locator that fits the best of some shapes.
+/// Defines a locator that fits the best of some shapes.
 macro_rules! locator {
     ($(#[$doc:meta])* $name:ident, $kebab:literal, $shapes:expr, $summary:literal) => {
         $(#[$doc])*
@@ -46,37 +46,37 @@ macro_rules! locator {
 }
 
 locator!(
-    /// Whichever of [`XCorner`] and [`LCorner`] explains the pixels better; texture stays where it is.
+    /// The better of the fits of [`XCorner`] and [`LCorner`]; key points in texture stay.
     Corner,
     "corner",
     [Shape::Wedge, Shape::Crossing],
-    "whichever of x-corner and l-corner explains the pixels better; texture stays"
+    "the better fit of x-corner and l-corner; key points in texture stay"
 );
 
 locator!(
-    /// The corner of a chequer-board: two blurred edges that cross, bright in two opposite parts.
+    /// The corner of a chequerboard: two crossing blurred edges, bright in two opposite sectors.
     ///
-    /// Seven parameters (centre, two directions, blur, two grey levels) are fitted to the pixels by least squares,
-    /// r = I − a − b·U; the covariance of the centre is that of JᵀJ, scaled by what remains.
+    /// Least squares on the residuals r = I − a − b·U fit seven parameters: centre, two directions, blur, two grey
+    /// levels. The covariance of the centre comes from (JᵀJ)⁻¹, scaled by the residual variance.
     XCorner,
     "x-corner",
     [Shape::Crossing],
-    "fits two blurred edges that cross: the corner of a chequer-board"
+    "fit of two crossing blurred edges: the corner of a chequerboard"
 );
 
 locator!(
-    /// The corner of a box: two blurred edges that end where they meet. Fitted as [`XCorner`].
+    /// The corner of a box: two blurred edges that end at their intersection, fitted as in [`XCorner`].
     LCorner,
     "l-corner",
     [Shape::Wedge],
-    "fits two blurred edges that end where they meet: the corner of a box"
+    "fit of two blurred edges with a common end: the corner of a box"
 );
 
-/// One fitter for each piece of the work.
+/// The fitters, one for each piece of the work.
 #[derive(Debug, Default)]
 struct Fitters(Vec<Fitter>);
 
-/// Fits the best of `shapes` at every key point.
+/// Fits the best of `shapes` at each key point.
 pub(crate) fn fit_into(
     settings: &CornerFit,
     shapes: &[Shape],
@@ -85,7 +85,7 @@ pub(crate) fn fit_into(
     work: &mut Workspace,
     places: &mut Vec<Option<UncertainPixel>>,
 ) {
-    /// Key points in a piece of the work.
+    /// The number of key points in a piece of the work.
     const PIECE: usize = 64;
     let threads: Threads = work.threads();
     let Fitters(fitters) = work.get();
@@ -104,8 +104,9 @@ mod tests {
 
     use super::*;
 
-    /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; with `chequer` the opposite one as well; blurred
-    /// by a Gaussian of 0.8 px.
+    /// A bright quarter of the plane, x ≥ `x` and y ≥ `y`, blurred by a Gaussian of 0.8 px.
+    ///
+    /// The opposite quarter is bright as well with `chequer`.
     fn quarters(x: f64, y: f64, chequer: bool) -> Image {
         let cover = |i: usize, edge: f64| 0.5 * libm::erfc((edge - i as f64) / (0.8 * std::f64::consts::SQRT_2));
         let pixel = |i: usize| {
@@ -130,7 +131,7 @@ mod tests {
                 let [l, x_only, either] =
                     found.map(|place| place.map(|place| place.at.distance(&Pixel { u: x, v: y })));
                 let (own, other) = if chequer { (x_only, l) } else { (l, x_only) };
-                assert!(own.expect("its own kind") < 1e-3, "{own:?} for {x}, {y}, {chequer}");
+                assert!(own.expect("the matching shape fits") < 1e-3, "{own:?} for {x}, {y}, {chequer}");
                 assert_eq!(own, either);
                 assert_eq!(other, None);
             }
@@ -158,7 +159,7 @@ mod tests {
         let tiny = Image::new(1, 1, vec![3.0]).unwrap();
         assert_eq!(locator.locate(&tiny, &[keypoint(0.0, 0.0)]), [None]);
         let border = quarters(5.0, 20.0, true);
-        assert_eq!(locator.locate(&border, &[keypoint(5.0, 20.0)]), [None], "a window cut off");
+        assert_eq!(locator.locate(&border, &[keypoint(5.0, 20.0)]), [None], "the window exceeds the image");
     }
 
     #[test]

@@ -12,18 +12,17 @@ use super::{
 };
 use crate::{Image, Keypoint};
 
-/// How a model of a corner is fitted, and when it is believed.
+/// Settings of the fit of a corner model and of its acceptance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CornerFit {
-    /// Side of the square of pixels that the model explains (px), odd, 7 to 31.
+    /// Side of the square window of the fit (px); odd, 7 to 31.
     pub window: usize,
-    /// How far the corner may lie from the key point (px).
+    /// Maximum distance of the corner from the key point (px).
     pub reach: f64,
-    /// The least difference between bright and dark (grey levels).
+    /// Minimum difference between bright and dark (grey levels).
     pub contrast: f64,
-    /// The least share of the window's variance that the model must explain: what stays is noise and
-    /// whatever else is there.
+    /// Minimum fraction of the window's variance that the model explains; the rest is noise and other structure.
     pub explained: f64,
 }
 
@@ -34,10 +33,10 @@ impl Default for CornerFit {
 }
 
 impl CornerFit {
-    /// Whether the settings can be.
+    /// Checks the settings' ranges.
     ///
     /// # Errors
-    /// The setting that is out of its range, its value, and the range.
+    /// The invalid setting, its value and its range.
     pub fn check(&self) -> Result<(), String> {
         let Self { window, reach, contrast, explained } = *self;
         let odd = window % 2 == 1 && (7..=31).contains(&window);
@@ -48,42 +47,45 @@ impl CornerFit {
     }
 }
 
-/// A window and its middle in the image.
+/// The pixels of a window and its centre in the image.
 #[derive(Debug, Default)]
 pub(super) struct Fitter {
     pixels: Pixels,
     middle: [usize; 2],
-    /// The mean, subtracted from the values, and the sum of their squares then.
+    /// The mean, which is subtracted from the values.
     mean: f64,
+    /// The sum of the squared values after that.
     variation: f64,
 }
 
-/// Steps of the fit at most, in all its windows.
+/// The maximum number of steps of the fit in all windows.
 const STEPS: usize = 20;
-/// Most key points are texture, and the time would go to them. Each of these is a multiple of what a believed fit may
-/// leave unexplained; what leaves more is given up: two flat parts with a sharp border between them, the first
-/// guess; what the linear model promises of the first step; and of any later one.
+/// The early-exit limit of the sharp-edged first guess.
+///
+/// Most key points lie in texture and would take most of the time. A candidate is abandoned if its unexplained variance
+/// exceeds that of an acceptable fit by this factor.
 const SHARP: f64 = 9.0;
+/// The early-exit factor of the linear model's prediction for the first step, as [`SHARP`].
 const FIRST: f64 = 2.5;
+/// The early-exit factor of the linear model's prediction for later steps, as [`SHARP`].
 const LATER: f64 = 1.5;
-/// A guess at the contrast may be less than what a fit finds: blur lessens it.
+/// The contrast factor of a first guess: blur lowers the contrast below that of the fit.
 const PALE: f64 = 0.5;
-/// A shape is tried if its first guess explains at least this share of what the other's does.
+/// A shape is tried if its guess explains at least this fraction of the other's explained variance.
 const WORSE: f64 = 0.7;
-/// A step this short needs no further one: the next would be a small part of it (px).
+/// The step length (px) that ends the fit: the next would be a small part of it.
 const SHORT: f64 = 3e-3;
-/// The window follows a corner that is nearer to another pixel than its middle, once steps are shorter than this (px),
-/// so many times at most.
+/// The offset (px) of the corner beyond which the window moves to it, once steps are shorter than this.
 const ASIDE: f64 = 0.5;
+/// The maximum number of moves of the window.
 const MOVES: usize = 3;
-/// The blur's standard deviation must be within these (px).
+/// The range of the blur's standard deviation (px).
 const BLUR: [f64; 2] = [0.3, 3.0];
-/// Sine of the least angle between the edges.
+/// The sine of the smallest angle between the edges.
 const PARALLEL: f64 = 0.3;
 
 impl Fitter {
-    /// The corner near `keypoint` that explains the pixels best among `shapes`; `None` where none does well
-    /// enough.
+    /// The corner near `keypoint` with the best fit among `shapes`; `None` if none is accepted.
     pub(super) fn near(
         &mut self,
         settings: &CornerFit,
@@ -105,8 +107,9 @@ impl Fitter {
         guesses.iter().filter(likely).find_map(|guess| self.fit(settings, image, keypoint, guess.model(at)))
     }
 
-    /// Gauss and Newton's iteration, damped by Levenberg and Marquardt's rule where a step does not help; the
-    /// window follows the corner. The centre of `model` counts from the image's first pixel.
+    /// The Gauss–Newton fit, with Levenberg and Marquardt's damping after a step that increases the cost.
+    ///
+    /// The window follows the corner. The centre of `model` is relative to the image's first pixel.
     fn fit(
         &mut self,
         settings: &CornerFit,
@@ -158,7 +161,7 @@ impl Fitter {
         None
     }
 
-    /// Takes the window around the centre of `model`, which from then on counts from the window's middle and mean.
+    /// Takes the window around the centre of `model`, whose values are then relative to the window's centre and mean.
     fn evaluate(&mut self, image: &Image, middle: &mut [f64; 2], half: usize, model: &mut Model) -> Option<Normal> {
         *middle = [model.at[0], model.at[1]].map(libm::round);
         self.take(image, *middle, half)?;
@@ -168,7 +171,7 @@ impl Fitter {
         Some(self.pixels.normal(model))
     }
 
-    /// The corner, if it is believed.
+    /// The corner, if the fit is accepted.
     fn judge(
         &self,
         settings: &CornerFit,
@@ -186,7 +189,7 @@ impl Fitter {
             && explained >= settings.explained;
         let freedom = (settings.window * settings.window - PARAMETERS) as f64;
         let inverse = factor(normal, 0.0)?.inverse();
-        // No residual is believed to be less than rounding.
+        // The residual variance is at least that of rounding.
         let covariance = inverse.fixed_view::<2, 2>(0, 0) * (normal.squares / freedom).max(rounding);
         let covariance = Matrix2::new(covariance[(0, 0)], covariance[(0, 1)], covariance[(0, 1)], covariance[(1, 1)]);
         (believed && covariance.trace() < 0.25).then_some(UncertainPixel { at, covariance })
@@ -213,7 +216,7 @@ impl Fitter {
     }
 }
 
-/// The pixel, if the square of `half` around it lies in the image.
+/// The pixel of `at`, if the square of half-side `half` around it lies in the image.
 pub(super) fn full(at: [f64; 2], half: usize, image: &Image) -> Option<[usize; 2]> {
     let inside = |x: f64, n: usize| x >= half as f64 && x + half as f64 <= (n - 1) as f64;
     (inside(at[0], image.width()) && inside(at[1], image.height())).then(|| at.map(|x| x as usize))

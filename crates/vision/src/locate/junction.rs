@@ -1,4 +1,4 @@
-//! Where the edges around a corner meet.
+//! The junction of the edges around a corner.
 
 use nalgebra::{Matrix2, Vector2};
 use seafix_component::{Component, in_range};
@@ -8,19 +8,18 @@ use serde::{Deserialize, Serialize};
 use super::{Locator, UncertainPixel, fit::full};
 use crate::{Image, Keypoint, Workspace};
 
-/// Places corners where the edges around them meet: the point p to whose surroundings' gradients
-/// the lines towards it are perpendicular, Σ w g gᵀ (x − p) = 0 over the pixels x.
+/// Förstner's junction: the point nearest to the lines of all edges around it.
 ///
-/// A Harris response peaks inside a convex corner by 1 to 2 px, at the apex of the blurred edge's
-/// curve; the edges themselves still meet at the true corner. The weight
-/// w = exp(−r²/2σ²) (1 − exp(−r²/2h²)), h = 0.6 σ, r the distance from p, therefore spares
-/// the middle, where blur has rounded the corner off. Gradients are taken at whole pixels and only
-/// the weights move with p: nothing is interpolated.
+/// The point p solves Σ w g gᵀ (x − p) = 0 over the pixels x with gradients g. A Harris response peaks 1 to 2 px inside
+/// a convex corner, at the apex of the blurred edge's curve, but the edges still intersect at the true corner. The
+/// weight w = exp(−r²/2σ²) (1 − exp(−r²/2h²)), h = 0.6 σ, r the distance from p, therefore suppresses the middle, where
+/// blur has rounded the corner. Gradients are taken at integer pixels and the weights alone move with p, so nothing is
+/// interpolated.
 ///
-/// The covariance is A⁻¹ (Σ w² (gᵀd)² g gᵀ) A⁻¹ with A = Σ w g gᵀ, d = x − p: what the lines miss p by.
+/// The covariance is A⁻¹ (Σ w² (gᵀd)² g gᵀ) A⁻¹ with A = Σ w g gᵀ and d = x − p, from the distances of the lines to p.
 ///
-/// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct
-/// points, corners and centres of circular features*, ISPRS 1987.
+/// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct points, corners and
+/// centres of circular features*, ISPRS 1987.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Junction {
@@ -36,7 +35,7 @@ impl Default for Junction {
 
 impl Component for Junction {
     const NAME: &'static str = "junction";
-    const SUMMARY: &'static str = "where the edges around a corner meet, by their gradients";
+    const SUMMARY: &'static str = "Förstner's junction: the intersection of the edges around a corner";
     const SOURCE: &'static str =
         "Förstner and Gülch, A fast operator for detection and precise location of distinct points, ISPRS 1987";
 
@@ -61,11 +60,11 @@ impl Locator for Junction {
     }
 }
 
-/// The pixels' weights, by their distance.
+/// The pixels' weights as a function of distance.
 struct Window {
-    /// −1/2σ² and −1/2σ² − 1/2h² (px⁻²).
+    /// The exponents −1/2σ² and −1/2σ² − 1/2h² (px⁻²).
     exponents: [f64; 2],
-    /// The window ends at this many pixels.
+    /// The half-side of the window (px).
     half: usize,
 }
 
@@ -78,9 +77,9 @@ struct Gradients {
     down: Vec<[f64; 3]>,
 }
 
-/// How far the junction may lie from the detector's peak (px).
+/// The maximum distance of the junction from the detector's peak (px).
 const REACH: f64 = 3.5;
-/// The gradients around the peak that some window within reach needs.
+/// The margin of the gradients (px), for all windows within reach.
 const SLACK: usize = 4;
 
 impl Window {
@@ -89,8 +88,9 @@ impl Window {
         Self { exponents: [outer, outer / (0.6 * 0.6) + outer], half: libm::ceil(2.5 * sigma) as usize }
     }
 
-    /// The junction near `start`; `None` when there is none within reach, when the edges are parallel,
-    /// or when the window leaves the image.
+    /// The junction near `start`.
+    ///
+    /// `None` if there is none within reach, if the edges are parallel, or if the window leaves the image.
     fn near(&self, image: &Image, start: &Pixel, gradients: &mut Gradients) -> Option<UncertainPixel> {
         let reach = self.half + SLACK;
         let [x0, y0] = full([start.u, start.v].map(libm::round), reach + 1, image)?;
@@ -146,7 +146,7 @@ impl Window {
     }
 }
 
-/// Σ w g gᵀ, Σ w g gᵀ d and Σ w² (gᵀ d)² g gᵀ over the pixels of a window, d from its centre.
+/// The sums Σ w g gᵀ, Σ w g gᵀ d and Σ w² (gᵀ d)² g gᵀ over the pixels of a window, d from its centre.
 #[derive(Debug, Default)]
 struct Sums {
     tensor: Matrix2<f64>,
@@ -157,7 +157,7 @@ struct Sums {
 impl Sums {
     fn inverse(&self) -> Option<Matrix2<f64>> {
         let trace = self.tensor.trace();
-        // Edges that cross at less than about 10° meet nowhere in particular.
+        // Edges at less than about 10° have no well-determined intersection.
         if !(self.tensor.determinant() > 0.01 * trace * trace) {
             return None;
         }
@@ -166,7 +166,7 @@ impl Sums {
 }
 
 impl Gradients {
-    /// Sobel's gradients (grey levels per 8 px) of a square of pixels, row by row.
+    /// Computes Sobel's gradients (grey levels per 8 px) of a square of pixels in row-major order.
     fn take(&mut self, image: &Image, left: usize, top: usize, side: usize) {
         self.side = side;
         self.squares.clear();
@@ -186,7 +186,7 @@ impl Gradients {
 mod tests {
     use super::*;
 
-    /// A quarter of the plane, x ≥ `x` and y ≥ `y`, brighter; blurred by one pixel's area.
+    /// A bright quarter of the plane, x ≥ `x` and y ≥ `y`, blurred by the area of one pixel.
     fn quadrant(x: f64, y: f64, size: usize) -> Image {
         let cover = |i: usize, edge: f64| (i as f64 + 0.5 - edge).clamp(0.0, 1.0);
         let pixel = |i: usize| 50.0 + 100.0 * cover(i % size, x) * cover(i / size, y);

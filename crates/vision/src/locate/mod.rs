@@ -1,10 +1,9 @@
-//! Locators: where exactly a corner is.
+//! Locators of exact corners.
 //!
-//! A detector's response peaks near a corner, not at it: 1 to 2 px inside the corner of a box. A locator
-//! fits a model of the corner to the pixels around. Both images' key points are located before they are
-//! described: a response may have two maxima beside one corner, and those of one image would match the
-//! others of the other. What is no corner stays; the alignment between the views then replaces the right
-//! place, which it finds more exactly than a second fit.
+//! A detector's response peaks near a corner, not at it: 1 to 2 px inside the corner of a box. A locator fits a corner
+//! model to the pixels around it. Key points of both images are located before they are described: a response may have
+//! two maxima beside one corner, and those of one image would match the others of the other image. Key points at no
+//! corner stay. The refinement later replaces the right pixel by a more exact one than a second fit gives.
 
 mod corner;
 mod fit;
@@ -25,35 +24,67 @@ use seafix_geometry::Pixel;
 
 use crate::{Image, Keypoint, Workspace};
 
-/// A place in an image and how well it is known.
+/// A pixel position with its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainPixel {
-    /// Where.
+    /// The position (px).
     pub at: Pixel,
     /// The covariance of (u, v) (px²).
     pub covariance: Matrix2<f64>,
 }
 
 impl UncertainPixel {
-    /// A place whose two coordinates err independently by `sigma` (px).
+    /// A position with independent errors of standard deviation `sigma` (px) in both coordinates.
     pub fn independent(at: Pixel, sigma: f64) -> Self {
         Self { at, covariance: Matrix2::identity() * (sigma * sigma) }
     }
 }
 
-/// A matched point: where the left image shows it, and where about the right one.
+/// A matched pair of uncertain pixels; the right one is approximate until it is refined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// In the left image.
+    /// The pixel in the left image.
     pub left: UncertainPixel,
-    /// In the right image.
+    /// The pixel in the right image.
     pub right: UncertainPixel,
 }
 
-/// Finds the exact place of corners that a detector found roughly.
+/// A locator: moves key points to exact corners.
+///
+/// ```
+/// use seafix_geometry::Pixel;
+/// use seafix_vision::{Image, Keypoint, Locator, UncertainPixel, Workspace};
+///
+/// /// The nearest pixel centre, with the standard deviation of rounding, 1/√12 px.
+/// #[derive(Debug)]
+/// struct Rounded;
+///
+/// impl Locator for Rounded {
+///     fn locate_into(
+///         &self,
+///         _: &Image,
+///         keypoints: &[Keypoint],
+///         _: &mut Workspace,
+///         places: &mut Vec<Option<UncertainPixel>>,
+///     ) {
+///         places.clear();
+///         places.extend(keypoints.iter().map(|keypoint| {
+///             let at = Pixel { u: keypoint.at.u.round(), v: keypoint.at.v.round() };
+///             Some(UncertainPixel::independent(at, 1.0 / 12f64.sqrt()))
+///         }));
+///     }
+/// }
+///
+/// let image = Image::new(16, 16, vec![0.0; 256]).unwrap();
+/// let keypoint = Keypoint { at: Pixel { u: 10.3, v: 6.8 }, response: 1.0, scale: 1.0 };
+/// let places = Rounded.locate(&image, &[keypoint]);
+/// assert_eq!(places[0].unwrap().at, Pixel { u: 10.0, v: 7.0 });
+/// ```
 pub trait Locator: Send + Sync + std::fmt::Debug {
-    /// Replaces `places` by the corner at each key point, in their order; `None` where the image shows no
-    /// corner of the kind that this locator knows, or not well enough to say better where it is.
+    /// Replaces `places` by the corner at each key point, in their order.
+    ///
+    /// `None` marks a key point without a corner of this locator's kind, or with one that the fit does not determine
+    /// better.
     fn locate_into(
         &self,
         image: &Image,
@@ -70,6 +101,6 @@ pub trait Locator: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All locators.
+/// The registry of locators.
 pub static LOCATORS: Registry<dyn Locator> =
     Registry::new("locator", &[entry!(Corner), entry!(Junction), entry!(LCorner), entry!(Peak), entry!(XCorner)]);

@@ -1,39 +1,38 @@
-//! What two blurred edges that meet look like, and its derivatives.
+//! The model of two blurred edges that meet, with its derivatives.
 
 use std::f32::consts::{LN_2, LOG2_E};
 
-/// Which parts of the plane that two straight edges cut are bright.
+/// The bright sectors between two straight edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Shape {
-    /// One of the four: the corner of a box.
+    /// One of four: the corner of a box.
     Wedge,
-    /// Two opposite ones: the corner of a chequer-board.
+    /// Two opposite ones: the corner of a chequerboard.
     Crossing,
 }
 
-/// Parameters of the model, in the order of its derivatives.
+/// The number of parameters, in the order of the derivatives.
 pub(super) const PARAMETERS: usize = 7;
 
-/// Two blurred edges through one point: the value at x is a + b·U with
+/// The model of two blurred edges through one point; the value at x is a + b·U with
 ///
 /// - h_k = t n_kᵀ(x − c), n_k = (cos θ_k, sin θ_k): the distance from edge k in units of the blur 1/t,
 /// - U = Φ₂(h₁, h₂; ρ), ρ = n₁ᵀn₂, for a wedge,
 /// - U = 4 Φ₂ − 2 Φ(h₁) − 2 Φ(h₂) + 1 for a crossing.
 ///
-/// Φ₂ is the bivariate normal distribution: the indicator of the wedge h₁ > 0, h₂ > 0 convolved with a round
-/// Gaussian is exactly that, for edges at any angle.
+/// Φ₂ is the bivariate normal distribution: exactly the indicator of the wedge h₁ > 0, h₂ > 0 convolved with an
+/// isotropic Gaussian, for edges at any angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Model {
     pub(super) shape: Shape,
-    /// c_x, c_y (px from the middle of the window), θ₁, θ₂ (rad), t (px⁻¹), a, b (grey levels).
+    /// The parameters c_x, c_y (px from the window's centre), θ₁, θ₂ (rad), t (px⁻¹), a, b (grey levels).
     pub(super) at: [f64; PARAMETERS],
 }
 
 const LANES: usize = 16;
 type Lanes = [f32; LANES];
 
-/// The pixels of a square window as lanes: columns and rows from its middle, values, and 1 for a pixel,
-/// 0 for the padding.
+/// The pixels of a square window as lanes: columns and rows from its centre, values, and 1 for a pixel, 0 for padding.
 #[derive(Debug, Default)]
 pub(super) struct Pixels {
     half: usize,
@@ -41,11 +40,11 @@ pub(super) struct Pixels {
     y: Vec<Lanes>,
     present: Vec<Lanes>,
     pub(super) value: Vec<Lanes>,
-    /// Derivatives by the parameters, then the residuals, each as long as the window.
+    /// The derivatives by the parameters, then the residuals, each as long as the window.
     columns: [Vec<Lanes>; PARAMETERS + 1],
 }
 
-/// JᵀJ (upper triangle), Jᵀr and rᵀr of the residuals r = value − model.
+/// The normal equations JᵀJ (upper triangle), Jᵀr and rᵀr of the residuals r = value − model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Normal {
     pub(super) matrix: [[f64; PARAMETERS]; PARAMETERS],
@@ -54,7 +53,7 @@ pub(super) struct Normal {
 }
 
 impl Pixels {
-    /// The window's shape; its values follow.
+    /// Sets the window's shape; the caller sets its values.
     pub(super) fn shape(&mut self, half: usize) {
         if self.half == half && !self.x.is_empty() {
             return;
@@ -74,7 +73,7 @@ impl Pixels {
         self.columns = std::array::from_fn(|_| self.value.clone());
     }
 
-    /// The values as one slice, padding behind.
+    /// The values as one slice, with the padding at its end.
     pub(super) fn values_mut(&mut self) -> &mut [f32] {
         self.value.as_flattened_mut()
     }
@@ -86,12 +85,12 @@ impl Pixels {
     }
 }
 
-/// Gauss and Legendre's rule for the part of Φ₂ that ρ adds to Φ(h₁) Φ(h₂):
-/// ∫ exp(−(h₁² + h₂² − 2 h₁ h₂ sin φ) / 2cos²φ) dφ/2π from 0 to arcsin ρ.
+/// The Gauss–Legendre rule for the part of Φ₂ that ρ adds to Φ(h₁) Φ(h₂): ∫ exp(−(h₁² + h₂² − 2 h₁ h₂ sin φ) / 2cos²φ)
+/// dφ/2π from 0 to arcsin ρ.
 struct Rule {
     sine: f64,
     cosine: f64,
-    /// Factors of h₁² + h₂² and of h₁ h₂ in the exponent, and the weight.
+    /// The factors of h₁² + h₂² and of h₁ h₂ in the exponent, and the weight.
     nodes: [[f32; 3]; 6],
     count: usize,
 }
@@ -122,10 +121,10 @@ impl Rule {
     }
 }
 
-/// exp x for x ≤ 0, to 2e-7.
+/// The exponential of x ≤ 0, accurate to 2e-7.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
-    /// Adding it rounds to whole numbers, which stand in the lowest bits.
+    /// A constant whose addition rounds to integers, which appear in the lowest bits.
     const ROUND: f32 = 12_582_912.0;
     let x = if x > -80.0 { x } else { -80.0 };
     let rounded = x * LOG2_E + ROUND;
@@ -134,7 +133,7 @@ fn exp(x: f32) -> f32 {
     f32::from_bits(p.to_bits().wrapping_add(rounded.to_bits() << 23))
 }
 
-/// The normal distribution Φ and exp(−x²/2), to 2e-7.
+/// The normal distribution Φ and exp(−x²/2), accurate to 2e-7.
 ///
 /// Source: Abramowitz and Stegun, *Handbook of mathematical functions*, 7.1.26.
 #[inline(always)]
@@ -173,7 +172,7 @@ fn normal(pixels: &mut Pixels, model: &Model, rule: &Rule) -> Normal {
                 beyond[lane] += weight * exp(square * (h1 * h1 + h2 * h2) + cross * (h1 * h2));
             }
         }
-        // In memory of its own, which nothing else can alias: else the loop would not be vectorised.
+        // A local buffer cannot alias; otherwise the loop would not be vectorised.
         let mut out = [[0.0; LANES]; PARAMETERS + 1];
         for lane in 0..LANES {
             let (dx, dy, h1, h2) = (x[lane] - cx, y[lane] - cy, h1[lane], h2[lane]);
@@ -234,7 +233,7 @@ mod tests {
 
     const EXAMPLE: [f64; PARAMETERS] = [0.3, -0.4, 0.2, 1.5, 1.2, 90.0, 60.0];
 
-    /// The model's values at the pixels: minus the residuals of a window of zeros.
+    /// The model's values at the pixels: the negative residuals of a window of zeros.
     fn values(model: &Model) -> Vec<f32> {
         let mut pixels = Pixels::default();
         pixels.shape(5);
@@ -244,7 +243,7 @@ mod tests {
 
     #[test]
     fn the_wedge_is_a_blurred_indicator() {
-        // By summing the Gaussian over a fine grid.
+        // The reference sums the Gaussian over a fine grid.
         for second in [1.5, 2.7, 0.6] {
             let at = [0.3, -0.4, 0.2, second, 1.2, 10.0, 100.0];
             let model = Model { shape: Shape::Wedge, at };

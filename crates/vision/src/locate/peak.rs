@@ -1,4 +1,4 @@
-//! Key points stay where the detector found them.
+//! The locator that keeps the detector's positions.
 
 use seafix_component::Component;
 use serde::{Deserialize, Serialize};
@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::{Locator, UncertainPixel};
 use crate::{Image, Keypoint, Workspace};
 
-/// Leaves every key point at the peak of the detector's response: right for texture, 1 to 2 px inside
-/// the corner of a box.
+/// Keeps each key point at the peak of the detector's response.
+///
+/// The position is right for texture, and 1 to 2 px inside the corner of a box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Peak {}

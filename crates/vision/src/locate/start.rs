@@ -1,4 +1,4 @@
-//! A first guess of the edges that meet at a corner.
+//! The initial guess of the edges at a corner.
 
 use multiversion::multiversion;
 use nalgebra::{Complex, Matrix2, Vector2};
@@ -6,20 +6,20 @@ use nalgebra::{Complex, Matrix2, Vector2};
 use super::model::{Model, Shape};
 use crate::Image;
 
-/// Two edges and what they part.
+/// The initial guess: two edges and the statistics of the four sectors between them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
-    /// Where they meet.
+    /// The intersection of the edges.
     pub(super) at: Vector2<f64>,
-    /// The directions of their normals (rad).
+    /// The directions of the edges' normals (rad).
     pub(super) normals: [f64; 2],
-    /// What the plane's four parts look like.
+    /// The statistics of the four sectors.
     sectors: [Sector; 4],
     /// The sum of the squared deviations of all pixels from their mean.
     variation: f64,
 }
 
-/// The pixels on one side of each edge.
+/// The pixels of one sector.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sector {
     count: f64,
@@ -27,12 +27,12 @@ struct Sector {
 }
 
 impl Start {
-    /// The edges in the square of side 2·`half` + 1, at most [`MAX`], around the pixel (x, y), which with one pixel
-    /// more must lie in the image; `None` where there are not two.
+    /// The edges in the square of side 2·`half` + 1, at most [`MAX`], around the pixel (x, y).
     ///
-    /// They meet where the gradients' lines do, Σ g gᵀ(x − p) = 0. Their directions are those of two edges
-    /// that explain the moments mₖ = Σ |g|² z^k, z = exp(2i·arg g), of the gradients: z₁ and z₂ are the
-    /// roots of z² − S z + P with m₁ = S m₀ − P m̄₁ and m₂ = S m₁ − P m₀ (Prony's method).
+    /// The square and one pixel more must lie in the image. `None` if there are fewer than two edges. They intersect at
+    /// the point nearest to the lines of the gradients, Σ g gᵀ(x − p) = 0. Their directions are those of two edges that
+    /// explain the moments mₖ = Σ |g|² z^k, z = exp(2i·arg g), of the gradients: z₁ and z₂ are the roots of z² − S z +
+    /// P with m₁ = S m₀ − P m̄₁ and m₂ = S m₁ − P m₀ (Prony's method).
     pub(super) fn of(image: &Image, x: usize, y: usize, half: usize) -> Option<Self> {
         let square = Square::cut(image, x, y, half);
         let [xx, xy, yy, xd, yd, fourth_x, fourth_y] = moments(&square).map(f64::from);
@@ -53,7 +53,7 @@ impl Start {
         Some(Self { at, normals, sectors, variation })
     }
 
-    /// Two flat parts with a sharp border between them, with the bright part turned as it fits best.
+    /// The best guess of two flat regions with a sharp border, over the orientations of the bright region.
     pub(super) fn guess(&self, shape: Shape) -> Guess {
         let mut best = Guess { shape, ..Guess::NONE };
         let wedges: &[usize] = if shape == Shape::Wedge { &[1, 2, 4, 8] } else { &[9] };
@@ -73,7 +73,7 @@ impl Start {
             let explained = between / self.variation;
             if explained > best.explained {
                 const PI: f64 = std::f64::consts::PI;
-                // The sector's index says on which side of each edge it lies.
+                // The sector's index has one bit for the side of each edge.
                 let turn = |edge: usize| {
                     let behind = shape == Shape::Wedge && mask & (if edge == 0 { 0b1010 } else { 0b1100 }) == 0;
                     self.normals[edge] + if behind { PI } else { 0.0 }
@@ -89,22 +89,22 @@ impl Start {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Guess {
     shape: Shape,
-    /// The share of the window's variance that it explains.
+    /// The fraction of the window's variance that the guess explains.
     pub(super) explained: f64,
     normals: [f64; 2],
-    /// Outside and inside.
+    /// The grey levels outside and inside.
     levels: [f64; 2],
 }
 
 impl Guess {
     pub(super) const NONE: Self = Self { shape: Shape::Wedge, explained: 0.0, normals: [0.0; 2], levels: [0.0; 2] };
 
-    /// The difference between the two parts (grey levels).
+    /// The difference between the two regions (grey levels).
     pub(super) fn contrast(&self) -> f64 {
         (self.levels[1] - self.levels[0]).abs()
     }
 
-    /// Where a fit begins: a corner at this place, its blur neither sharp nor soft.
+    /// The initial model of a fit: a corner at this position with a medium blur.
     pub(super) fn model(&self, at: [f64; 2]) -> Model {
         let ([outside, inside], [first, second]) = (self.levels, self.normals);
         let [a, b] = match self.shape {
@@ -115,13 +115,13 @@ impl Guess {
     }
 }
 
-/// The greatest side of a square.
+/// The largest side of a square.
 pub(super) const MAX: usize = 31;
 const LANES: usize = 16;
-/// A row of a square with one pixel more on either side, and what lanes reach beyond.
+/// A row of a square with one pixel more on either side, and padding for the lanes.
 type Row = [f32; 2 * LANES + 2];
 
-/// A square of pixels, less the middle one's value, and one pixel around it.
+/// A square of pixels, less the value of the middle one, with one pixel around it.
 struct Square {
     half: usize,
     middle: f32,
@@ -140,8 +140,9 @@ impl Square {
     }
 }
 
-/// Over the pixels of the square, Σ of gx², gx gy, gy², gx gᵀd, gy gᵀd, d from the middle, and of |g|² exp(4i·arg g),
-/// with Sobel's gradients (grey levels per 8 px).
+/// The sums over the square of gx², gx gy, gy², gx gᵀd, gy gᵀd (d from the centre) and of |g|² exp(4i·arg g).
+///
+/// The gradients are Sobel's (grey levels per 8 px).
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn moments(square: &Square) -> [f32; 7] {
     let side = 2 * square.half + 1;
@@ -182,7 +183,7 @@ fn moments(square: &Square) -> [f32; 7] {
     sums.map(|lanes| lanes.iter().sum())
 }
 
-/// The four parts that edges through `at` with these normals cut the square into, and its variation.
+/// The four sectors of the square between edges through `at` with these normals, and the square's variation.
 fn parts(square: &Square, normals: &[f64; 2], at: &Vector2<f64>) -> ([Sector; 4], f64) {
     let [n1, n2] = normals.map(|angle| [libm::cos(angle) as f32, libm::sin(angle) as f32]);
     let [counts, sums, [squares, ..]] =
@@ -193,11 +194,11 @@ fn parts(square: &Square, normals: &[f64; 2], at: &Vector2<f64>) -> ([Sector; 4]
     (sectors, squares - sum * sum / count)
 }
 
-/// Of each part the count and the sum of its pixels; then the sum of all squares.
+/// The number and the sum of the pixels of each sector, then the sum of all squares.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn part_sums(square: &Square, n1: [f32; 2], n2: [f32; 2], at: [f32; 2]) -> [[f32; 4]; 3] {
     let side = 2 * square.half + 1;
-    // All, beyond the first edge, beyond the second, beyond both: counts, then sums; then squares.
+    // The pixels of all, beyond the first edge, beyond the second, beyond both: counts, then sums; then squares.
     let mut all = [[0.0_f32; LANES]; 9];
     for first in (0..side).step_by(LANES) {
         for j in 0..side {

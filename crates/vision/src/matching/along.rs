@@ -1,9 +1,9 @@
-//! Matching within a band: the nearest descriptors there, with the support of their neighbours.
+//! Mutual nearest neighbours among admissible pairs, with the support of neighbouring pairs.
 
 use super::{nearest::Nearest, support::MatchCandidates};
 use crate::Keypoint;
 
-/// The memory of the search.
+/// The working memory of the search.
 #[derive(Debug, Default)]
 pub(super) struct Along {
     nearest: Nearest,
@@ -12,22 +12,24 @@ pub(super) struct Along {
     ambiguous: Vec<bool>,
 }
 
-/// What a pair must pass.
+/// The criteria of a match.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Test {
-    /// The greatest squared distance, as a share of that to the second nearest; 1: any.
+    /// The maximum ratio of the squared distances to the nearest and the second nearest; 1 disables the test.
     pub(super) squared_ratio: f32,
-    /// How many neighbours support a pair; 0: descriptors alone decide.
+    /// The number of neighbours that support a pair; 0: descriptors alone decide.
     pub(super) neighbours: usize,
-    /// Whether pairs of patterns that repeat themselves stay, which may be a period off.
+    /// Whether ambiguous pairs of repeated patterns, possibly a period off, are kept.
     pub(super) patterns: bool,
 }
 
 impl Along {
-    /// Visits the pairs that are each other's clearly nearest, with the squared distance of their descriptors, in the
-    /// order of the left key points. Only pairs compete that `visit(i, ..)` names for left key point `i`; distance is
-    /// that of the descriptors or, with neighbours, the inverse of a pair's supported weight, and then an
-    /// ambiguous pair is left out unless patterns stay.
+    /// Calls `accept` with the mutual nearest neighbours that pass the ratio test.
+    ///
+    /// Its arguments are both indices and the squared distance of the descriptors, in the order of the left key points.
+    /// Only the pairs compete that `visit(i, ..)` names for left key point `i`. The distance is that of the
+    /// descriptors. With neighbours it is the inverse of a pair's supported weight, and ambiguous pairs are rejected
+    /// unless `patterns` is set.
     pub(super) fn search(
         &mut self,
         test: Test,

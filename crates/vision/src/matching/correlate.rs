@@ -1,19 +1,19 @@
-//! Zero-normalised cross correlation of one window with many.
+//! Zero-normalised cross-correlation (ZNCC) of one window with many.
 
 use multiversion::multiversion;
 
 use crate::Image;
 
-/// Windows compared at once, beside each other.
+/// The number of windows that are compared side by side.
 pub(crate) const LANES: usize = 16;
-/// The greatest side of a window.
+/// The largest side of a window.
 pub(crate) const WIDEST: usize = 51;
 
-/// A window of one image, ready to be compared with those of another.
+/// A normalised window of one image, for comparison with windows of another.
 #[derive(Debug, Default)]
 pub(crate) struct Template {
     half: usize,
-    /// Row by row, less their mean, of unit length.
+    /// The values in row-major order, less their mean and of unit norm.
     values: Vec<f32>,
     /// The mean.
     level: f32,
@@ -21,7 +21,7 @@ pub(crate) struct Template {
 }
 
 impl Template {
-    /// The window of (2 `half` + 1)² pixels around (x, y); `None` if it leaves the image or is flat.
+    /// Takes the window of (2 `half` + 1)² pixels around (x, y); `None` if it leaves the image or is flat.
     pub(crate) fn take(&mut self, image: &Image, [x, y]: [usize; 2], half: usize) -> Option<()> {
         if !fits(image, [x, y], half) {
             return None;
@@ -35,12 +35,13 @@ impl Template {
         self.values.iter_mut().for_each(|value| *value -= self.level);
         let length = self.values.iter().map(|value| value * value).sum::<f32>().sqrt();
         self.values.iter_mut().for_each(|value| *value /= length);
-        // A sum of squares of rounding errors alone is no structure.
+        // A norm of rounding errors alone means a flat window.
         (length.is_finite() && length > 1e-4 * self.level.abs().max(f32::MIN_POSITIVE) * count.sqrt()).then_some(())
     }
 
-    /// Its correlations with the windows around (x, y) and the next pixels of that row; −1 for those that leave the
-    /// image or are flat.
+    /// The correlations with the windows around (x, y) and the next pixels of that row.
+    ///
+    /// A window that leaves the image or is flat gives −1.
     pub(crate) fn compare(&mut self, image: &Image, [x, y]: [usize; 2]) -> [f32; LANES] {
         let half = self.half;
         if !fits(image, [x, y], half) {
@@ -59,7 +60,7 @@ impl Template {
         let n = self.values.len() as f32;
         std::array::from_fn(|lane| {
             let square = squares[lane] - sums[lane] * sums[lane] / n;
-            // Less than rounding leaves of the difference: flat.
+            // A difference below the rounding error means a flat window.
             let correlation = if square > 1e-6 * squares[lane] { products[lane] / square.sqrt() } else { -1.0 };
             if lane < count && correlation.is_finite() { correlation } else { -1.0 }
         })
@@ -70,12 +71,12 @@ fn fits(image: &Image, [x, y]: [usize; 2], half: usize) -> bool {
     x >= half && y >= half && x + half < image.width() && y + half < image.height()
 }
 
-/// Σ t v, Σ v and Σ v² over the windows that begin at each lane of `patch`.
+/// The sums Σ t v, Σ v and Σ v² over the windows that begin at each lane of `patch`.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn sums(template: &[f32], patch: &[[f32; LANES + WIDEST - 1]]) -> [[f32; LANES]; 3] {
     let side = patch.len();
     let [mut products, mut sums, mut squares] = [[0.0_f32; LANES]; 3];
-    // Down the columns first: what neighbouring windows share is summed once.
+    // Columns are summed first, since neighbouring windows share them.
     let [mut down, mut down_squares] = [[0.0_f32; LANES + WIDEST - 1]; 2];
     let wide = LANES + side - 1;
     for (weights, row) in template.chunks_exact(side).zip(patch) {
@@ -84,7 +85,7 @@ fn sums(template: &[f32], patch: &[[f32; LANES + WIDEST - 1]]) -> [[f32; LANES];
             *down_square += value * value;
         }
         for (i, weight) in weights.iter().enumerate() {
-            let values = row[i..].first_chunk::<LANES>().expect("a window is at most WIDEST wide");
+            let values = row[i..].first_chunk::<LANES>().expect("a window of at most WIDEST columns");
             for lane in 0..LANES {
                 products[lane] += weight * values[lane];
             }

@@ -3,11 +3,11 @@
 use nalgebra::Vector2;
 use seafix_geometry::{Pixel, Point, StereoRig};
 
-/// Replaces `curve` by the places of the right image that show the ray of left pixel `place` between two depths (m),
-/// about `step` px apart, at most `max` of them; those beyond the image are among them. Where the lens model has no
-/// direction there is none.
+/// Replaces `curve` by the epipolar curve of left pixel `place` in the right image, between two depths (m).
 ///
-/// They are spaced evenly in inverse depth, which for cameras beside each other is evenly in the image.
+/// It has points about `step` px apart, at most `max`, including those outside the image and excluding those outside
+/// the range of the lens model. They are evenly spaced in inverse depth, hence in the image if the cameras are side by
+/// side.
 pub(super) fn epipolar_curve(
     rig: &StereoRig,
     place: &Pixel,
@@ -24,7 +24,7 @@ pub(super) fn epipolar_curve(
     };
     let (far, mut near) = (1.0 / furthest, 1.0 / nearest);
     let Some(end) = seen(far) else { return };
-    // So near that the right camera does not see it: half of that.
+    // The right camera does not see a point this near, so start at half the inverse depth.
     let mut begin = seen(near);
     while begin.is_none() && near > 2.0 * far {
         near *= 0.5;

@@ -1,4 +1,4 @@
-//! Which pairs of key points the rig allows.
+//! The pairs of key points that the rig admits.
 
 use nalgebra::{Vector2, Vector3};
 use seafix_geometry::StereoRig;
@@ -6,19 +6,19 @@ use seafix_geometry::StereoRig;
 use super::grid::Grid;
 use crate::Keypoint;
 
-/// How far from seeing one point two key points may be.
+/// The limits of an admissible pair of key points.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
-    /// Half width of the epipolar band (px, Sampson distance).
+    /// The half-width of the epipolar band (px, Sampson distance).
     pub(super) px: f64,
-    /// Least and greatest depth in the left camera (m).
+    /// The minimum and the maximum depth in the left camera (m).
     pub(super) depths: [f64; 2],
 }
 
-/// The pairs that see one point within a distance in pixels and limits of depth.
+/// The index of admissible pairs: within a Sampson distance (px) and limits of depth.
 ///
-/// The right key points lie in a grid of their undistorted directions, where epipolar lines are straight: only those
-/// beside a line are looked at. This holds for any displacement of the cameras, with epipoles inside the images too.
+/// A grid holds the right key points by their undistorted directions, in which epipolar lines are straight, so a query
+/// visits only points beside a line. This holds for any displacement of the cameras, even with epipoles in the images.
 ///
 /// Source: Hartley and Zisserman, *Multiple View Geometry*, 2nd ed. 2004, eq. 11.9 (Sampson distance).
 #[derive(Debug, Default)]
@@ -26,39 +26,39 @@ pub(super) struct Band {
     left: Vec<LeftRay>,
     right: Vec<RightRay>,
     grid: Grid,
-    /// Translation of right_from_left (m).
+    /// The translation of right_from_left (m).
     step: Vector3<f64>,
-    /// Depth limits in the left camera (m).
+    /// The depth limits in the left camera (m).
     depths: [f64; 2],
-    /// The greatest squared slope among the right rays.
+    /// The largest squared slope of the right rays.
     steepest: f64,
 }
 
 #[derive(Debug)]
 struct LeftRay {
-    /// The epipolar line in the right image, scaled to pixels over the band's half width.
+    /// The epipolar line in the right image, scaled to pixels over the band's half-width.
     line: Vector3<f64>,
-    /// Squared slope of `line`.
+    /// The squared slope of `line`.
     slope: f64,
-    /// The ray, (X/Z, Y/Z, 1), in the axes of the right camera.
+    /// The ray (X/Z, Y/Z, 1) in the axes of the right camera.
     turned: Vector3<f64>,
 }
 
 #[derive(Debug)]
 struct RightRay {
     ray: Vector2<f64>,
-    /// Squared slope of the epipolar line in the left image, not scaled.
+    /// The squared slope of the epipolar line in the left image, unscaled.
     slope: f64,
 }
 
 impl Band {
-    /// Replaces its key points by these.
+    /// Replaces the key points.
     pub(super) fn fill(&mut self, left: &[Keypoint], right: &[Keypoint], rig: &StereoRig, limits: &Limits) {
         let motion = rig.right_from_left();
         let (rotation, essential) = (motion.rotation_matrix(), rig.essential());
         let (scale, transposed) = (rig.mean_focal() / limits.px, essential.transpose());
         (self.step, self.depths) = (motion.translation(), limits.depths);
-        // Where the lens model has no direction the ray is not a number, which no comparison allows.
+        // Outside the range of the lens model the ray is NaN, which fails every comparison.
         let nowhere = Vector2::repeat(f64::NAN);
         self.left.clear();
         self.left.extend(left.iter().map(|keypoint| {
@@ -75,7 +75,7 @@ impl Band {
         self.grid.fill(self.right.iter().map(|right| right.ray.into()));
     }
 
-    /// Visits every right key point that left key point `i` may be, in no order that means anything.
+    /// Visits each right key point that is admissible for left key point `i`, in arbitrary order.
     pub(super) fn visit(&self, i: usize, mut visit: impl FnMut(usize)) {
         let left = &self.left[i];
         if left.slope.is_finite() {
@@ -88,7 +88,7 @@ impl Band {
         }
     }
 
-    /// Whether left key point `i` and right key point `j` can see one point.
+    /// Whether left key point `i` and right key point `j` may see one point.
     pub(super) fn allows(&self, i: usize, j: usize) -> bool {
         let (left, right) = (&self.left[i], &self.right[j]);
         let off = left.line.x * right.ray.x + left.line.y * right.ray.y + left.line.z;
@@ -96,8 +96,9 @@ impl Band {
             && self.depth(left, right).is_some_and(|z| self.depths[0] <= z && z <= self.depths[1])
     }
 
-    /// The depth z in the left camera at which z · turned + step points along the right ray; `None`
-    /// behind the right camera or with parallel rays.
+    /// The depth z in the left camera at which z · turned + step lies along the right ray.
+    ///
+    /// `None` behind the right camera or for parallel rays.
     fn depth(&self, left: &LeftRay, right: &RightRay) -> Option<f64> {
         let ray = right.ray.push(1.0);
         let across = ray.cross(&left.turned);

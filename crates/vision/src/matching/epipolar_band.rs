@@ -1,4 +1,4 @@
-//! Nearest neighbours along the epipolar band, supported by their neighbours.
+//! Mutual nearest neighbours along the epipolar band, supported by neighbouring pairs.
 
 use seafix_component::{Component, in_range};
 use seafix_geometry::StereoRig;
@@ -12,42 +12,40 @@ use super::{
 };
 use crate::Workspace;
 
-/// Pairs of key points that are each other's nearest by descriptor among those that the rig allows,
-/// clearly nearer than the second, with the support of the pairs around them.
+/// Mutual nearest neighbours by descriptor along the epipolar band, with ratio test and neighbour support.
 ///
-/// A pair is allowed when the key points lie within `epipolar_px` of seeing one point (Sampson
-/// distance, as in [`StereoRig::epipolar_distance`]) whose depth lies between the limits; this holds
-/// for any rig, rectified or not. Only allowed pairs compete, for the second place too: a pattern that
-/// repeats itself would otherwise have no clear nearest anywhere.
+/// A pair is admissible if its key points lie within `epipolar_px` of a common point's projections (Sampson distance,
+/// see [`StereoRig::epipolar_distance`]) and that point's depth lies between the limits. This holds for any rig,
+/// rectified or not. Only admissible pairs compete, for the second place too; otherwise a repeated pattern would have
+/// no clear nearest neighbour anywhere.
 ///
-/// Distance is Euclidean between numbers and counts bits that differ (Hamming) between bits; a pair
-/// passes when it is less than `ratio` times the distance to the second nearest, seen from either side.
-/// With `neighbours`, what competes is not a pair's distance but its belief, the inverse squared
-/// distance times the support of the pairs around it (relaxation). Where a pattern repeats itself and
-/// the whole neighbourhood fits as well one period further, there is no match, nor is there one for the points around that
-/// seem to have no rival.
+/// The distance is Euclidean between numbers and Hamming between bits. A pair passes if its distance is less than
+/// `ratio` times the distance to the second nearest, seen from either side. With `neighbours`, pairs compete by weight
+/// instead: the inverse squared distance times the support of the pairs around it (relaxation labelling). A pair is
+/// rejected as ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; so are the
+/// pairs around it that seem unambiguous.
 ///
-/// Descriptors of different kinds or lengths match nothing.
+/// Limit: descriptors of different kinds or lengths do not match.
 ///
-/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio);
-/// Barnard and Thompson, *Disparity analysis of images*, PAMI 1980 (support).
+/// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio); Barnard and Thompson,
+/// *Disparity analysis of images*, PAMI 1980 (support).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EpipolarBand {
-    /// The greatest distance, as a share of the distance to the second nearest; 1 switches the test off.
+    /// Maximum ratio of the distances to the nearest and the second nearest; 1 disables the test.
     pub ratio: f64,
-    /// The greatest distance between descriptors of unit length, whatever the second is: 2 − 2 cos of
-    /// their angle is its square.
+    /// Maximum distance between descriptors of unit length, whatever the second nearest; its square is 2 − 2 cos of
+    /// their angle.
     pub max_distance: f64,
-    /// The greatest share of bits that may differ, where descriptors are bits.
+    /// Maximum fraction of differing bits, for binary descriptors.
     pub max_hamming: f64,
-    /// Half width of the epipolar band (px).
+    /// Half-width of the epipolar band (px).
     pub epipolar_px: f64,
-    /// Least depth in the left camera (m).
+    /// Minimum depth in the left camera (m).
     pub min_depth: f64,
-    /// Greatest depth in the left camera (m).
+    /// Maximum depth in the left camera (m).
     pub max_depth: f64,
-    /// How many neighbours of a left key point support its pairs; 0: descriptors alone decide.
+    /// Number of neighbours of a left key point that support its pairs; 0: descriptors alone decide.
     pub neighbours: usize,
 }
 
@@ -67,7 +65,7 @@ impl Default for EpipolarBand {
 
 impl Component for EpipolarBand {
     const NAME: &'static str = "epipolar-band";
-    const SUMMARY: &'static str = "mutual nearest neighbours along the epipolar band, supported by those around them";
+    const SUMMARY: &'static str = "mutual nearest neighbours along the epipolar band, supported by neighbouring pairs";
     const SOURCE: &'static str = "Barnard and Thompson, Disparity analysis of images, PAMI 1980";
 
     fn check(&self) -> Result<(), String> {
@@ -85,7 +83,7 @@ impl Component for EpipolarBand {
 }
 
 impl EpipolarBand {
-    /// The greatest squared distance that a pair may have.
+    /// The maximum squared distance of a pair.
     pub(super) fn max(&self, metric: &Metric<'_>) -> f32 {
         match metric {
             Metric::Euclid(_) => (self.max_distance * self.max_distance) as f32,
@@ -93,7 +91,7 @@ impl EpipolarBand {
         }
     }
 
-    /// Finds the pairs, those of patterns too where `patterns` says so.
+    /// Finds the matches, including those of ambiguous patterns if `patterns` is set.
     pub(crate) fn find(
         &self,
         [left, right]: [&View<'_>; 2],
@@ -147,7 +145,7 @@ mod tests {
     use nalgebra::Vector3;
     use seafix_geometry::{Pixel, Point};
 
-    /// The definition, word by word; with `banded` only what the rig allows competes.
+    /// The definition by brute force; with `banded` only admissible pairs compete.
     fn brute_force(
         m: &EpipolarBand,
         banded: bool,
@@ -197,7 +195,7 @@ mod tests {
         for (step, turn) in [
             (Vector3::new(0.25, 0.0, 0.0), Vector3::zeros()),
             (Vector3::new(0.01, 0.3, 0.02), Vector3::new(0.05, -0.02, 0.1)),
-            // One camera ahead of the other: the epipoles lie inside the images.
+            // One camera ahead of the other, with epipoles inside the images.
             (Vector3::new(0.05, 0.02, 0.4), Vector3::new(0.0, 0.02, 0.3)),
         ] {
             let rig = rig(step, turn);
@@ -231,7 +229,7 @@ mod tests {
     #[test]
     fn alike_points_are_distinguished_by_the_band_alone() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
-        // A column of points that all look the same.
+        // A column of identical points.
         let seen: Vec<_> =
             (0..9).map(|i| rig.project(&Point::new(0.0, f64::from(i) * 0.2 - 0.8, 2.0)).unwrap()).collect();
         let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
@@ -249,8 +247,8 @@ mod tests {
             .map(|point| rig.project(&point).unwrap())
             .collect();
         let (l, r): (Vec<_>, Vec<_>) = seen.iter().map(|s| (s.left, s.right)).unzip();
-        // One look for all, a little of each point's own, and noise in each image: so little that neighbours together
-        // tell a place from the next by the six standard errors that are asked of patterns.
+        // A common pattern, small individual differences and image noise: the neighbours together distinguish a
+        // position from the next by the required six standard errors.
         let mut next = numbers(11);
         let descriptor: Vec<f32> = (0..48 * 16).map(|i| (i % 16) as f32 / 16.0 + 0.2 * next()).collect();
         let mut noisy = || unit(descriptor.iter().map(|x| x + 0.15 * next()).collect(), 16);
@@ -260,7 +258,7 @@ mod tests {
             (found.iter().filter(|m| m.left == index(&r, m)).count(), found.len())
         };
         let (alone, found) = right(0);
-        assert!(alone <= found && found < 48, "descriptors alone: {alone} of {found} are right");
+        assert!(alone <= found && found < 48, "by descriptors alone {alone} of {found} are right");
         assert_eq!(right(30), (48, 48));
     }
 
@@ -283,7 +281,7 @@ mod tests {
                 wrong += pairs.iter().filter(|m| index(&r, m) != m.left).count();
             }
         }
-        // Believed without asking for rivals, 478 of the 644 would be matched, 390 of them wrong.
+        // Without the test for alternatives 478 of the 644 would match, 390 of them wrongly.
         assert_eq!((found, wrong), (0, 0));
     }
 }

@@ -12,25 +12,25 @@ use super::{
 };
 use crate::Threads;
 
-/// The memory of the comparison.
+/// The working memory of the comparison.
 #[derive(Debug, Default)]
 pub(super) struct Exhaustive {
     left: Vec<Three>,
     right: Vec<Three>,
-    /// Squared lengths of the left descriptors.
+    /// The squared lengths of the left descriptors.
     lengths: Vec<f32>,
     pieces: Vec<Piece>,
 }
 
-/// What a key may have lost: a share of its value.
+/// The factor of the largest truncation of a key.
 const LOST: f32 = 1.0 + 1.0 / 32768.0;
 
 impl Exhaustive {
-    /// Replaces `nearest` by the nearest among all pairs.
+    /// Replaces `nearest` by the nearest neighbours among all pairs.
     ///
-    /// Numbers are compared by |a|² + |b|² − 2 a·b, in blocks that stay in registers. Where that form's rounding could
-    /// change who is nearest or second, differences are summed instead; so are the distances of those two. The
-    /// answer is that of [`Metric::squared`] for every pair, to the last bit, whatever the machine or its threads.
+    /// Numbers are compared by |a|² + |b|² − 2 a·b, in blocks that stay in registers. If rounding of that form could
+    /// change the nearest or the second, differences are summed instead; so are the final distances of both. The result
+    /// equals that of [`Metric::squared`] for every pair to the last bit, whatever the machine or its threads.
     pub(super) fn compare(&mut self, metric: &Metric<'_>, threads: Threads, nearest: &mut Nearest) {
         let [n, m] = match metric {
             Metric::Euclid([a, b]) => [a.len(), b.len()],
@@ -43,7 +43,7 @@ impl Exhaustive {
         let Self { left, right, lengths, pieces } = self;
         right.clear();
         right.resize(m, Three::NONE);
-        // The answer does not depend on it: few pieces, for each goes through all left descriptors.
+        // The result does not depend on the size; few pieces, since each traverses all left descriptors.
         let size = match threads {
             Threads::One => MAX,
             Threads::Pool => m.div_ceil(2 * rayon::current_num_threads()).clamp(64, MAX),
@@ -58,8 +58,8 @@ impl Exhaustive {
                 let longest = |lengths: &mut dyn Iterator<Item = f32>| lengths.fold(0.0, f32::max);
                 let (a_max, b_max) =
                     (longest(&mut lengths.iter().copied()), longest(&mut (0..m).map(|j| squared_length(b.row(j)))));
-                // Of n numbers the products err by at most n + 4 roundings of |a|² + |b|², ε/2 each, the differences
-                // by n/4 + 12, for there are eight sums; both, for the second and for the third.
+                // The products of n numbers have an error of at most n + 4 roundings of |a|² + |b|², ε/2 each; the
+                // differences, in eight sums, of n/4 + 12. Both count for the second and for the third.
                 (1.25 * a.length() as f32 + 20.0) * f32::EPSILON * (a_max + b_max)
             }
             Metric::Hamming(tables) => {
@@ -83,7 +83,7 @@ impl Exhaustive {
     }
 }
 
-/// The nearest two by their exact distances: the two that were found where the third is beyond doubt further.
+/// Finds the nearest two by their exact distances, or keeps them if the third is farther beyond doubt.
 fn settle(two: &mut Two, three: &Three, margin: f32, count: usize, squared: impl Fn(usize) -> f32) {
     if three.value[2] > LOST * three.value[1] + margin || margin == 0.0 {
         let found = three.index.iter().filter(|&&index| index != u32::MAX);
@@ -129,7 +129,7 @@ mod tests {
                     Descriptors::Numbers(Table::new(length, (0..count * length).map(value).collect()))
                 };
                 is_exact(&table(n, 3, 9973, 0.0), &table(m, 50, 9973, 0.0), &mut memory);
-                // Many that are equal, and many that differ by less than the products can tell.
+                // Many equal distances, and many that differ by less than the products resolve.
                 is_exact(&table(n, 1, 3, 0.0), &table(m, 2, 3, 0.0), &mut memory);
                 is_exact(&table(n, 3, 9973, 3e4), &table(m, 50, 9973, 3e4), &mut memory);
                 is_exact(&table(n, 3, 9973, 3e19), &table(m, 50, 9973, -3e19), &mut memory);

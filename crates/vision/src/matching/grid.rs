@@ -1,23 +1,23 @@
-//! Points of the plane, found by place.
+//! A grid of points in the plane.
 
-/// Points sorted into the cells of a grid over the box that holds them all.
+/// Points sorted into the cells of a grid over their bounding box.
 #[derive(Debug, Default)]
 pub(super) struct Grid {
     low: [f64; 2],
     cell: [f64; 2],
-    /// Where each cell's points begin in `order`, row by row, and where the last cell's end.
+    /// The start of each cell in `order`, in row-major order, then the end of the last.
     starts: Vec<u32>,
-    /// The points, cell by cell, in their own order within one.
+    /// The points by cell, in their original order within a cell.
     order: Vec<u32>,
 }
 
-/// Cells along either side.
+/// The number of cells along either side.
 const SIDE: usize = 64;
-/// What rounding may move a border by, as a share of a cell.
+/// The largest shift of a border by rounding, as a fraction of a cell.
 const SLACK: f64 = 1e-6;
 
 impl Grid {
-    /// Replaces its points by these; those that are not finite are in no cell.
+    /// Replaces the points; points that are not finite are skipped.
     pub(super) fn fill(&mut self, points: impl Iterator<Item = [f64; 2]> + Clone) {
         let known = points.enumerate().filter(|(_, at)| at.iter().all(|x| x.is_finite()));
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -38,7 +38,7 @@ impl Grid {
         }
         self.order.clear();
         self.order.resize(self.starts[SIDE * SIDE] as usize, 0);
-        // Filling moves each start to its end, which is the next one's start: the last shift undoes it.
+        // Filling advances each start to the next cell's start; the shift undoes it.
         for (index, at) in known {
             let cell = self.cell_of(at);
             self.order[self.starts[cell] as usize] = index as u32;
@@ -48,22 +48,22 @@ impl Grid {
         self.starts[0] = 0;
     }
 
-    /// How many points lie in cells.
+    /// The number of points in the grid.
     pub(super) fn len(&self) -> usize {
         self.order.len()
     }
 
-    /// The length of the box's sides.
+    /// The sides of the bounding box.
     pub(super) fn extent(&self) -> [f64; 2] {
         self.cell.map(|cell| cell * SIDE as f64)
     }
 
-    /// Visits every point with |a x + b y + c| ≤ `half`, and a few more.
+    /// Visits all points with |a x + b y + c| ≤ `half`, and a few more.
     pub(super) fn along_line(&self, [a, b, c]: [f64; 3], half: f64, mut visit: impl FnMut(usize)) {
         let half = half * (1.0 + SLACK);
         let spread = |k: f64, low: f64, high: f64| (f64::min(k * low, k * high), f64::max(k * low, k * high));
         let [width, height] = self.extent();
-        // a x takes all values between these in the box, and b y must make up for them.
+        // The term a x has this range in the box, and b y must compensate it.
         let (min, max) = spread(a, self.low[0], self.low[0] + width);
         let (top, bottom) = interval(b, -half - c - max, half - c - min);
         if !(top <= self.low[1] + height * (1.0 + SLACK) && bottom >= self.low[1] - height * SLACK) {
@@ -79,7 +79,7 @@ impl Grid {
         }
     }
 
-    /// Visits every point within `reach` of `at` along either axis, and a few more.
+    /// Visits all points within `reach` of `at` along both axes, and a few more.
     pub(super) fn around(&self, at: [f64; 2], reach: f64, mut visit: impl FnMut(usize)) {
         for row in self.index(1, at[1] - reach)..=self.index(1, at[1] + reach) {
             self.run(row, at[0] - reach, at[0] + reach).iter().for_each(|&index| visit(index as usize));
@@ -92,7 +92,7 @@ impl Grid {
         &self.order[self.starts[first] as usize..self.starts[last + 1] as usize]
     }
 
-    /// The row or column of a coordinate, the nearest one outside the box.
+    /// The row or column of a coordinate, clamped to the grid.
     fn index(&self, axis: usize, x: f64) -> usize {
         (((x - self.low[axis]) / self.cell[axis]) as usize).min(SIDE - 1)
     }
@@ -102,7 +102,7 @@ impl Grid {
     }
 }
 
-/// The x with low ≤ k x ≤ high.
+/// The range of x with low ≤ k x ≤ high.
 fn interval(k: f64, low: f64, high: f64) -> (f64, f64) {
     match k {
         k if k > 0.0 => (low / k, high / k),
@@ -135,10 +135,10 @@ mod tests {
             let (c, half) = (0.01 * f64::from(index) - 1.0, 0.001 * f64::from(index));
             let mut seen = vec![0; points.len()];
             grid.along_line([a, b, c], half, |index| seen[index] += 1);
-            assert!(seen.iter().all(|&times| times <= 1), "none is visited twice");
+            assert!(seen.iter().all(|&times| times <= 1), "a point is visited twice");
             let beside = |at: &[f64; 2]| (a * at[0] + b * at[1] + c).abs() <= half;
             assert!(points.iter().zip(&seen).all(|(at, &times)| times == 1 || !beside(at)), "{a} {b} {c} {half}");
-            assert!(half > 0.03 || seen.iter().sum::<i32>() < 250, "few others are");
+            assert!(half > 0.03 || seen.iter().sum::<i32>() < 250, "too many other points are visited");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Matching without descriptors: each left key point is sought in the right image itself.
+//! Matching without descriptors by pyramidal Lucas–Kanade tracking along the epipolar curve.
 
 use nalgebra::Vector2;
 use seafix_component::{Component, in_range};
@@ -8,29 +8,29 @@ use serde::{Deserialize, Serialize};
 use super::{Match, Matcher, View, curve::epipolar_curve, sought::Sought};
 use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
 
-/// Left key points, followed into the right image from coarse to fine.
+/// Pyramidal Lucas–Kanade tracking of left key points along their epipolar curves.
 ///
-/// On a level of a pyramid (1/8 of the size, finer near the border) the window around the key point is compared
-/// by zero-normalised cross correlation at every pixel of its epipolar curve between the depths. The best of
-/// these places are followed to the full size and back by the tracker; a pair is the one that correlates best, if it
-/// lies on the epipolar curve. The right places are wherever they are found: right key points play no part.
-/// The distance of a pair is 1 minus the correlation. Of two pairs that end within a pixel the better stays. Nothing is asked of
-/// the second best place: of a pattern that repeats itself a pair may be a period off.
+/// The window around a key point is compared by zero-normalised cross-correlation at every pixel of its epipolar curve
+/// between the depths, on a coarse pyramid level (1/8 of the size, finer near the border). The tracker follows the best
+/// positions to full resolution and back. The best correlation is a match if it lies on the epipolar curve.
+///
+/// Right key points take no part. The distance of a pair is 1 minus the correlation. The better of two pairs within a
+/// pixel of each other is kept. Limit: there is no ratio test, so a pair on a repeated pattern may be a period off.
 ///
 /// Source: Lucas and Kanade, *An iterative image registration technique with an application to stereo vision*, 1981;
 /// Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct LucasKanade {
-    /// The greatest distance from the epipolar curve (px, Sampson).
+    /// Maximum distance from the epipolar curve (px, Sampson distance).
     pub epipolar_px: f64,
-    /// Least depth in the left camera (m).
+    /// Minimum depth in the left camera (m).
     pub min_depth: f64,
-    /// Greatest depth in the left camera (m).
+    /// Maximum depth in the left camera (m).
     pub max_depth: f64,
-    /// How many places on the epipolar curve are followed.
+    /// Number of positions on the epipolar curve that are tracked.
     pub places: usize,
-    /// How they are followed.
+    /// Settings of the tracker.
     pub tracker: Tracker,
 }
 
@@ -43,7 +43,7 @@ impl Default for LucasKanade {
 impl Component for LucasKanade {
     const NAME: &'static str = "lucas-kanade";
     const SUMMARY: &'static str =
-        "left key points sought along the right image's epipolar curves, coarse to fine and back";
+        "pyramidal Lucas–Kanade tracking along the right image's epipolar curves, forward and backward";
     const SOURCE: &'static str = "Lucas and Kanade, An iterative image registration technique with an application to \
                                   stereo vision, 1981; Bouguet, Pyramidal implementation of the Lucas Kanade feature \
                                   tracker, 2000";
@@ -60,21 +60,21 @@ impl Component for LucasKanade {
     }
 }
 
-/// The level on which the epipolar curve is searched, at most.
+/// The coarsest level of the search along the epipolar curve.
 const SEARCHED: usize = 3;
-/// Places on a curve, at most.
+/// The maximum number of positions on a curve.
 const MAX: f64 = 512.0;
-/// Places on a curve that correlate worse than the best by this are not followed.
+/// The deficit in correlation against the best from which on a position is not tracked.
 const MUCH_WORSE: f64 = 0.3;
 
-/// Memory from frame to frame.
+/// The memory that is kept between frames.
 #[derive(Debug, Default)]
 struct Memory {
     pyramids: [Pyramid; 2],
     sought: Sought<Seeker>,
 }
 
-/// Memory for one piece of the work.
+/// The memory for one piece of the work.
 #[derive(Debug, Default)]
 struct Seeker {
     aligner: Aligner,
@@ -109,16 +109,16 @@ impl Matcher for LucasKanade {
 }
 
 impl LucasKanade {
-    /// Where the right image shows `place`, and the correlation there.
+    /// The position of `place` in the right image, and the correlation there.
     ///
-    /// Near the border a window fits on finer levels only, and a pair that a coarse level does not show may
-    /// be seen on a finer one.
+    /// A window near the border fits on finer levels only, and a pair that a coarse level does not resolve may appear
+    /// on a finer one; so levels are tried from coarse to fine.
     fn seek(&self, levels: [&[Image]; 2], place: &Pixel, rig: &StereoRig, seeker: &mut Seeker) -> Option<(Pixel, f64)> {
         let coarsest = SEARCHED.min(levels[0].len().saturating_sub(1));
         (0..=coarsest).rev().find_map(|level| self.seek_from(level, levels, place, rig, seeker))
     }
 
-    /// The same, beginning on one level.
+    /// The position and the correlation of a search that begins on one level.
     fn seek_from(
         &self,
         level: usize,
@@ -163,7 +163,7 @@ mod tests {
     use nalgebra::{UnitQuaternion, Vector3};
     use seafix_geometry::{Pinhole, Transform};
 
-    /// f = 500 px, the right camera `step` (m) away.
+    /// A rig with f = 500 px and the right camera displaced by `step` (m).
     fn rig(step: Vector3<f64>) -> StereoRig {
         let camera = Pinhole::new([240, 180], [500.0; 2], [119.5, 89.5], &[]).unwrap();
         StereoRig::new(camera, camera, Transform::new(UnitQuaternion::identity(), -step)).unwrap()
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn what_lies_off_the_epipolar_line_is_no_pair() {
         let (keypoints, found) = matches(&rig(Vector3::new(0.25, 0.0, 0.0)), [-30.0, 4.0]);
-        // A window may look like another by chance.
+        // A few windows correlate by chance.
         assert!(found.len() <= 3, "{found:?}");
         for pair in &found {
             let place = keypoints[pair.left].at;

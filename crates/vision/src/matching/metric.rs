@@ -1,18 +1,18 @@
-//! How unlike two descriptors are.
+//! The distance between two descriptors.
 
 use crate::{Descriptors, Table};
 
-/// The descriptors of two views, comparable: of one kind and one length.
+/// The comparable descriptors of two views: of one kind and one length.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Metric<'a> {
-    /// Euclidean distance.
+    /// The Euclidean distance.
     Euclid([&'a Table<f32>; 2]),
-    /// Hamming distance: how many bits differ.
+    /// The Hamming distance: the number of differing bits.
     Hamming([&'a Table<u64>; 2]),
 }
 
 impl<'a> Metric<'a> {
-    /// `None` for descriptors of different kinds or lengths, which nothing compares.
+    /// The metric of two views; `None` for descriptors of different kinds or lengths.
     pub(super) fn of(left: &'a Descriptors, right: &'a Descriptors) -> Option<Self> {
         match (left, right) {
             (Descriptors::Numbers(a), Descriptors::Numbers(b)) => {
@@ -23,8 +23,10 @@ impl<'a> Metric<'a> {
         }
     }
 
-    /// What left descriptor `i` and right descriptor `j` are compared by: their squared Euclidean
-    /// distance; of bits, that of the unit vectors whose signs they are, 4 h / n for h of n bits.
+    /// The squared distance of left descriptor `i` and right descriptor `j`.
+    ///
+    /// It is Euclidean for numbers. For n bits with Hamming distance h it is 4 h / n, the squared distance of the unit
+    /// vectors whose signs they are.
     pub(super) fn squared(&self, i: usize, j: usize) -> f32 {
         match self {
             Self::Euclid([a, b]) => squared(a.row(i), b.row(j)),
@@ -32,7 +34,7 @@ impl<'a> Metric<'a> {
         }
     }
 
-    /// The distance in its own measure: Euclidean, or in bits.
+    /// The distance in the descriptors' own measure: Euclidean or Hamming.
     pub(super) fn distance(&self, squared: f32) -> f32 {
         match self {
             Self::Euclid(_) => squared.sqrt(),
@@ -40,7 +42,7 @@ impl<'a> Metric<'a> {
         }
     }
 
-    /// The ratio of two squared distances that belongs to a ratio of distances in its own measure.
+    /// The ratio of squared distances for a ratio of distances in the descriptors' own measure.
     pub(super) fn squared_ratio(&self, ratio: f64) -> f32 {
         match self {
             Self::Euclid(_) => (ratio * ratio) as f32,
@@ -53,12 +55,12 @@ fn bits(table: &Table<u64>) -> f32 {
     64.0 * table.length() as f32
 }
 
-/// How many bits differ.
+/// The number of differing bits.
 pub(super) fn differing(a: &[u64], b: &[u64]) -> u32 {
     a.iter().zip(b).map(|(a, b)| (a ^ b).count_ones()).sum()
 }
 
-/// The squared Euclidean distance, summed in eight lanes and these in pairs: the same on every machine.
+/// The squared Euclidean distance, summed in eight lanes and these pairwise: identical on every machine.
 pub(super) fn squared(a: &[f32], b: &[f32]) -> f32 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut lanes = [0.0_f32; 8];

@@ -7,25 +7,24 @@ use serde::{Deserialize, Serialize};
 use super::{EpipolarBand, Match, Matcher, View, exhaustive::Exhaustive, metric::Metric, nearest::Nearest};
 use crate::Workspace;
 
-/// Pairs of key points that are each other's nearest by descriptor, clearly nearer than the second.
+/// Mutual nearest neighbours by descriptor among all pairs, with the ratio test.
 ///
-/// All pairs are compared, exactly: by their Euclidean distance between numbers, by the bits that
-/// differ (Hamming) between bits. A pair passes when it is less than `ratio` times the distance to the
-/// second nearest, seen from either side; of equally near ones the first counts as nearest. Descriptors
-/// of different kinds or lengths match nothing.
+/// All pairs are compared exactly, by Euclidean distance between numbers or Hamming distance between bits. A pair
+/// passes if its distance is less than `ratio` times the distance to the second nearest, seen from either side; of
+/// equal distances the first counts as nearest.
 ///
-/// The rig plays no part: [`EpipolarBand`] is the one that asks it.
+/// Limits: descriptors of different kinds or lengths do not match. The rig takes no part; [`EpipolarBand`] uses it.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MutualRatio {
-    /// The greatest distance, as a share of the distance to the second nearest; 1 switches the test off.
+    /// Maximum ratio of the distances to the nearest and the second nearest; 1 disables the test.
     pub ratio: f64,
-    /// The greatest distance between descriptors of unit length, whatever the second is: 2 − 2 cos of
-    /// their angle is its square.
+    /// Maximum distance between descriptors of unit length, whatever the second nearest; its square is 2 − 2 cos of
+    /// their angle.
     pub max_distance: f64,
-    /// The greatest share of bits that may differ, where descriptors are bits.
+    /// Maximum fraction of differing bits, for binary descriptors.
     pub max_hamming: f64,
 }
 
@@ -47,7 +46,7 @@ impl Component for MutualRatio {
 }
 
 impl MutualRatio {
-    /// The matcher whose settings these are, with the rest of its own.
+    /// The epipolar-band matcher with these settings, whose checks are shared.
     fn alike(&self) -> EpipolarBand {
         let Self { ratio, max_distance, max_hamming } = *self;
         EpipolarBand { ratio, max_distance, max_hamming, ..EpipolarBand::default() }

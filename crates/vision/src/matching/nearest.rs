@@ -1,13 +1,13 @@
 //! Nearest and second nearest neighbours between two sets.
 
-/// For everything on either side, the nearest on the other side and the distance of the second.
+/// The nearest neighbour of each element in the other set, with the distance of the second nearest.
 #[derive(Debug, Default)]
 pub(super) struct Nearest {
     pub(super) left: Vec<Two>,
     pub(super) right: Vec<Two>,
 }
 
-/// The nearest of those seen so far and the squared distances of the nearest two.
+/// The nearest element so far and the squared distances of the nearest two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Two {
     index: usize,
@@ -15,21 +15,21 @@ pub(super) struct Two {
     second: f32,
 }
 
-/// Two that are each other's nearest.
+/// A pair of mutual nearest neighbours.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mutual {
     pub(super) left: usize,
     pub(super) right: usize,
-    /// Their squared distance.
+    /// The squared distance of the pair.
     pub(super) squared: f32,
-    /// The squared distance from either to any other, the least.
+    /// The smallest squared distance from either to any other.
     pub(super) second: f32,
 }
 
 impl Two {
     pub(super) const NONE: Self = Self { index: usize::MAX, squared: f32::INFINITY, second: f32::INFINITY };
 
-    /// Of equals the one of the lowest index stays, in whatever order they come.
+    /// Considers an element; of equal distances the lowest index is kept, in whatever order they come.
     pub(super) fn offer(&mut self, index: usize, squared: f32) {
         if squared < self.squared || squared == self.squared && index < self.index {
             *self = Self { index, squared, second: self.squared };
@@ -40,15 +40,16 @@ impl Two {
 }
 
 impl Mutual {
-    /// Whether they are nearer than `ratio` times the second; 1 asks for nothing. Where the second is no
-    /// further, as where all look alike, no ratio below 1 passes.
+    /// Whether the pair passes the ratio test; 1 disables it.
+    ///
+    /// A second of equal distance fails any ratio below 1.
     pub(super) fn clear(&self, squared_ratio: f32) -> bool {
         squared_ratio >= 1.0 || self.squared < squared_ratio * self.second
     }
 }
 
 impl Nearest {
-    /// Of so many on the left and on the right, none compared yet.
+    /// Resets the sets to `left` and `right` elements without distances.
     pub(super) fn reset(&mut self, left: usize, right: usize) {
         self.left.clear();
         self.left.resize(left, Two::NONE);
@@ -56,13 +57,13 @@ impl Nearest {
         self.right.resize(right, Two::NONE);
     }
 
-    /// Left `i` and right `j` are this far apart.
+    /// Considers the squared distance of left `i` and right `j`.
     pub(super) fn offer(&mut self, i: usize, j: usize, squared: f32) {
         self.left[i].offer(j, squared);
         self.right[j].offer(i, squared);
     }
 
-    /// The pairs that are each other's nearest, in the order of the left side.
+    /// The mutual nearest neighbours, in the order of the left side.
     pub(super) fn mutual(&self) -> impl Iterator<Item = Mutual> + '_ {
         self.left.iter().enumerate().filter_map(|(left, two)| {
             let back = self.right.get(two.index)?;
@@ -87,9 +88,9 @@ mod tests {
         let pairs: Vec<_> = nearest.mutual().collect();
         assert_eq!(pairs.len(), 2);
         assert_eq!((pairs[0].left, pairs[0].right), (0, 1));
-        assert!((pairs[0].second - 20.25).abs() < 1e-4, "from right 1 the second is left 1");
+        assert!((pairs[0].second - 20.25).abs() < 1e-4, "left 1 is not the second nearest of right 1");
         assert_eq!((pairs[1].left, pairs[1].right), (1, 0));
-        assert!((pairs[1].second - 0.16).abs() < 1e-4, "from right 0 the second is left 2");
+        assert!((pairs[1].second - 0.16).abs() < 1e-4, "left 2 is not the second nearest of right 0");
         assert!(pairs[0].clear(0.7) && pairs[1].clear(0.7) && !pairs[1].clear(0.05));
     }
 

@@ -1,16 +1,16 @@
-//! Left key points that are sought in the right image, each for itself.
+//! Independent searches for left key points in the right image.
 
 use seafix_geometry::Pixel;
 
 use super::Match;
 use crate::{Keypoint, Threads};
 
-/// Left key points that are sought one after the other.
+/// The number of left key points in a piece of the work.
 const PIECE: usize = 32;
-/// Pairs that end nearer to each other (px) are one place.
+/// The distance (px) below which two right pixels are the same.
 const SAME: f64 = 1.0;
 
-/// The memory of the search, with what a seeker `S` keeps for itself.
+/// The working memory, with that of each seeker `S`.
 #[derive(Debug, Default)]
 pub(super) struct Sought<S> {
     seekers: Vec<S>,
@@ -19,8 +19,9 @@ pub(super) struct Sought<S> {
 }
 
 impl<S: Send + Default> Sought<S> {
-    /// Replaces `found` by what `seek` says of each key point's place: where the right image shows it, and the
-    /// distance. Of pairs that end at one place the best stays.
+    /// Replaces `found` by the results of `seek` for each key point: the pixel in the right image and the distance.
+    ///
+    /// The best of several pairs with the same right pixel is kept.
     pub(super) fn each(
         &mut self,
         threads: Threads,
@@ -41,8 +42,9 @@ impl<S: Send + Default> Sought<S> {
     }
 }
 
-/// Replaces `found` by the pairs there are, in the order of the left key points. Of pairs that end at one place
-/// in the right image the best stays; of equally good ones the first.
+/// Replaces `found` by the pairs with distinct right pixels, in the order of the left key points.
+///
+/// The best of several pairs with the same right pixel is kept; of equally good ones the first.
 fn distinct(pairs: &[Option<Match>], order: &mut Vec<Match>, found: &mut Vec<Match>) {
     order.clear();
     order.extend(pairs.iter().flatten());

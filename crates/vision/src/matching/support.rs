@@ -1,84 +1,88 @@
-//! Support of a pair by the pairs around it.
+//! The support of a pair by neighbouring pairs (relaxation labelling).
 
 use super::grid::Grid;
 use crate::Keypoint;
 
-/// A right key point that a left one may be.
+/// A candidate: a right key point that may match a left one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MatchCandidate {
-    /// Index among the left key points.
+    /// The index of the left key point.
     left: usize,
-    /// Index among the right key points.
+    /// The index of the right key point.
     pub(super) right: usize,
-    /// Squared distance of the descriptors.
+    /// The squared distance of the descriptors.
     pub(super) squared: f32,
-    /// The belief in it: inverse squared distance times all support.
+    /// The weight of the candidate: inverse squared distance times all support.
     pub(super) weight: f32,
-    /// The weight as a share of all candidates' weights at either key point of the pair.
+    /// The weight as a fraction of the weights of all candidates of either key point.
     fraction: f32,
-    /// From the left key point to the right one (px).
+    /// The displacement from the left to the right key point (px).
     displacement: [f32; 2],
 }
 
-/// The candidates of every left key point, the nearest descriptors first, and what supports them.
+/// The candidates of each left key point, nearest descriptors first, and their support.
 #[derive(Debug, Default)]
 pub(super) struct MatchCandidates {
     all: Vec<MatchCandidate>,
-    /// Where each left key point's candidates begin, and where the last one's end.
+    /// The start of each left key point's candidates, then the end of the last.
     starts: Vec<usize>,
     links: Vec<Link>,
-    /// Where each candidate's links begin, and where the last one's end.
+    /// The start of each candidate's links, then the end of the last.
     link_starts: Vec<usize>,
-    /// The left key points that have candidates.
+    /// The left key points with candidates.
     occupied: Vec<usize>,
     grid: Grid,
     near: Vec<(f32, u32)>,
     columns: Vec<f32>,
-    /// Whether each candidate that was chosen has a rival.
+    /// Whether each selected candidate has an alternative.
     verdicts: Vec<Option<bool>>,
-    /// Whether each pair stands in a pattern.
+    /// Whether each pair lies in a repeated pattern.
     spread: Vec<bool>,
 }
 
-/// An agreeing candidate of a neighbour.
+/// A link to an agreeing candidate of a neighbour.
 #[derive(Debug, Clone, Copy)]
 struct Link {
     candidate: u32,
     agreement: f32,
-    /// Which neighbour it belongs to.
+    /// The neighbour's rank by distance.
     rank: u16,
 }
 
-/// No left key point has more candidates than this.
+/// The maximum number of candidates of a left key point.
 const MAX: usize = 8;
-/// No candidate's descriptor is further than this many times the nearest one's. In a pattern that repeats itself
-/// another place often looks a few times more alike than the right one: it is for the neighbours to decide.
+/// The maximum ratio of a candidate's squared descriptor distance to the nearest one's.
+///
+/// On a repeated pattern the wrong position often looks a few times more similar than the right one; neighbours decide.
 const FURTHEST: f32 = 4.0;
-/// What counts as no distance: descriptors nearer than this are equally near.
+/// The squared distance below which descriptors count as equally near.
 const NEAREST: f32 = 1e-6;
-/// Rounds of mutual support.
+/// The number of relaxation rounds.
 const ROUNDS: usize = 10;
-/// Greatest gradient of the displacement that still gives support: a surface seen at a grazing angle.
+/// The maximum gradient of the displacement with support, that of a surface at a grazing angle.
 const GRADIENT: f32 = 0.3;
-/// What detectors may err (px).
+/// The tolerance of the detectors' errors (px).
 const SLACK: f32 = 1.0;
-/// The support that every pair has.
+/// The support of a pair without agreeing neighbours.
 const FLOOR: f32 = 0.05;
-/// A rival that so great a share of the neighbours agrees with as well is one to be told from.
+/// The minimum agreement of an alternative, as a fraction of the pair's.
 const ALTERNATIVE: f32 = 0.5;
-/// Standard errors by which the neighbourhood's descriptors must prefer a pair to its rival: three, twice as long as if
-/// they were independent: the windows of neighbours overlap, and what the pixel grid does to one it does to those a period
-/// off.
+/// The number of standard errors by which the neighbourhood's descriptors must prefer a pair to its alternative.
+///
+/// It is three, doubled because the errors are not independent: windows of neighbours overlap, and the sampling by the
+/// pixel grid has a similar effect on patterns a period apart.
 const CLEARLY: f32 = 6.0;
-/// Fewer neighbours give no standard error.
+/// The minimum number of neighbours for a standard error.
 const FEW: usize = 4;
 
-/// One ambiguous pair in so many is a pattern. In sixteen pairs of images, rendered and real, of things that do not repeat
-/// themselves and of whole chessboards it was one in sixty at most, in patterns without end two in three and more.
+/// The reciprocal of the fraction of ambiguous pairs that indicates a pattern.
+///
+/// The fraction was at most 1/60 in 16 pairs of images, rendered and real, without repeated patterns or of complete
+/// chessboards; in unbounded patterns it was at least two thirds.
 const PATTERN: usize = 5;
 
 impl MatchCandidates {
-    /// Replaces them by the pairs that `visit(i, ..)` names for each left key point, so far apart.
+    /// Replaces the candidates by the pairs that `visit(i, ..)` names for each left key point, with their distances.
     pub(super) fn fill(
         &mut self,
         [left, right]: [&[Keypoint]; 2],
@@ -110,16 +114,15 @@ impl MatchCandidates {
         &self.all[self.starts[i]..self.starts[i + 1]]
     }
 
-    /// Shifts belief to the candidates that agree with those of the `neighbours` nearest left key points.
+    /// Shifts weight to the candidates that agree with those of the `neighbours` nearest left key points.
     ///
-    /// Pairs (i, j) and (i', j') agree by c = 1 − |δ| / (1 px + 0.3 |x_i − x_i'|), if positive, where
-    /// δ = (x_j − x_i) − (x_j' − x_i') is the difference of their displacements. Each round multiplies
-    /// the weight w_ij by its support, the mean over i' of the greatest p_i'j' c over j', where
-    /// p_ij = w_ij / (Σ_k w_ik + Σ_k w_kj − w_ij) is the pair's share. Where nothing supports anything
-    /// the weights keep their ratios, those of the plain ratio test.
+    /// Pairs (i, j) and (i', j') agree by c = 1 − |δ| / (1 px + 0.3 |x_i − x_i'|), if positive, where δ = (x_j − x_i) −
+    /// (x_j' − x_i') is the difference of their displacements. Each round multiplies the weight w_ij by its support,
+    /// the mean over i' of the maximum over j' of p_i'j' c, where p_ij = w_ij / (Σ_k w_ik + Σ_k w_kj − w_ij) is the
+    /// pair's fraction. Without any support the weights keep their ratios, those of the plain ratio test.
     ///
-    /// Source: Barnard and Thompson, *Disparity analysis of images*, PAMI 1980; Pollard, Mayhew and
-    /// Frisby, *PMF: a stereo correspondence algorithm using a disparity gradient limit*, 1985.
+    /// Source: Barnard and Thompson, *Disparity analysis of images*, PAMI 1980; Pollard, Mayhew and Frisby, *PMF: a
+    /// stereo correspondence algorithm using a disparity gradient limit*, 1985.
     pub(super) fn support(&mut self, left: &[Keypoint], right: usize, neighbours: usize) {
         self.link(left, neighbours);
         for _ in 0..ROUNDS {
@@ -133,18 +136,20 @@ impl MatchCandidates {
         }
     }
 
-    /// Says of each of these pairs, in the order of the left key points, whether all that speaks for it speaks as
-    /// well for another: a pattern that repeats itself, shifted by a period.
+    /// Decides for each of these pairs, in the order of the left key points, whether it is ambiguous: the evidence for
+    /// it supports an alternative as well, as on a repeated pattern shifted by a period.
     ///
-    /// A pair's rival is another candidate of its left key point that the neighbours agree with at least half as
-    /// much, by candidates of their own. Of each such neighbour, and of the point itself, take the logarithm of the
-    /// ratio of two squared distances: that of the candidate that agrees with the rival and that of the one that
-    /// agrees with the pair. The pair stands when their mean is at least six standard errors above zero; with
-    /// fewer than four neighbours, when it passes the plain ratio test. One point's neighbourhood may mislead:
-    /// a pair is ambiguous where more than half of the pairs that agree with it, itself among them, do not stand.
+    /// An alternative of a pair is another candidate of its left key point with which the neighbours agree at least
+    /// half as much, by candidates of their own. Each such neighbour, and the point itself, contributes the logarithm
+    /// of a ratio of squared descriptor distances: that of its candidate that agrees with the alternative over that of
+    /// its candidate that agrees with the pair. A pair is confirmed if the mean is at least six standard errors above
+    /// zero or, with fewer than four neighbours, if it passes the plain ratio test.
+    ///
+    /// One neighbourhood may mislead, so a pair is ambiguous if more than half of the pairs that agree with it, itself
+    /// included, are not confirmed.
     pub(super) fn ambiguous(&mut self, pairs: &[(usize, usize)], squared_ratio: f32, ambiguous: &mut Vec<bool>) {
         let place = |this: &Self, (i, j): (usize, usize)| {
-            (this.starts[i]..this.starts[i + 1]).find(|&c| this.all[c].right == j).expect("a pair is a candidate")
+            (this.starts[i]..this.starts[i + 1]).find(|&c| this.all[c].right == j).expect("each pair is a candidate")
         };
         let mut verdicts = std::mem::take(&mut self.verdicts);
         verdicts.clear();
@@ -165,10 +170,11 @@ impl MatchCandidates {
         self.verdicts = verdicts;
     }
 
-    /// Calls every pair ambiguous of whose `neighbours` nearest more than one in five are.
+    /// Marks each pair as ambiguous if more than a fifth of its `neighbours` nearest pairs are.
     ///
-    /// The points of a pattern that goes on are told from their rivals by chance at best: where the right image has no key
-    /// point at the rival's place, or has it a little off. Where nothing repeats itself hardly a pair has a rival.
+    /// Points of an unbounded pattern differ from their alternatives by chance at best: if the right image has no key
+    /// point at the alternative's position, or has it a little off. Without repetition hardly any pair has an
+    /// alternative.
     pub(super) fn spread(
         &mut self,
         left: &[Keypoint],
@@ -186,7 +192,7 @@ impl MatchCandidates {
         let in_pattern = |&(i, _): &(usize, usize)| {
             nearest_neighbours(grid, left, occupied, i, neighbours, near);
             let rivalled = near.iter().filter(|(_, k)| {
-                let pair = occupied.binary_search(&(*k as usize)).expect("a neighbour has a pair");
+                let pair = occupied.binary_search(&(*k as usize)).expect("each neighbour has a pair");
                 ambiguous[pair]
             });
             near.len() > FEW && rivalled.count() > near.len() / PATTERN
@@ -235,13 +241,13 @@ impl MatchCandidates {
         !(mean > 0.0 && mean * mean * n >= CLEARLY * CLEARLY * variance)
     }
 
-    /// What agrees with a candidate, neighbour by neighbour.
+    /// The links of a candidate, grouped by neighbour.
     fn neighbours_of(&self, candidate: usize) -> impl Iterator<Item = &[Link]> {
         let links = &self.links[self.link_starts[candidate]..self.link_starts[candidate + 1]];
         links.chunk_by(|a, b| a.rank == b.rank)
     }
 
-    /// The shares that belong to the weights.
+    /// Updates the fractions from the weights.
     fn fraction(&mut self, right: usize) {
         self.columns.clear();
         self.columns.resize(right, 0.0);
@@ -252,7 +258,7 @@ impl MatchCandidates {
         }
     }
 
-    /// Finds what agrees with each candidate.
+    /// Finds the agreeing candidates of the neighbours of each candidate.
     fn link(&mut self, left: &[Keypoint], neighbours: usize) {
         let Self { all, starts, links, link_starts, occupied, grid, near, .. } = self;
         occupied.clear();
@@ -283,7 +289,7 @@ impl MatchCandidates {
     }
 }
 
-/// The squared distances and indices of the `count` left key points nearest to `i`, among those that are occupied.
+/// Finds the squared distances and indices of the `count` left key points nearest to `i`, among `occupied`.
 fn nearest_neighbours(
     grid: &Grid,
     left: &[Keypoint],
@@ -294,7 +300,7 @@ fn nearest_neighbours(
 ) {
     let at = left[i].at;
     let [width, height] = grid.extent();
-    // Twice the area that so many points take on average.
+    // Twice the average area of `count` points.
     let mut reach = 1.0 + (width * height * (count + 1) as f64 / (2.0 * grid.len() as f64)).sqrt();
     loop {
         near.clear();
@@ -329,8 +335,7 @@ mod tests {
     const ROWS: usize = 6;
     const COUNT: usize = COLUMNS * ROWS;
 
-    /// A lattice of 25 px seen by both cameras, 60 px further left in the right image, where it is also
-    /// slanted: 2 % narrower.
+    /// A lattice of 25 px in both images, 60 px further left and 2 % narrower (slanted) in the right one.
     fn lattice() -> [Vec<Keypoint>; 2] {
         let at = |u: f64, v: f64| Keypoint { at: Pixel { u, v }, response: 1.0, scale: 1.0 };
         let place = |i: usize| (100.0 + 25.0 * (i % COLUMNS) as f64, 100.0 + 25.0 * (i / COLUMNS) as f64);
@@ -339,7 +344,7 @@ mod tests {
         [left.collect(), right.collect()]
     }
 
-    /// Left point `i` may be every right point of its row, and all look alike: so far apart are they.
+    /// The candidates of left point `i` are all right points of its row, with these squared distances.
     fn of_rows(views: [&[Keypoint]; 2], squared: impl Fn(usize, usize) -> f32) -> MatchCandidates {
         let mut candidates = MatchCandidates::default();
         let row = |i: usize, visit: &mut dyn FnMut(usize)| {
@@ -349,14 +354,13 @@ mod tests {
         candidates
     }
 
-    /// Every third is a little more like its neighbours than like itself, the others the other way round.
+    /// A distance by which each third point is more similar to its neighbours than to itself; the others are not.
     fn alike(i: usize, j: usize) -> f32 {
         let (itself, misled) = (i == j, i.is_multiple_of(3));
         if itself == misled { 0.05 } else { 0.04 }
     }
 
-    /// The right point that each left one believes in most, and whether clearly: the second has less than
-    /// half the belief.
+    /// The right point of the largest weight for each left one, and whether the second has less than half of it.
     fn believed(candidates: &MatchCandidates) -> Vec<(usize, bool)> {
         let max = |i: usize| {
             let mut sorted = candidates.of(i).to_vec();
@@ -371,8 +375,8 @@ mod tests {
         let [left, right] = lattice();
         let mut candidates = of_rows([&left, &right], alike);
         let alone = believed(&candidates);
-        assert_eq!((0..COUNT).filter(|&i| alone[i].0 == i).count(), COUNT - COUNT / 3, "a third is misled");
-        assert!(alone.iter().all(|(_, clearly)| !clearly), "and nothing is clear");
+        assert_eq!((0..COUNT).filter(|&i| alone[i].0 == i).count(), COUNT - COUNT / 3, "a third is not misled");
+        assert!(alone.iter().all(|(_, clearly)| !clearly), "descriptors alone decide nothing");
         candidates.support(&left, COUNT, 12);
         let together = believed(&candidates);
         assert!((0..COUNT).all(|i| together[i] == (i, true)), "{together:?}");
@@ -381,7 +385,7 @@ mod tests {
     #[test]
     fn where_nothing_agrees_the_descriptors_decide() {
         let [left, right] = lattice();
-        // The right points lie far from each other: no two displacements are alike.
+        // Scattered right points, so that no two displacements agree.
         let scattered: Vec<Keypoint> = right
             .iter()
             .enumerate()

@@ -1,4 +1,4 @@
-//! What the matchers' tests look at.
+//! The scenes of the matchers' tests.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Pinhole, Pixel, Point, StereoRig, Transform};
@@ -6,7 +6,7 @@ use seafix_geometry::{Pinhole, Pixel, Point, StereoRig, Transform};
 use super::{Match, Matcher, View};
 use crate::{Descriptors, Image, Keypoint, Table};
 
-/// The right camera `step` (m) from the left one and turned by `turn` (rad).
+/// A rig with the right camera displaced by `step` (m) and rotated by `turn` (rad).
 pub(super) fn rig(step: Vector3<f64>, turn: Vector3<f64>) -> StereoRig {
     let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[-0.05, 0.01, 0.001, 0.0]).unwrap();
     let rotation = UnitQuaternion::from_scaled_axis(turn);
@@ -48,13 +48,14 @@ pub(super) fn matched(
     )
 }
 
-/// Which right pixel a match means.
+/// The index of the right pixel of a match.
 pub(super) fn index(right: &[Pixel], found: &Match) -> usize {
     right.iter().position(|at| *at == found.right).unwrap()
 }
 
-/// Points at random depths, their pixels in both images and random descriptors, noisy on the right,
-/// where they come in reverse order.
+/// The pixels of points at random depths in both images, with random descriptors.
+///
+/// The right ones are noisy and in reverse order.
 pub(super) fn scene(n: usize, rig: &StereoRig) -> (Vec<Pixel>, Vec<Pixel>, Descriptors, Descriptors) {
     let mut next = numbers(7);
     let (mut left, mut right, mut a, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());

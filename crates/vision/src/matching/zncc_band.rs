@@ -1,4 +1,4 @@
-//! Matching without descriptors or right key points: every pixel of the epipolar band is compared.
+//! Matching by zero-normalised cross-correlation at every pixel of the epipolar band.
 
 use nalgebra::Vector2;
 use seafix_component::{Component, in_range};
@@ -13,35 +13,34 @@ use super::{
 };
 use crate::{Image, Workspace, detect::vertex};
 
-/// Left key points, each sought at every pixel of its epipolar band in the right image.
+/// Area-based matching of left key points by ZNCC at every pixel of their epipolar band.
 ///
-/// The window around the key point is compared by zero-normalised cross correlation c with those around all pixels
-/// within `epipolar_px` of its epipolar curve between the depths, for any rig. The best is a pair if it is clearly
-/// better than any place further than half a window away, if the same search from there back into the left image
-/// ends where it began, and if it passes the epipolar test once it is placed to a fraction of a pixel by the
-/// quadratic through its nine correlations. The distance of a pair is that of the windows as unit vectors, √(2 − 2c). Of
-/// two pairs that end within a pixel the better stays.
+/// The window around a key point is compared by zero-normalised cross-correlation c with those around all pixels within
+/// `epipolar_px` of its epipolar curve between the depths, for any rig. The best is a match under three conditions: it
+/// is clearly better than any position further than half a window away; the search from there in the left image returns
+/// to the start; and it passes the epipolar test at its subpixel position, the vertex of the quadratic through its nine
+/// correlations. The distance of a pair is that of the windows as unit vectors, √(2 − 2c). The better of two pairs
+/// within a pixel of each other is kept.
 ///
-/// Whatever a detector sees or misses in the right image plays no part: where contrast is low and key points seldom
-/// appear twice, more is found. Windows are compared as they are; cameras that are rolled against each other by more
-/// than some 10° need a descriptor.
+/// Right key points take no part, so the matcher finds more pairs where contrast is low and detections seldom repeat.
+/// Limit: windows are not rotated; cameras with a relative roll of more than about 10° need a descriptor.
 ///
-/// Source: Hannah, *Computer matching of areas in stereo images*, 1974; Fua, *A parallel stereo algorithm that
-/// produces dense depth maps and preserves image features*, 1993 (there and back).
+/// Source: Hannah, *Computer matching of areas in stereo images*, 1974; Fua, *A parallel stereo algorithm that produces
+/// dense depth maps and preserves image features*, 1993 (left–right check).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccBand {
-    /// Side of the window (px), odd, 3 to 51.
+    /// Side of the window (px); odd, 3 to 51.
     pub window: usize,
-    /// The least correlation.
+    /// Minimum correlation.
     pub min_correlation: f64,
-    /// The greatest distance, as a share of the distance to the second best place; 1 switches the test off.
+    /// Maximum ratio of the distances to the best and the second best position; 1 disables the test.
     pub ratio: f64,
-    /// Half width of the epipolar band (px).
+    /// Half-width of the epipolar band (px).
     pub epipolar_px: f64,
-    /// Least depth in the left camera (m).
+    /// Minimum depth in the left camera (m).
     pub min_depth: f64,
-    /// Greatest depth in the left camera (m).
+    /// Maximum depth in the left camera (m).
     pub max_depth: f64,
 }
 
@@ -53,7 +52,8 @@ impl Default for ZnccBand {
 
 impl Component for ZnccBand {
     const NAME: &'static str = "zncc-band";
-    const SUMMARY: &'static str = "left key points sought at every pixel of the epipolar band, there and back";
+    const SUMMARY: &'static str =
+        "area-based matching by ZNCC at every pixel of the epipolar band, with left-right check";
     const SOURCE: &'static str =
         "Fua, A parallel stereo algorithm that produces dense depth maps and preserves image features, 1993";
 
@@ -72,26 +72,26 @@ impl Component for ZnccBand {
     }
 }
 
-/// Places on a curve, at most.
+/// The maximum number of positions on a curve.
 const MAX: f64 = 8192.0;
-/// The way back ends where the way there began if it ends within this (px, along either axis).
+/// The tolerance of the left–right check (px along either axis).
 const RETURN: usize = 1;
 
-/// Memory for one piece of the work.
+/// The memory for one piece of the work.
 #[derive(Debug, Default)]
 struct Seeker {
     template: Template,
     curve: Vec<Vector2<f64>>,
-    /// Of each row of the image that the band meets, the first and the last column.
+    /// The first and the last column of the band in each of its rows.
     rows: Vec<[usize; 2]>,
     seen: Vec<([usize; 2], f32)>,
 }
 
-/// The whole pixel where a window fits best.
+/// The integer pixel of the best window.
 struct Best {
     at: [usize; 2],
     correlation: f32,
-    /// The greatest correlation elsewhere.
+    /// The largest correlation elsewhere.
     second: f32,
 }
 
@@ -116,7 +116,7 @@ impl Matcher for ZnccBand {
 }
 
 impl ZnccBand {
-    /// Where the right image shows `place`, and the distance of the windows.
+    /// The position of `place` in the right image, and the distance of the windows.
     fn there_and_back(
         &self,
         [left, right]: [&Image; 2],
@@ -139,14 +139,14 @@ impl ZnccBand {
         let at =
             Pixel { u: x as f64 + dx + (place.u - begin[0] as f64), v: y as f64 + dy + (place.v - begin[1] as f64) };
         let off = rig.epipolar_distance(&StereoPixels { left: *place, right: at })?;
-        // A depth means another number to the other camera.
+        // The other camera sees the point at a different depth.
         let depths = [0.5 * self.min_depth, 2.0 * self.max_depth];
         let again = self.seek([right, left], back, best.at, depths, seeker)?.at;
         let returned = again.iter().zip(begin).all(|(a, b)| a.abs_diff(b) <= RETURN);
         (off <= self.epipolar_px && returned).then(|| (at, (2.0 * own.max(0.0)).sqrt()))
     }
 
-    /// The best place of the window around `begin` in the band of the other image.
+    /// The best position of the window around `begin` in the band of the other image.
     fn seek(
         &self,
         [from, to]: [&Image; 2],
@@ -175,16 +175,17 @@ impl ZnccBand {
     }
 }
 
-/// The pixel around a place; none for what is no place.
+/// The integer pixel of a position; `None` if it is not finite.
 fn full(place: &Pixel) -> Option<[usize; 2]> {
     let at = [place.u, place.v].map(libm::round);
     at.iter().all(|x| (0.0..1e9).contains(x)).then(|| at.map(|x| x as usize))
 }
 
-/// Replaces `rows` by what an image of this width and height has within `reach` of the curve: first and last column of
-/// each row, from the row returned on.
+/// Replaces `rows` by the first and the last column of each row within `reach` of the curve; returns the first row.
+///
+/// The image has this width and height.
 fn band(curve: &[Vector2<f64>], reach: f64, [width, height]: [usize; 2], rows: &mut Vec<[usize; 2]>) -> Option<usize> {
-    // Half a pixel more, for a place between pixels.
+    // Half a pixel more, for positions between pixels.
     let reach = reach + 0.5;
     let range = |x: f64, n: usize| {
         let (first, last) = (libm::ceil(x - reach).max(0.0), libm::floor(x + reach).min(n as f64 - 1.0));
@@ -202,7 +203,7 @@ fn band(curve: &[Vector2<f64>], reach: f64, [width, height]: [usize; 2], rows: &
             (*begin, *end) = ((*begin).min(left), (*end).max(right));
         }
     }
-    // A row that a coarse curve leaps over has no column.
+    // A row that a coarse curve skips has no column.
     rows.iter_mut().filter(|row| row[0] > row[1]).for_each(|row| *row = [1, 0]);
     Some(top)
 }
@@ -238,7 +239,7 @@ mod tests {
             for pair in &found {
                 let place = keypoints[pair.left].at;
                 let expected = Pixel { u: place.u + shift[0], v: place.v + shift[1] };
-                // The quadratic says which half of a pixel; the alignment begins there.
+                // The quadratic gives the position to half a pixel, the start of the refinement.
                 assert!(pair.right.distance(&expected) < 0.5, "{shift:?}: {place:?} {pair:?}");
             }
         }

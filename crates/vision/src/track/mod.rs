@@ -1,4 +1,4 @@
-//! Tracking: where places of one image are in another, near or far.
+//! Pyramidal tracking of points from one image to another.
 
 mod pyramid;
 
@@ -13,41 +13,41 @@ use crate::{
     align::{Aligned, Aligner, Rules, Translation},
 };
 
-/// Follows places from one image to another, from coarse to fine, and back.
+/// The pyramidal Lucas–Kanade tracker with forward–backward check.
 ///
-/// On each level of a pyramid, the coarsest first, the window around the place is aligned to the other
-/// image as in [`Direct`](crate::Direct), by translation; each level begins where the one before ended. A place is
-/// followed if the finest level is aligned and the way back ends where the way there began.
+/// On each pyramid level, the coarsest first, the window around the point is aligned to the other image by translation,
+/// as in [`Direct`](crate::Direct); each level begins at the result of the one before. A track is accepted if the
+/// finest level aligns and tracking backward returns to the start.
 ///
-/// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and
-/// Matas, *Forward-backward error*, 2010.
+/// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and Matas,
+/// *Forward-backward error*, 2010.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Tracker {
-    /// Side of the window (px, on every level), odd, 3 to 201.
+    /// Side of the window on each level (px); odd, 3 to 201.
     pub window: usize,
-    /// How the pixels of the window count.
+    /// Weights of the window's pixels.
     pub weight: Weight,
-    /// Levels of the pyramid, 1 to 12: with each the reach doubles.
+    /// Number of pyramid levels, 1 to 12; each doubles the reach.
     pub levels: usize,
-    /// How far a place may move on one level (px of that level).
+    /// Maximum motion of a point on one level (px of that level).
     pub reach: f64,
-    /// The least zero-normalised cross correlation of the windows on the finest level.
+    /// Minimum zero-normalised cross-correlation of the windows on the finest level.
     pub min_correlation: f64,
-    /// The greatest distance between the beginning and the end of the way there and back (px); 0: no way back.
+    /// Maximum forward–backward error (px); 0 disables the check.
     pub return_px: f64,
-    /// The greatest number of iterations on a level.
+    /// Maximum number of iterations on a level.
     pub iterations: usize,
 }
 
-/// A place that was followed.
+/// A tracked point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Track {
-    /// Where it is in the other image.
+    /// The position in the other image.
     pub at: Pixel,
-    /// The covariance of that, given the place in the first image (px²).
+    /// The covariance of that position, given the position in the first image (px²).
     pub covariance: Matrix2<f64>,
-    /// The zero-normalised cross correlation of the windows.
+    /// The zero-normalised cross-correlation of the windows.
     pub correlation: f64,
 }
 
@@ -72,18 +72,18 @@ impl Default for Tracker {
     }
 }
 
-/// Places that are followed one after the other.
+/// The number of points in a piece of the work.
 const PIECE: usize = 64;
-/// Steps on levels that are only passed through end here (px of the level).
+/// The step length (px of the level) that ends the iteration on intermediate levels.
 const COARSE: f64 = 0.03;
-/// The least correlation on these levels.
+/// The minimum correlation on intermediate levels.
 const ALIKE: f64 = 0.5;
 
 impl Tracker {
-    /// Whether the settings can be.
+    /// Checks the settings' ranges.
     ///
     /// # Errors
-    /// The setting that is out of its range, its value, and the range.
+    /// The invalid setting, its value and its range.
     pub fn check(&self) -> Result<(), String> {
         let Self { window, weight: _, levels, reach, min_correlation, return_px, iterations } = *self;
         let odd = window % 2 == 1 && (3..=201).contains(&window);
@@ -96,8 +96,8 @@ impl Tracker {
         in_range((1..=1000).contains(&iterations), "iterations", iterations, "a number from 1 to 1000")
     }
 
-    /// Replaces `found` by where each of `places` (in the first image, and where to begin in the second) is in the
-    /// second image.
+    /// Replaces `found` by the positions in the second image of `places`: positions in the first image and initial
+    /// positions in the second.
     pub fn track_into(
         &self,
         [from, to]: [&Pyramid; 2],
@@ -116,7 +116,7 @@ impl Tracker {
         });
     }
 
-    /// Where each of `places` of the first image is in the second, beginning where it was.
+    /// The tracks of `places` from the first image to the second, from the same initial pixels.
     pub fn track_all(&self, from: &Image, to: &Image, places: &[Pixel]) -> Vec<Option<Track>> {
         let pyramids = [from, to].map(|image| Pyramid::new(image, self.levels));
         let places: Vec<[Pixel; 2]> = places.iter().map(|place| [*place; 2]).collect();
@@ -125,13 +125,13 @@ impl Tracker {
         found
     }
 
-    /// When an alignment on the finest level is believed.
+    /// The acceptance rules of an alignment on the finest level.
     pub(crate) fn rules(&self) -> Rules {
         let Self { window, weight, reach, min_correlation, iterations, .. } = *self;
         Rules { window, weight, reach, min_correlation, iterations, precision: Rules::FINE, beyond: false }
     }
 
-    /// One place, there and back.
+    /// Tracks one point forward and backward.
     pub(crate) fn track(
         &self,
         [from, to]: [&[Image]; 2],
@@ -143,7 +143,7 @@ impl Tracker {
         self.returns([from, to], [place, start], &there, aligner).then_some(there)
     }
 
-    /// One place, there.
+    /// Tracks one point forward.
     pub(crate) fn there(
         &self,
         levels: [&[Image]; 2],
@@ -154,7 +154,7 @@ impl Tracker {
         self.follow(levels, &vector(place), &vector(start), aligner).map(Track::from)
     }
 
-    /// Whether the way back, which begins as wrong as the way there did, ends at `place`.
+    /// Whether backward tracking, with an initial error as large as the forward one, returns to `place`.
     pub(crate) fn returns(
         &self,
         [from, to]: [&[Image]; 2],
@@ -169,7 +169,7 @@ impl Tracker {
                 .is_some_and(|back| (back.at - place).norm() <= self.return_px)
     }
 
-    /// From the coarsest level to the finest. A level that cannot align leaves the place to the next.
+    /// Tracks from the coarsest level to the finest; a level that fails to align passes its initial position on.
     fn follow(
         &self,
         [from, to]: [&[Image]; 2],
@@ -197,7 +197,7 @@ fn vector(pixel: &Pixel) -> Vector2<f64> {
     Vector2::new(pixel.u, pixel.v)
 }
 
-/// Soft discs of random size, place and brightness, moved by `shift`: an image of `width` × ¾ `width`.
+/// An image of `width` × ¾ `width` of soft discs of random size, position and brightness, moved by `shift`.
 #[cfg(test)]
 pub(crate) fn stones(width: usize, shift: [f64; 2]) -> Image {
     let mut state = 1_u64;
@@ -228,7 +228,7 @@ mod tests {
 
     const SHIFT: [f64; 2] = [31.3, -6.6];
 
-    /// 48 places well inside an image of 480 px.
+    /// A grid of 48 points well inside an image of 480 px.
     fn places() -> Vec<Pixel> {
         (0..48).map(|i| Pixel { u: 130.5 + 20.0 * (i % 8) as f64, v: 110.25 + 22.0 * (i / 8) as f64 }).collect()
     }
@@ -249,7 +249,7 @@ mod tests {
         };
         let (followed, rightly) = right(&Tracker::default());
         assert!(followed >= 46 && rightly == followed, "{rightly} of {followed} of 48");
-        assert_eq!(right(&Tracker { levels: 1, ..Tracker::default() }).1, 0, "31 px are too far for one level");
+        assert_eq!(right(&Tracker { levels: 1, ..Tracker::default() }).1, 0, "one level tracks 31 px");
     }
 
     #[test]
@@ -271,7 +271,7 @@ mod tests {
         let there = tracker.there(levels, &place, &place, aligner).unwrap();
         assert!(tracker.returns(levels, [&place, &place], &there, aligner));
         let beside = Track { at: Pixel { u: there.at.u + 1.0, v: there.at.v }, ..there };
-        assert!(!tracker.returns(levels, [&place, &place], &beside, aligner), "it ends a pixel beside");
+        assert!(!tracker.returns(levels, [&place, &place], &beside, aligner), "an error of one pixel passes the check");
         let free = Tracker { return_px: 0.0, ..tracker };
         assert!(free.returns(levels, [&place, &place], &beside, aligner));
     }

@@ -1,8 +1,8 @@
-//! Pyramids: an image at half the size, and half of that, and so on.
+//! Gaussian image pyramids.
 
 use crate::Image;
 
-/// An image and its halves. Pixel i of a level lies at 2 i of the level below.
+/// An image and its successive halves; pixel i of a level lies at 2 i of the next finer level.
 ///
 /// Each level is smoothed by (1, 4, 6, 4, 1) / 16 along both axes before every second pixel is taken.
 ///
@@ -14,18 +14,18 @@ pub struct Pyramid {
     row: Vec<f32>,
 }
 
-/// No side of a level is shorter (px).
+/// The minimum side of a level (px).
 const SHORTEST: usize = 16;
 
 impl Pyramid {
-    /// The pyramid of `image`, with at most `levels` levels, the image itself among them.
+    /// The pyramid of `image`, with at most `levels` levels including the image.
     pub fn new(image: &Image, levels: usize) -> Self {
         let mut pyramid = Self::default();
         pyramid.build(image, levels);
         pyramid
     }
 
-    /// Makes this the pyramid of `image`, in the memory that is there.
+    /// Rebuilds the pyramid for `image` and reuses the memory.
     pub fn build(&mut self, image: &Image, levels: usize) {
         let (mut width, mut height) = (image.width(), image.height());
         self.level(0).copy_from(image);
@@ -41,7 +41,7 @@ impl Pyramid {
         }
     }
 
-    /// The levels, the finest first.
+    /// The levels, finest first.
     pub fn levels(&self) -> &[Image] {
         &self.levels[..self.used]
     }
@@ -54,11 +54,11 @@ impl Pyramid {
     }
 }
 
-/// Every second pixel of every second row, smoothed; mirrored at the border.
+/// Halves the smoothed pixels along both axes, mirrored at the border.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn halve(pixels: &[f32], width: usize, to_width: usize, smooth: &mut Vec<f32>, to: &mut [f32]) {
     let height = pixels.len() / width;
-    // Two pixels before the first and after the last.
+    // Two pixels of margin before the first and after the last.
     smooth.resize(2 * to_width + 4, 0.0);
     let sum = |a: f32, b: f32, c: f32, d: f32, e: f32| (6.0 * c + 4.0 * (b + d) + (a + e)) / 16.0;
     for (y, to) in to.chunks_exact_mut(to_width).enumerate() {
@@ -96,7 +96,7 @@ mod tests {
         );
         assert_eq!(pyramid.levels()[1].row(5)[7], ramp(14, 10));
         assert_eq!(pyramid.levels()[2].row(5)[7], ramp(28, 20));
-        // Mirrored, (2, 1, 0, 1, 2) · 3 weighs 12 · 3 / 16 at the left border.
+        // The mirrored kernel (2, 1, 0, 1, 2) · 3 weighs 12 · 3 / 16 at the left border.
         assert_eq!(pyramid.levels()[1].row(5)[0], 10.0 + 2.25);
     }
 

@@ -1,4 +1,4 @@
-//! The ways from two pixels to a point.
+//! The methods of triangulation.
 
 use seafix_component::Component;
 use seafix_geometry::{StereoRig, Triangulation, UncertainPixels, Untriangulable};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{PointRules, Triangulator};
 
-/// A triangulator by one of the rig's methods.
+/// Defines a triangulator by one of the rig's methods.
 macro_rules! triangulator {
     ($(#[$doc:meta])* $name:ident, $kebab:literal, $method:ident, $summary:literal, $source:literal) => {
         $(#[$doc])*
@@ -37,30 +37,32 @@ macro_rules! triangulator {
 }
 
 triangulator!(
-    /// The likeliest point: that whose two projections are nearest to the pixels, measured by their joint covariance.
+    /// The maximum-likelihood point, whose projections are nearest to the pixels under their joint covariance.
     Optimal,
     "optimal",
     triangulate,
-    "the likeliest point, by the joint covariance of its two pixels",
+    "the maximum-likelihood point under the joint covariance of its two pixels",
     "Hartley and Sturm, Triangulation, CVIU 1997"
 );
 
 triangulator!(
-    /// The point halfway between the two rays where they come closest. It asks no covariance for the point, and errs
-    /// with the depths of the two cameras where they differ.
+    /// The midpoint of the shortest segment between the two rays.
+    ///
+    /// It needs no covariance for the point; its error grows if the depths of the two cameras differ.
     Midpoint,
     "midpoint",
     triangulate_midpoint,
-    "halfway between the two rays where they come closest",
+    "the midpoint of the shortest segment between the two rays",
     "Beardsley, Zisserman, Murray, Sequential updating of projective and affine structure from motion, IJCV 1997"
 );
 
 triangulator!(
-    /// The least-squares solution of the four equations that are linear in the point: u (p₃ · X) = p₁ · X for each
-    /// coordinate. What it makes small has no meaning in the images.
+    /// The linear least-squares solution of the four equations u (p₃ · X) = p₁ · X, one for each coordinate.
+    ///
+    /// Limit: the algebraic error that it minimises has no meaning in the images.
     Linear,
     "linear",
     triangulate_linear,
-    "least squares of the four equations linear in the point",
+    "linear least squares of the four projection equations of the point",
     "Hartley and Sturm, Triangulation, CVIU 1997"
 );

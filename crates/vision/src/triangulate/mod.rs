@@ -1,4 +1,4 @@
-//! From matched pixels to measured points.
+//! Triangulators: from matched pixels to measured points.
 
 mod methods;
 mod rules;
@@ -10,20 +10,50 @@ use seafix_component::{Choice, Component, Registry, entry};
 use seafix_geometry::{MeasuredPoint, StereoRig, Triangulation, UncertainPixels, UncertainPoint, Untriangulable};
 use serde::Deserializer;
 
-/// Says which point two pixels show.
+/// A triangulator: computes a point from a matched pair of pixels.
+///
+/// ```
+/// # use nalgebra::{UnitQuaternion, Vector3};
+/// # use seafix_geometry::{Pinhole, Transform};
+/// use seafix_geometry::{Point, StereoRig, Triangulation, UncertainPixels, Untriangulable};
+/// use seafix_vision::{PointRules, Triangulator};
+///
+/// /// The maximum-likelihood point.
+/// #[derive(Debug, Default)]
+/// struct MaximumLikelihood {
+///     rules: PointRules,
+/// }
+///
+/// impl Triangulator for MaximumLikelihood {
+///     fn rules(&self) -> &PointRules {
+///         &self.rules
+///     }
+///
+///     fn point(&self, rig: &StereoRig, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable> {
+///         rig.triangulate(seen)
+///     }
+/// }
+///
+/// # let camera = Pinhole::new([1024, 768], [500.0, 500.0], [511.5, 383.5], &[]).unwrap();
+/// # let right_from_left = Transform::new(UnitQuaternion::identity(), Vector3::new(-0.25, 0.0, 0.0));
+/// # let rig = StereoRig::new(camera, camera, right_from_left).unwrap();
+/// let pixels = rig.project(&Point::new(0.3, -0.2, 3.0)).unwrap();
+/// let mut cloud = Vec::new();
+/// MaximumLikelihood::default().triangulate_into(&[UncertainPixels::independent(pixels, 0.1)], &rig, &mut cloud);
+/// assert!((cloud[0].position.at.coords.z - 3.0).abs() < 1e-6);
+/// ```
 pub trait Triangulator: Send + Sync + std::fmt::Debug {
-    /// What the pixels err by, and which points are kept.
+    /// The pixels' errors and the acceptance criteria.
     fn rules(&self) -> &PointRules;
 
-    /// The point that two pixels show, how well it is known when they err as their covariance says, and what they
-    /// disagree by.
+    /// The point of two pixels, its covariance from theirs, and their disagreement across the epipolar line.
     ///
     /// # Errors
-    /// [`Untriangulable`] where they show none.
+    /// [`Untriangulable`] if the pixels determine no point.
     fn point(&self, rig: &StereoRig, seen: &UncertainPixels) -> Result<Triangulation, Untriangulable>;
 
-    /// Replaces `cloud` by the points whose two pixels pass the epipolar and the χ² test and meet in front of
-    /// the cameras, in the order of `pairs`.
+    /// Replaces `cloud` by the points in front of the cameras whose pairs pass the epipolar and the χ² test, in the
+    /// order of `pairs`.
     fn triangulate_into(&self, pairs: &[UncertainPixels], rig: &StereoRig, cloud: &mut Vec<MeasuredPoint>) {
         cloud.clear();
         let PointRules { calibration_px, epipolar_px, confidence, max_depth, .. } = *self.rules();
@@ -33,7 +63,7 @@ pub trait Triangulator: Send + Sync + std::fmt::Debug {
             let calibration = Matrix4::identity() * (calibration_px * calibration_px);
             let pair = UncertainPixels { covariance: pair.covariance + calibration, ..*pair };
             let found = self.point(rig, &pair).ok()?;
-            // The distribution of χ² with one degree of freedom is P(x) = erf √(x/2).
+            // The χ² distribution with one degree of freedom is P(x) = erf √(x/2).
             let likely = libm::erf((0.5 * found.disagreement).sqrt()) <= confidence;
             let kept = likely && found.point.coords.z <= max_depth;
             kept.then_some(MeasuredPoint {
@@ -44,14 +74,14 @@ pub trait Triangulator: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// All triangulators.
+/// The registry of triangulators.
 pub static TRIANGULATORS: Registry<dyn Triangulator> =
     Registry::new("triangulator", &[entry!(Linear), entry!(Midpoint), entry!(Optimal)]);
 
-/// Reads the choice of a triangulator; settings without a name are those of `optimal`.
+/// Deserialises the choice of a triangulator; settings without a name are those of `optimal`.
 ///
 /// # Errors
-/// What is neither a name nor a table.
+/// A value that is neither a name nor a table.
 pub fn read_triangulator<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Choice, D::Error> {
     Choice::deserialize_or(deserializer, Optimal::NAME)
 }
@@ -69,7 +99,7 @@ mod tests {
         let rig = StereoRig::new(camera, camera, right).unwrap();
         let kept = |confidence, sigmas: f64| {
             let mut at = rig.project(&Point::new(0.3, -0.2, 3.0)).unwrap();
-            // Between two rows that err by 0.1 px each.
+            // The difference of two rows with an error of 0.1 px each.
             at.right.v += sigmas * 0.1 * 2f64.sqrt();
             let (rules, mut cloud) =
                 (PointRules { confidence, calibration_px: 0.0, ..PointRules::default() }, Vec::new());
@@ -78,6 +108,6 @@ mod tests {
         };
         // P(χ² ≤ 9) = 0.9973.
         assert!(kept(0.9973, 2.99) && !kept(0.9973, 3.01));
-        assert!(kept(1.0, 5.0), "no test");
+        assert!(kept(1.0, 5.0), "a confidence of 1 disables the test");
     }
 }

@@ -1,28 +1,32 @@
-//! What pixels err by, and which points are kept.
+//! The error model of pixels and the acceptance criteria of points.
 
 use seafix_component::in_range;
 use serde::{Deserialize, Serialize};
 
-/// What every triangulation is told.
+/// The settings of every triangulator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointRules {
-    /// Standard deviation of the coordinates of a key point that no corner was fitted to, from image to image (px).
+    /// Standard deviation (px) of a key point without a fitted corner, from image to image.
     pub sigma_px: f64,
-    /// How far such a key point lies off the corner that it means, in both images alike (standard deviation, px): directions
-    /// suffer, disparities do not. Of 130 corners in 60 rendered pairs of a dive Harris' maxima were .87 px off an axis
-    /// (RMS) and their disparities .13; fitted corners .16 and .05 (`cargo test -p seafix-experiment located:: -- --ignored --nocapture`).
+    /// Standard deviation (px) of the offset of a key point without a fitted corner from its true corner.
+    ///
+    /// The offset is common to both images, so it affects directions and not disparities. Harris' maxima of 130 corners
+    /// in 60 rendered pairs of a dive had an RMS offset of 0.87 px an axis and a disparity error of 0.13 px; fitted
+    /// corners had 0.16 and 0.05 (`cargo test -p seafix-experiment located:: -- --ignored --nocapture`).
     pub peak_px: f64,
-    /// Standard deviation of what the camera model leaves unexplained (px): calibration, lens, housing. It
-    /// comes to every coordinate in both images: an alignment may be good to a hundredth of a pixel, the
-    /// directions that belong to it are not.
+    /// Standard deviation (px) of the camera model's own error: calibration, lens, housing.
+    ///
+    /// It is added to each coordinate in both images: an alignment may be accurate to 0.01 px, the directions of its
+    /// pixels are not.
     pub calibration_px: f64,
-    /// Largest distance from the epipolar line (px, Sampson).
+    /// Maximum distance from the epipolar line (px, Sampson distance).
     pub epipolar_px: f64,
-    /// Share of good pairs that the χ² test of their disagreement across the epipolar line keeps, one degree of
-    /// freedom: 0.997 is three standard deviations. It asks for covariances that are right. 1: no test.
+    /// Fraction of good pairs that pass the χ² test of their epipolar disagreement; 1: no test.
+    ///
+    /// The test has one degree of freedom, so 0.997 is three standard deviations. It needs correct covariances.
     pub confidence: f64,
-    /// Largest depth worth keeping (m).
+    /// Maximum depth of an accepted point (m).
     pub max_depth: f64,
 }
 
@@ -33,10 +37,10 @@ impl Default for PointRules {
 }
 
 impl PointRules {
-    /// Whether the settings can be.
+    /// Checks the settings' ranges.
     ///
     /// # Errors
-    /// The setting that is out of its range, its value, and the range.
+    /// The invalid setting, its value and its range.
     pub(super) fn check(&self) -> Result<(), String> {
         let Self { sigma_px, peak_px, calibration_px, epipolar_px, confidence, max_depth } = *self;
         in_range(sigma_px > 0.0 && sigma_px <= 100.0, "sigma-px", sigma_px, "more than 0, at most 100 (px)")?;

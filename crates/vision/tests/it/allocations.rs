@@ -1,4 +1,4 @@
-//! A warm front end allocates nothing.
+//! A test that a warm front end allocates nothing.
 
 use std::{alloc::System, env, process::Command};
 
@@ -13,9 +13,9 @@ use crate::scenes;
 #[global_allocator]
 static ALLOCATIONS: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
-/// Whether this process runs `test` alone; if not, a process that does has passed.
+/// Whether this process runs `test` alone; otherwise a child process runs it and passes.
 ///
-/// The counters belong to the process: a test that runs beside this one would be counted.
+/// Counters are per process, so a concurrent test would be counted.
 fn alone(test: &str) -> bool {
     if env::var_os("SEAFIX_ALONE").is_some() {
         return true;
@@ -28,10 +28,9 @@ fn alone(test: &str) -> bool {
     false
 }
 
-/// Every listed detector, locator, descriptor, matcher, refinement and triangulator in a pipeline of defaults: the third look at a pair of
-/// images, whose memory the first two have made, allocates nothing.
+/// The third pair of images causes no allocation, with each component in a pipeline of defaults.
 ///
-/// Seen to fail when the band's pairs are collected into a new vector.
+/// The first two pairs allocate the buffers. Seen to fail when the band's pairs are collected into a new vector.
 #[test]
 fn a_warm_pair_allocates_nothing() {
     if !alone("allocations::a_warm_pair_allocates_nothing") {
@@ -60,12 +59,12 @@ fn a_warm_pair_allocates_nothing() {
         let [detector, locator, descriptor, matcher, refinement, triangulator] = pipeline.map(Choice::named);
         let front_end = FrontEnd {
             filters: Vec::new(),
-            detector: DETECTORS.build(&detector).expect("a detector"),
-            locator: LOCATORS.build(&locator).expect("a locator"),
-            descriptor: DESCRIPTORS.build(&descriptor).expect("a descriptor"),
-            matcher: MATCHERS.build(&matcher).expect("a matcher"),
-            refinement: REFINEMENTS.build(&refinement).expect("a refinement"),
-            triangulator: TRIANGULATORS.build(&triangulator).expect("a triangulator"),
+            detector: DETECTORS.build(&detector).expect("a valid detector"),
+            locator: LOCATORS.build(&locator).expect("a valid locator"),
+            descriptor: DESCRIPTORS.build(&descriptor).expect("a valid descriptor"),
+            matcher: MATCHERS.build(&matcher).expect("a valid matcher"),
+            refinement: REFINEMENTS.build(&refinement).expect("a valid refinement"),
+            triangulator: TRIANGULATORS.build(&triangulator).expect("a valid triangulator"),
         };
         let mut front_end_output = FrontEndOutput::new(Threads::One);
         (0..2).for_each(|_| front_end.run(&left, &right, &rig, &mut front_end_output));
@@ -73,7 +72,7 @@ fn a_warm_pair_allocates_nothing() {
         front_end.run(&left, &right, &rig, &mut front_end_output);
         let change = region.change();
         assert_eq!((change.allocations, change.reallocations), (0, 0), "{pipeline:?}");
-        // Nothing here is a corner of a board or a box.
+        // These images have no corner of a chequerboard or a box.
         let made = ["l-corner", "x-corner"].contains(&pipeline[0]);
         assert!(made || front_end_output.cloud.len() > 20, "{pipeline:?}: {}", front_end_output.cloud.len());
     }

@@ -1,12 +1,12 @@
-//! Laws of all descriptors.
+//! Properties of all descriptors.
 
 use seafix_component::Choice;
 use seafix_geometry::Pixel;
 use seafix_vision::{DESCRIPTORS, Descriptor, Descriptors, Image, Keypoint, Threads, Workspace};
 
-/// Every descriptor with its default settings, and with each setting that is yes or no turned over.
+/// Each descriptor with its default settings, and with each Boolean setting inverted.
 fn all() -> Vec<(String, Box<dyn Descriptor>)> {
-    let build = |choice: &Choice| DESCRIPTORS.build(choice).expect("these are settings");
+    let build = |choice: &Choice| DESCRIPTORS.build(choice).expect("valid settings");
     let mut all = Vec::new();
     for listing in DESCRIPTORS.listings() {
         let flags: Vec<_> = listing.defaults.iter().filter_map(|(key, value)| Some((key, value.as_bool()?))).collect();
@@ -21,9 +21,9 @@ fn all() -> Vec<(String, Box<dyn Descriptor>)> {
     all
 }
 
-/// The descriptors that can be as wide as a key point is, upright and turned.
+/// The descriptors with a window of the key point's scale, upright and rotated.
 fn at_own_scale() -> Vec<(String, Box<dyn Descriptor>)> {
-    let build = |choice: &Choice| DESCRIPTORS.build(choice).expect("these are settings");
+    let build = |choice: &Choice| DESCRIPTORS.build(choice).expect("valid settings");
     let mut all = Vec::new();
     for listing in DESCRIPTORS.listings().iter().filter(|listing| listing.defaults.contains_key("scale")) {
         let own = Choice::named(listing.name).with("scale", 0.0);
@@ -37,7 +37,7 @@ fn at_own_scale() -> Vec<(String, Box<dyn Descriptor>)> {
 
 fn image(width: usize, height: usize, f: impl Fn(f64, f64) -> f64) -> Image {
     let pixels = (0..width * height).map(|i| f((i % width) as f64, (i / width) as f64) as f32).collect();
-    Image::new(width, height, pixels).expect("so many pixels")
+    Image::new(width, height, pixels).expect("width × height pixels")
 }
 
 /// Waves of several lengths and directions.
@@ -61,7 +61,7 @@ fn keypoints(width: usize, height: usize) -> Vec<Keypoint> {
     points
 }
 
-/// How far apart two descriptors are, of how much: their greatest difference, or the share of bits.
+/// The distance of two descriptors relative to their magnitude: the largest difference, or the fraction of bits.
 fn apart(a: &Descriptors, b: &Descriptors, i: usize) -> f64 {
     match (a, b) {
         (Descriptors::Numbers(a), Descriptors::Numbers(b)) => {
@@ -71,10 +71,12 @@ fn apart(a: &Descriptors, b: &Descriptors, i: usize) -> f64 {
             let differ: u32 = a.row(i).iter().zip(b.row(i)).map(|(a, b)| (a ^ b).count_ones()).sum();
             f64::from(differ) / (64 * a.length()) as f64
         }
-        _ => panic!("numbers and bits"),
+        _ => panic!("descriptors of different kinds"),
     }
 }
 
+/// Descriptors are invariant under brightness offset and contrast.
+///
 /// Seen to fail when a patch keeps its mean.
 #[test]
 fn light_and_contrast_drop_out() {
@@ -90,7 +92,9 @@ fn light_and_contrast_drop_out() {
     }
 }
 
-/// Seen to fail when SURF is divided by the sum of its numbers' sizes.
+/// Numbers have unit length, or are zero in a flat region.
+///
+/// Seen to fail when SURF is divided by the sum of the absolute values.
 #[test]
 fn numbers_have_unit_length_or_nothing_changes() {
     let points = keypoints(120, 90);
@@ -107,7 +111,9 @@ fn numbers_have_unit_length_or_nothing_changes() {
     }
 }
 
-/// Seen to fail when pixels beyond the last are looked for.
+/// Any key point of any image has a descriptor.
+///
+/// Seen to fail when pixels beyond the border are read.
 #[test]
 fn any_image_and_any_key_point_are_described() {
     let mut points = keypoints(3, 3);
@@ -132,11 +138,13 @@ fn any_image_and_any_key_point_are_described() {
     }
 }
 
-/// Seen to fail when the smaller images of the image before stay.
+/// Results do not depend on threads or earlier contents of the workspace.
+///
+/// Seen to fail when the halves of the previous image remain.
 #[test]
 fn the_result_is_the_same_for_any_threads_and_in_used_memory() {
     let (large, small) = (image(160, 110, waves), image(40, 50, |x, y| waves(3.0 * x, y)));
-    // Twice as wide: from 6 px on smaller images are looked at.
+    // Windows of twice the width; from 6 px on they use the halved images.
     let wide = |points: Vec<Keypoint>| points.into_iter().map(|p| Keypoint { scale: 2.0 * p.scale, ..p }).collect();
     let (many, few): (Vec<_>, Vec<_>) = (wide(keypoints(160, 110)), wide(keypoints(40, 50)));
     for (name, descriptor) in all().into_iter().chain(at_own_scale()) {
@@ -150,7 +158,9 @@ fn the_result_is_the_same_for_any_threads_and_in_used_memory() {
     }
 }
 
-/// Seen to fail when the pattern turns against its surroundings.
+/// Rotated descriptors are invariant under a quarter turn of the image.
+///
+/// Seen to fail when the pattern rotates in the opposite direction.
 #[test]
 fn what_turns_with_its_surroundings_follows_a_quarter_turn() {
     let choices = [
@@ -160,13 +170,13 @@ fn what_turns_with_its_surroundings_follows_a_quarter_turn() {
     ];
     let (width, height) = (140, 110);
     let before = image(width, height, waves);
-    // (x, y) goes to (y, width − 1 − x).
+    // A quarter turn moves (x, y) to (y, width − 1 − x).
     let after = image(height, width, |x, y| waves((width - 1) as f64 - y, x));
     let points = keypoints(width, height);
     let turned: Vec<_> =
         points.iter().map(|p| Keypoint { at: Pixel { u: p.at.v, v: (width - 1) as f64 - p.at.u }, ..*p }).collect();
     for choice in choices {
-        let descriptor = DESCRIPTORS.build(&choice).expect("these are settings");
+        let descriptor = DESCRIPTORS.build(&choice).expect("valid settings");
         let (a, b) = (descriptor.describe(&before, &points), descriptor.describe(&after, &turned));
         let min = if a.numbers().is_some() { 1e-4 } else { 2.0 / 256.0 };
         for (i, point) in points.iter().enumerate() {

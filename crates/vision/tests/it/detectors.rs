@@ -1,4 +1,4 @@
-//! Laws of every detector.
+//! Properties of all detectors.
 
 use seafix_component::Choice;
 use seafix_geometry::Pixel;
@@ -11,15 +11,14 @@ fn hash(x: usize, y: usize) -> u32 {
     h ^ (h >> 13)
 }
 
-/// A patchwork of dark and bright cells of 7 px with a little noise: whole grey levels from 0 to 203.
+/// A patchwork of dark and bright cells of 7 px with a little noise: integer grey levels from 0 to 203.
 fn patchwork(width: usize, height: usize) -> Image {
     let value = |x: usize, y: usize| (hash(x / 7, y / 7) % 200 + hash(x, y) % 5) as f32;
     Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect())
-        .expect("as many as it has")
+        .expect("width × height pixels")
 }
 
-/// What a detector is shown: the patchwork or, for those that fit a model to corners, a board whose cells of 11 px
-/// have often changed colour, blurred as by a lens.
+/// The test image of a detector: the patchwork or, for corner models, a blurred board of random cells of 11 px.
 fn shown(name: &str, width: usize, height: usize) -> Image {
     if !["l-corner", "x-corner"].contains(&name) {
         return patchwork(width, height);
@@ -33,18 +32,18 @@ fn shown(name: &str, width: usize, height: usize) -> Image {
     let row = |x: usize, y: usize| sharp(x.saturating_sub(1), y) + 2.0 * sharp(x, y) + sharp(x + 1, y);
     let value = |x: usize, y: usize| (row(x, y.saturating_sub(1)) + 2.0 * row(x, y) + row(x, y + 1)) / 16.0;
     Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect())
-        .expect("as many as it has")
+        .expect("width × height pixels")
 }
 
 fn cut(image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> Image {
     let pixels = (0..height).flat_map(|y| image.row(top + y)[left..left + width].iter().copied()).collect();
-    Image::new(width, height, pixels).expect("as many as it has")
+    Image::new(width, height, pixels).expect("width × height pixels")
 }
 
-/// Runs the law on every detector, with those settings changed that it has.
+/// Applies the property to each detector, with the settings changed that it has.
 ///
-/// No budget, and no threshold relative to the strongest of the image: which of two equals is the last,
-/// where a grid's lines fall and what else is in the image must not matter.
+/// There is no maximum number and no threshold relative to the strongest response, so the property does not depend on
+/// the order of equals, on the position of a grid's lines, or on other parts of the image.
 fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
     for listing in DETECTORS.listings() {
         let mut choice = Choice::named(listing.name);
@@ -61,13 +60,14 @@ fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
         if has("window") {
             choice = choice.with("window", window);
         }
-        law(listing.name, &*DETECTORS.build(&choice).expect("the defaults are settings"));
+        law(listing.name, &*DETECTORS.build(&choice).expect("valid defaults"));
     }
 }
 
-/// How far rounding may move a point (px) when an image is brighter, or turned: sums of f32 then are
-/// rounded another way, a response moves by some 1e-6 of itself, and its vertex by that over the
-/// curvature. Differences of whole grey levels, and sums of these in a box, are exact.
+/// The largest shift of a point by rounding (px) in a brighter or rotated image.
+///
+/// Sums of f32 are rounded differently then; a response changes by about 1e-6 of itself, and its vertex by that over
+/// the curvature. Differences of integer grey levels, and their sums in a box, are exact.
 fn rounding(name: &str, turned: bool) -> f64 {
     match name {
         "fast" => 1e-9,
@@ -76,7 +76,7 @@ fn rounding(name: &str, turned: bool) -> f64 {
     }
 }
 
-/// Every point of `a` is in `b`, at most this far away (px).
+/// Asserts that each point of `a` has one of `b` within `tolerance` (px).
 fn within(name: &str, a: &[Keypoint], b: &[Keypoint], tolerance: f64) {
     for point in a {
         let nearest = b.iter().map(|other| other.at.distance(&point.at)).fold(f64::INFINITY, f64::min);
@@ -90,10 +90,10 @@ fn same(name: &str, a: &[Keypoint], b: &[Keypoint], tolerance: f64) {
     within(name, a, b, tolerance);
 }
 
-/// P55. Sides of 16 n + 1 px, so that a pyramid or a coarser grid falls on the same pixels; of 16 n px
-/// for detectors that bin pixels.
+/// P55. A quarter turn of the image turns the key points.
 ///
-/// Seen to fail when the gradient down the image counts a tenth more than that across.
+/// Sides are 16 n + 1 px, so that a pyramid or a coarser grid samples the same pixels; 16 n px for detectors that bin
+/// pixels. Seen to fail when the vertical gradient counts a tenth more than the horizontal one.
 #[test]
 fn a_quarter_turn_of_the_image_turns_the_points() {
     for (width, height) in [(161, 129), (160, 128)] {
@@ -106,13 +106,13 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
         every(window, |name, detector| {
             let mut image = shown(name, width, height);
             if window == "gaussian" {
-                // Of equals the first counts, and which is the first turns with the image: no two may be equal.
+                // The first of equals counts and changes with the rotation, so no two values may be equal.
                 let pixels = image.pixels_mut().iter_mut().enumerate();
                 pixels.for_each(|(i, pixel)| *pixel += (hash(i, 1) % 1024) as f32 / 1024.0);
             }
-            // (x, y) goes to (y, width − 1 − x): a quarter turn to the left.
+            // A quarter turn to the left moves (x, y) to (y, width − 1 − x).
             let turned = (0..width * height).map(|i| image.row(i % height)[width - 1 - i / height]).collect();
-            let turned = Image::new(height, width, turned).expect("as many as it has");
+            let turned = Image::new(height, width, turned).expect("width × height pixels");
             let tolerance = match (window, name) {
                 ("box", "harris" | "shi-tomasi") => 1e-9,
                 ("box", _) => return,
@@ -126,12 +126,13 @@ fn turn(width: usize, height: usize, concerns: impl Fn(&str) -> bool) {
     }
 }
 
-/// P55, away from the border: a point's surroundings, ten times its scale, are in both images.
+/// P55. A shift of the image by integer pixels shifts the key points away from the border.
 ///
-/// Seen to fail when rows of the response that are kept for the next ones are moved by one.
+/// Their surroundings of ten times the scale lie in both images. Seen to fail when the kept rows of a response are
+/// moved by one.
 #[test]
 fn a_shift_by_integer_pixels_shifts_the_points() {
-    // Down by another number than that of the rows which are worked on at a time.
+    // The vertical shift differs from the number of rows in a block.
     let (size, shift) = ([193, 177], [32, 16]);
     every("gaussian", |name, detector| {
         let big = shown(name, 225, 193);
@@ -153,7 +154,7 @@ fn a_shift_by_integer_pixels_shifts_the_points() {
     });
 }
 
-/// P56: 40 grey levels more, nothing clips.
+/// P56. An offset of 40 grey levels without clipping changes nothing.
 ///
 /// Seen to fail when one pixel of the gradient's six counts a thousandth more.
 #[test]
@@ -166,7 +167,7 @@ fn more_light_everywhere_changes_nothing() {
     });
 }
 
-/// P57.
+/// P57. A flat image has no key points.
 ///
 /// Seen to fail when the size of the image is not compared with the operator's.
 #[test]
@@ -181,6 +182,8 @@ fn an_image_without_structure_has_no_point() {
     });
 }
 
+/// Any size and any finite values are valid.
+///
 /// Seen to fail when an image may be as small as one margin of the operator.
 #[test]
 fn any_size_and_any_finite_values_are_an_image() {
@@ -197,9 +200,9 @@ fn any_size_and_any_finite_values_are_an_image() {
     });
 }
 
-/// Whoever works, and whatever was looked at before, brighter or darker.
+/// Results do not depend on threads or on earlier images, brighter or darker.
 ///
-/// Seen to fail when the strongest response of the image before stays, and when rows are left where they were.
+/// Seen to fail when the strongest response of the previous image remains, and when rows are not moved.
 #[test]
 fn threads_and_memory_change_no_bit() {
     for listing in DETECTORS.listings() {
@@ -218,7 +221,9 @@ fn threads_and_memory_change_no_bit() {
     }
 }
 
-/// Seen to fail when one more stays.
+/// The maximum number of key points is respected.
+///
+/// Seen to fail when one more is kept.
 #[test]
 fn the_budget_is_kept() {
     for listing in DETECTORS.listings().iter().filter(|listing| listing.defaults.contains_key("features")) {

@@ -1,9 +1,9 @@
-//! Laws of every filter.
+//! Properties of all filters.
 
 use seafix_component::Choice;
 use seafix_vision::{FILTERS, Filter, Image, Threads, Workspace};
 
-/// Every filter with its defaults, and with others where they lead another way.
+/// Each filter with its defaults, and with other settings that select other code.
 fn filters() -> Vec<(String, Box<dyn Filter>)> {
     let mut choices: Vec<Choice> = FILTERS.names().map(Choice::named).collect();
     choices.push(Choice::named("median").with("radius", 2));
@@ -19,6 +19,8 @@ fn texture(width: usize, height: usize) -> Image {
     Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect()).unwrap()
 }
 
+/// A constant image stays constant.
+///
 /// Seen to fail when a mean counts one pixel too many.
 #[test]
 fn a_constant_image_stays_constant() {
@@ -36,7 +38,9 @@ fn a_constant_image_stays_constant() {
     }
 }
 
-/// Seen to fail when what is beyond white is not cut off.
+/// Results are finite and within 0 to 255.
+///
+/// Seen to fail when values above white are not clipped.
 #[test]
 fn what_comes_out_is_finite_and_within_the_range() {
     let extreme = |i: usize| [0.0, f32::MAX, -f32::MAX, 1e-40, 255.0, -1.0, 65535.0][i % 7];
@@ -51,15 +55,17 @@ fn what_comes_out_is_finite_and_within_the_range() {
     }
 }
 
+/// Filters commute with a shift of the image.
+///
 /// Seen to fail when a band of rows begins without the last row above it.
 #[test]
 fn an_image_shifted_is_filtered_and_shifted() {
-    // Turned around its borders, so that the mean of the image stays.
+    // The shift is cyclic, which preserves the mean of the image.
     let (width, height, across, down) = (260, 220, 5, 3);
     let image = texture(width, height);
     let pixel = |i: usize| image.row((i / width + down) % height)[(i % width + across) % width];
     let shifted = Image::new(width, height, (0..width * height).map(pixel).collect()).unwrap();
-    // The tiles of CLAHE stay where they are; σ = 40 px reaches everywhere in this image.
+    // The tiles of CLAHE do not shift; σ = 40 px extends over the complete image.
     let local = filters().into_iter().filter(|(_, filter)| {
         let name = format!("{filter:?}");
         !name.contains("Clahe") && !name.contains("sigma: 40.0")
@@ -76,7 +82,9 @@ fn an_image_shifted_is_filtered_and_shifted() {
     }
 }
 
-/// Seen to fail when a histogram keeps the counts of the one before, and when a band takes the rows of the first.
+/// Results do not depend on threads or earlier contents of the workspace.
+///
+/// Seen to fail when a histogram keeps earlier counts, and when a band takes the rows of the first.
 #[test]
 fn threads_and_memory_change_nothing() {
     let images = [texture(150, 333), texture(40, 30), texture(301, 170)];
@@ -84,8 +92,8 @@ fn threads_and_memory_change_nothing() {
         let mut used = [Workspace::new(Threads::One), Workspace::new(Threads::Pool)];
         for image in &images {
             let expected = filter.filtered(image);
-            // Under a σ wider than the image the background is its mean.
-            assert!(image.width() < 100 || expected != *image, "{name} does something");
+            // The background under a σ wider than the image is its mean.
+            assert!(image.width() < 100 || expected != *image, "{name} changes nothing");
             for work in &mut used {
                 let mut copy = image.clone();
                 filter.apply(&mut copy, work);

@@ -1,4 +1,4 @@
-//! Laws of the whole front end, on rigs of any kind.
+//! Properties of the front end on rigs of any kind.
 
 use nalgebra::Matrix4;
 use seafix_component::Choice;
@@ -13,28 +13,28 @@ use crate::scenes;
 fn front_end(matcher: &str) -> FrontEnd {
     FrontEnd {
         filters: Vec::new(),
-        detector: DETECTORS.build(&Choice::named("harris").with("features", 400)).expect("a detector"),
-        locator: LOCATORS.build(&Choice::named("corner")).expect("a locator"),
-        descriptor: DESCRIPTORS.build(&Choice::named("surf")).expect("a descriptor"),
-        matcher: MATCHERS.build(&Choice::named(matcher)).expect("a matcher"),
+        detector: DETECTORS.build(&Choice::named("harris").with("features", 400)).expect("a valid detector"),
+        locator: LOCATORS.build(&Choice::named("corner")).expect("a valid locator"),
+        descriptor: DESCRIPTORS.build(&Choice::named("surf")).expect("a valid descriptor"),
+        matcher: MATCHERS.build(&Choice::named(matcher)).expect("a valid matcher"),
         refinement: Box::new(Direct::default()),
         triangulator: Box::new(Optimal::default()),
     }
 }
 
-/// The default but for the refinement between the views.
+/// The default front end with another refinement.
 fn refined(name: &str) -> FrontEnd {
-    let refinement = REFINEMENTS.build(&Choice::named(name)).expect("a refinement");
+    let refinement = REFINEMENTS.build(&Choice::named(name)).expect("a valid refinement");
     FrontEnd { refinement, ..front_end("epipolar-band") }
 }
 
-/// The default but for the triangulation.
+/// The default front end with another triangulator.
 fn triangulated(name: &str) -> FrontEnd {
-    let triangulator = TRIANGULATORS.build(&Choice::named(name)).expect("a triangulator");
+    let triangulator = TRIANGULATORS.build(&Choice::named(name)).expect("a valid triangulator");
     FrontEnd { triangulator, ..front_end("epipolar-band") }
 }
 
-/// Beside, above, turned towards each other, rolled, behind strong lenses, one before the other.
+/// Rigs side by side, vertical, converging, rolled, with strong lenses, and one camera ahead of the other.
 fn rigs() -> Vec<(&'static str, StereoRig)> {
     let strong = [-0.32, 0.12, 1e-3, -1e-3];
     vec![
@@ -47,11 +47,11 @@ fn rigs() -> Vec<(&'static str, StereoRig)> {
     ]
 }
 
-/// Most key points become points of the plane, and at most one in a hundred is another place of the right image, more
-/// than 1.5 px from the truth: in clear water, and with a contrast of a few grey levels under noise of ±2.
+/// Most key points become points of the plane, and at most 1 % have a right pixel more than 1.5 px from the truth.
 ///
-/// Seen to fail when pairs that cannot be aligned stay: under noise one in four of the band's is false; and when the
-/// right image's part of the noise is forgotten in the covariance.
+/// This holds in clear water, and with a contrast of a few grey levels under noise of ±2. Seen to fail when pairs
+/// without alignment are kept (under noise a quarter of the band's are false), and when the right image's noise is
+/// missing from the covariance.
 #[test]
 fn the_cloud_lies_on_the_plane() {
     for (name, rig) in rigs() {
@@ -78,10 +78,11 @@ fn the_cloud_lies_on_the_plane() {
     }
 }
 
-/// On a plane that is tiled without end hardly a point is a tile off: where the rig cannot tell one tile from the next
-/// there is none, and where the tiles do not follow each other along the epipolar lines they are right.
+/// Hardly a point of an endlessly tiled plane is a tile off.
 ///
-/// Seen to fail when the points around ambiguous ones stay: 29 of the 31 points of a vertical rig were wrong.
+/// No point remains if the rig cannot distinguish a tile from the next; points are right if the tiles do not follow
+/// each other along the epipolar lines. Seen to fail when the points around ambiguous ones are kept: 29 of the 31
+/// points of a vertical rig were wrong.
 #[test]
 fn a_pattern_without_end_misleads_hardly_a_point() {
     for (name, rig) in rigs() {
@@ -100,10 +101,9 @@ fn a_pattern_without_end_misleads_hardly_a_point() {
     }
 }
 
-/// Alignment finds where the right image shows a left place within a few hundredths of a pixel, for every rig and warp,
-/// from a start half a pixel beside it.
+/// Alignment has an error of a few hundredths of a pixel for every rig and warp, from a start half a pixel away.
 ///
-/// Seen to fail when the window is laid over the right image as it is, whatever the rig, and when its mean stays.
+/// Seen to fail when the window is not deformed for the rig, and when its mean is not subtracted.
 #[test]
 fn alignment_finds_the_place_for_every_rig() {
     for (name, rig) in rigs() {
@@ -133,17 +133,16 @@ fn alignment_finds_the_place_for_every_rig() {
                 found.iter().zip(&pairs).map(|(found, (_, truth))| found.at.right.distance(truth)).collect();
             errors.sort_by(f64::total_cmp);
             let (median, max) = (errors[errors.len() / 2], errors[errors.len() * 9 / 10]);
-            println!("{name}, {warp:?}: {} pairs, median {median:.4} px, nine in ten {max:.4} px", errors.len());
+            println!("{name}, {warp:?}: {} pairs, median {median:.4} px, 90 % below {max:.4} px", errors.len());
             assert!(median < 0.05 && max < 0.2, "{name}, {warp:?}: {median} and {max} px");
         }
     }
 }
 
-/// Every refinement says how far its disparities are off: across all matches of a plane that is seen by a rectified rig
-/// the normalised error squared is about one in the median, which is .45 for χ² of one degree of freedom, and they are
-/// better than what the matcher said.
+/// Every refinement states the error of its disparities correctly and improves on the matcher.
 ///
-/// Seen to fail when `zncc-parabola` claims a tenth of its variance.
+/// On a plane and a rectified rig the median of the normalised squared error must be about 0.45, that of χ² with one
+/// degree of freedom. Seen to fail when `zncc-parabola` claims a tenth of its variance.
 #[test]
 fn every_refinement_has_an_error_as_it_states() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
@@ -173,11 +172,11 @@ fn every_refinement_has_an_error_as_it_states() {
     assert!(of("direct") < of("zncc-parabola") && of("zncc-parabola") < 0.5 * of("none"), "{spreads:?}");
 }
 
-/// What key points lie off their corners enters both images alike, whatever refines them: every coordinate's variance and the
-/// covariance of the same coordinate in both grow by its square, that of a disparity does not; fitted corners stay as they
-/// are.
+/// The offset of a key point from its corner is an error common to both images, whatever the refinement.
 ///
-/// Seen to fail when only the left image's coordinates are given it, and when fitted corners are given it too.
+/// Each coordinate's variance and its covariance with the same coordinate of the other image grow by the squared
+/// offset; the variance of a disparity does not. Fitted corners have no such error. Seen to fail when only the left
+/// image's coordinates have it, and when fitted corners have it too.
 #[test]
 fn peaks_lie_off_their_corners_in_both_images_alike() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
@@ -187,7 +186,7 @@ fn peaks_lie_off_their_corners_in_both_images_alike() {
         for locator in ["peak", "corner"] {
             let seen = [0.0, 0.9].map(|peak_px| {
                 let mut stages = refined(refinement);
-                stages.locator = LOCATORS.build(&Choice::named(locator)).expect("a locator");
+                stages.locator = LOCATORS.build(&Choice::named(locator)).expect("a valid locator");
                 stages.triangulator = Box::new(Optimal(PointRules { peak_px, ..PointRules::default() }));
                 let mut output = FrontEndOutput::new(Threads::One);
                 stages.run(&left, &right, &rig, &mut output);
@@ -209,9 +208,9 @@ fn peaks_lie_off_their_corners_in_both_images_alike() {
     assert!(fitted > 0);
 }
 
-/// An image of 16 bits in dim light shows what the bright one does: 16 levels of grey, each cut into 257, keep the points.
+/// A dim image of 16 bits keeps the points of the bright one: 16 grey levels, each divided into 257.
 ///
-/// Seen to fail when finer levels are believed to err by rounding to 8 bits: one point in six is lost at 16 levels.
+/// Seen to fail when finer levels have the rounding error of 8 bits: one point in six is lost.
 #[test]
 fn dim_images_of_many_bits_keep_their_points() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
@@ -225,15 +224,15 @@ fn dim_images_of_many_bits_keep_their_points() {
     let [many, few] = [&bright, &dim].map(|[left, right]| {
         let mut output = FrontEndOutput::new(Threads::One);
         let mut stages = front_end("epipolar-band");
-        // Contrast is counted in grey levels: a sixteenth of it is left.
-        stages.locator = LOCATORS.build(&Choice::named("peak")).expect("a locator");
+        // Contrast is in grey levels, of which a sixteenth remains.
+        stages.locator = LOCATORS.build(&Choice::named("peak")).expect("a valid locator");
         stages.run(left, right, &rig, &mut output);
         output.cloud.len()
     });
     assert!(many > 100 && 10 * few >= 9 * many, "{few} of {many}");
 }
 
-/// Whoever works, and whatever was looked at before.
+/// Results do not depend on threads or on earlier images.
 ///
 /// Seen to fail when every piece of the alignment begins at the first pair.
 #[test]

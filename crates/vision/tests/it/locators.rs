@@ -1,4 +1,4 @@
-//! Laws of every locator.
+//! Properties of all locators.
 
 use seafix_component::Choice;
 use seafix_geometry::Pixel;
@@ -12,7 +12,7 @@ fn hash(x: usize, y: usize) -> u32 {
     h ^ (h >> 13)
 }
 
-/// A board of 12 px whose cells have often changed colour, blurred as by a lens: X corners, L corners, and neither.
+/// A blurred board of random cells of 12 px, with X corners, L corners and neither.
 fn board(width: usize, height: usize) -> Image {
     let cell = |x: usize, y: usize| {
         let bright = (x + y).is_multiple_of(2) ^ hash(x, y).is_multiple_of(4);
@@ -26,7 +26,7 @@ fn board(width: usize, height: usize) -> Image {
 
 fn made(width: usize, height: usize, value: impl Fn(usize, usize) -> f32) -> Image {
     Image::new(width, height, (0..width * height).map(|i| value(i % width, i / width)).collect())
-        .expect("as many as it has")
+        .expect("width × height pixels")
 }
 
 fn corners(image: &Image) -> Vec<Keypoint> {
@@ -39,7 +39,7 @@ fn every(law: impl Fn(&str, &dyn Locator)) {
     }
 }
 
-/// The same key points are located, at the same places to this many pixels.
+/// Asserts that the same key points are located, at the same positions within `tolerance` (px).
 fn same(name: &str, found: &[Option<UncertainPixel>], expected: &[Option<UncertainPixel>], tolerance: f64) {
     let located = expected.iter().flatten().count();
     assert!(name == "peak" || located > 15, "{name}: {located}");
@@ -55,12 +55,12 @@ fn same(name: &str, found: &[Option<UncertainPixel>], expected: &[Option<Uncerta
     }
 }
 
-/// What rounding may move a place by (px): the fits end when a step is short, some 1e-4 px from their end.
+/// The largest shift by rounding (px): fits end with a short step, about 1e-4 px from their limit.
 const ROUNDING: f64 = 1e-3;
 
-/// Light that is added and contrast that is changed move nothing.
+/// Positions are invariant under brightness offset and contrast.
 ///
-/// Seen to fail when the fit's derivative by the row changes its sign.
+/// Seen to fail when the fit's derivative by the row has the wrong sign.
 #[test]
 fn light_and_contrast_move_nothing() {
     let image = board(SIDE, SIDE);
@@ -69,9 +69,9 @@ fn light_and_contrast_move_nothing() {
     every(|name, locator| same(name, &locator.locate(&other, &points), &locator.locate(&image, &points), ROUNDING));
 }
 
-/// An image shifted by whole pixels has its corners there.
+/// A shift of the image by integer pixels shifts the corners.
 ///
-/// Seen to fail when a fit's place depends on where its window lies in the image.
+/// Seen to fail when a fit depends on its window's position in the image.
 #[test]
 fn a_shift_by_integer_pixels_shifts_the_places() {
     let image = board(SIDE, SIDE);
@@ -88,9 +88,9 @@ fn a_shift_by_integer_pixels_shifts_the_places() {
     });
 }
 
-/// An image turned by a quarter has its corners there, and their covariances turned.
+/// A quarter turn of the image turns the corners and their covariances.
 ///
-/// Seen to fail when the junction weighs the gradient down the image otherwise than that across.
+/// Seen to fail when the junction weighs vertical gradients differently from horizontal ones.
 #[test]
 fn a_quarter_turn_turns_the_places() {
     let image = board(SIDE, SIDE);
@@ -110,9 +110,9 @@ fn a_quarter_turn_turns_the_places() {
     });
 }
 
-/// No corner is taken that lies further than 3.5 px from its key point.
+/// A corner is at most 3.5 px from its key point.
 ///
-/// Seen to fail when a fit is believed wherever it ends.
+/// Seen to fail when a fit is accepted wherever it ends.
 #[test]
 fn a_place_is_near_its_key_point() {
     let image = board(SIDE, SIDE);
@@ -129,7 +129,7 @@ fn a_place_is_near_its_key_point() {
     });
 }
 
-/// Wherever a key point is and whatever the image, there is a place with a covariance or none, and never in a flat image.
+/// Any key point of any image gives a position with a covariance, or none; a flat image gives none.
 ///
 /// Seen to fail when windows may leave the image.
 #[test]
@@ -149,7 +149,7 @@ fn any_key_point_of_any_image_is_examined() {
                 let found = locator.locate(&image, &points);
                 assert_eq!(found.len(), points.len(), "{name}");
                 for place in found.iter().flatten() {
-                    assert!(scale > 0.0, "{name}: {place:?} where nothing is");
+                    assert!(scale > 0.0, "{name}: {place:?} in a flat image");
                     let finite = place.at.u.is_finite() && place.covariance.iter().all(|c| c.is_finite());
                     assert!(finite && place.covariance.trace() >= 0.0, "{name}: {place:?}");
                 }
@@ -159,9 +159,9 @@ fn any_key_point_of_any_image_is_examined() {
     });
 }
 
-/// Whoever works, and whatever was looked at before.
+/// Results do not depend on threads or earlier contents of the workspace.
 ///
-/// Seen to fail when a piece begins at the first key point, and when a fit keeps the mean of the window before.
+/// Seen to fail when a piece begins at the first key point, and when a fit keeps the mean of the previous window.
 #[test]
 fn threads_and_memory_change_no_bit() {
     let images = [board(SIDE, SIDE), board(60, 90), board(SIDE, SIDE)];

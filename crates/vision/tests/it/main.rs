@@ -1,6 +1,6 @@
-//! Laws of every component of vision.
+//! Properties of the components of seafix-vision.
 
-#![allow(clippy::unwrap_used, reason = "a test may stop at once, and says what it measured")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod allocations;
 mod descriptors;

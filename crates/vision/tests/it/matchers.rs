@@ -1,4 +1,4 @@
-//! Laws that every matcher obeys, on rigs of any kind, over numbers and bits.
+//! Properties of all matchers, on rigs of any kind, with numbers and bits.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_component::Choice;
@@ -15,12 +15,12 @@ fn numbers(seed: u32) -> impl FnMut() -> f32 {
 
 const SIZE: usize = 320;
 
-/// Rigs beside, above and before each other, turned, with lens distortion.
+/// Rigs side by side, vertical, and one camera ahead of the other, rotated, with lens distortion.
 fn rigs() -> [StereoRig; 3] {
     let rig = |step: Vector3<f64>, turn: Vector3<f64>, lens: &[f64]| {
-        let camera = Pinhole::new([SIZE as u32; 2], [200.0, 201.0], [159.0, 161.0], lens).expect("a camera");
+        let camera = Pinhole::new([SIZE as u32; 2], [200.0, 201.0], [159.0, 161.0], lens).expect("a valid camera");
         let rotation = UnitQuaternion::from_scaled_axis(turn);
-        StereoRig::new(camera, camera, Transform::new(rotation, rotation * -step)).expect("a rig")
+        StereoRig::new(camera, camera, Transform::new(rotation, rotation * -step)).expect("a valid rig")
     };
     [
         rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros(), &[]),
@@ -29,7 +29,7 @@ fn rigs() -> [StereoRig; 3] {
     ]
 }
 
-/// What one camera of a scene shows: an image, key points, descriptors as numbers and as bits.
+/// One camera's part of a scene: image, key points, descriptors as numbers and as bits.
 struct Seen {
     image: Image,
     keypoints: Vec<Keypoint>,
@@ -42,8 +42,9 @@ impl Seen {
     }
 }
 
-/// `n` points of a smooth surface, seen from both sides, in reverse order on the right; each is a spot of
-/// its own pattern in both images.
+/// The two views of `n` points on a smooth surface, in reverse order on the right.
+///
+/// Each point is a spot with its own pattern in both images.
 fn scene(rig: &StereoRig, n: usize) -> [Seen; 2] {
     let mut next = numbers(17);
     let mut seen: Vec<StereoPixels> = Vec::new();
@@ -90,10 +91,10 @@ fn every(mut law: impl FnMut(&str, &dyn Matcher)) {
     }
 }
 
-/// The matchers that look for a place in the right image, whatever key points it has.
+/// The matchers that search the right image and ignore its key points.
 const PLACES: [&str; 2] = ["lucas-kanade", "zncc-band"];
 
-/// The key point at the place, to a pixel.
+/// The index of the key point within a pixel of a position.
 fn index(keypoints: &[Keypoint], at: Pixel) -> Option<usize> {
     keypoints.iter().position(|keypoint| keypoint.at.distance(&at) < 1.0)
 }
@@ -102,7 +103,7 @@ fn bits(found: &[Match]) -> Vec<(usize, u64, u64, u32)> {
     found.iter().map(|m| (m.left, m.right.u.to_bits(), m.right.v.to_bits(), m.distance.to_bits())).collect()
 }
 
-/// Every matcher finds most points of an easy scene and no wrong key point, each once, in the order of the left ones.
+/// Every matcher finds most points of an easy scene and no wrong one, each once, in the order of the left key points.
 ///
 /// Seen to fail when the epipolar line is taken from the wrong side.
 #[test]
@@ -113,9 +114,12 @@ fn points_are_found_once_and_in_order() {
             every(|name, matcher| {
                 let found = matcher.matches(&l.view(kind), &r.view(kind), &rig);
                 assert!(found.len() * 10 >= l.keypoints.len() * 8, "{name} {kind}: {}", found.len());
-                assert!(found.is_sorted_by(|a, b| a.left < b.left), "{name}: left once, in order");
+                assert!(found.is_sorted_by(|a, b| a.left < b.left), "{name}: a left key point twice, or not in order");
                 for (index, pair) in found.iter().enumerate() {
-                    assert!(found[..index].iter().all(|other| other.right != pair.right), "{name}: right once");
+                    assert!(
+                        found[..index].iter().all(|other| other.right != pair.right),
+                        "{name}: a right pixel twice"
+                    );
                     let seen = StereoPixels { left: l.keypoints[pair.left].at, right: pair.right };
                     assert!(rig.epipolar_distance(&seen).unwrap() < 1.0, "{name}");
                 }
@@ -129,23 +133,23 @@ fn points_are_found_once_and_in_order() {
     }
 }
 
-/// P54. Left to right to left is the same pair: with the images and the rig exchanged, the same pairs.
+/// P54. Exchanging the images and the rig gives the same pairs.
 ///
-/// Seen to fail when the second side of the mutual test is left out.
+/// Seen to fail when the second side of the mutual test is skipped.
 #[test]
 fn left_to_right_to_left_returns_the_same_pairs() {
     for rig in rigs() {
         let [l, r] = scene(&rig, 60);
         let back = rig.exchanged();
         for listing in MATCHERS.listings().iter().filter(|listing| !PLACES.contains(&listing.name)) {
-            // Support looks at the neighbours of left key points, so it alone knows left from right.
+            // Support uses the neighbours of left key points and is the only asymmetric part.
             let alone = Choice::named(listing.name).with("neighbours", 0).with("ratio", 1.0);
             let alone = alone.with("max-distance", 2.0).with("max-hamming", 1.0);
-            // Depth is the left camera's: only its sign is the same for both.
+            // Depth is that of the left camera; only its sign is the same for both.
             let alone = alone.with("min-depth", 0.0).with("max-depth", 1e9);
             let matcher = MATCHERS.build(&alone).or_else(|_| MATCHERS.build(&Choice::named(listing.name))).unwrap();
             for kind in 0..2 {
-                // Descriptors of other points: every left one has a nearest, few are each other's.
+                // The descriptors of other points: each left one has a nearest, few are mutual.
                 let shuffled = View { descriptors: &l.patterns[kind], ..r.view(kind) };
                 let there = matcher.matches(&l.view(kind), &shuffled, &rig);
                 let there: Vec<_> = there.iter().map(|m| (m.left, index(&r.keypoints, m.right).unwrap())).collect();
@@ -158,9 +162,9 @@ fn left_to_right_to_left_returns_the_same_pairs() {
     }
 }
 
-/// The same bits on one thread and on many, in a new workspace and in a used one.
+/// Results are bit-identical on one thread or many, with a new or a used workspace.
 ///
-/// Seen to fail when the nearest of the pair before stay.
+/// Seen to fail when the nearest neighbours of the previous pair remain.
 #[test]
 fn threads_and_memory_change_no_bit() {
     let [first, second, _] = rigs();
@@ -180,10 +184,10 @@ fn threads_and_memory_change_no_bit() {
     }
 }
 
-/// Nothing matches nothing, one key point none or one, and where the lens model has no direction there is no match;
-/// descriptors of different kinds or lengths match nothing.
+/// Without key points there is no match, and a single one gives at most one.
 ///
-/// Seen to fail when everything is thought to have a nearest.
+/// Key points outside the range of the lens model do not match, nor do descriptors of different kinds or lengths. Seen
+/// to fail when every key point is assumed to have a nearest one.
 #[test]
 fn few_points_and_none() {
     let [rig, ..] = rigs();
@@ -211,7 +215,7 @@ fn few_points_and_none() {
     });
 }
 
-/// P53. Exchanged images are known by their matches, and those in order as well, on any rig.
+/// P53. Exchanged images are recognised by their matches, and so are images in order, on any rig.
 ///
 /// Seen to fail when both orders are matched on the same rig.
 #[test]

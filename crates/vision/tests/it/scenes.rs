@@ -1,27 +1,27 @@
-//! A tilted plane that carries a texture, seen by a rig of any kind.
+//! A textured tilted plane, seen by a rig of any kind.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Pinhole, Pixel, Point, StereoPixels, StereoRig, Transform};
 use seafix_vision::Image;
 
 const SIZE: [usize; 2] = [320, 240];
-/// Normal and offset of the plane n·p = offset, in the left camera (m).
+/// The normal and the offset (m) of the plane n·p = offset, in the left camera.
 const NORMAL: Vector3<f64> = Vector3::new(-0.2, 0.1, 1.0);
 const OFFSET: f64 = 2.0;
 
-/// The right camera `step` (m) from the left one and turned by `turn` (rad), f = 300 px.
+/// A rig with the right camera displaced by `step` (m) and rotated by `turn` (rad), f = 300 px.
 pub(crate) fn rig(step: [f64; 3], turn: [f64; 3], lens: &[f64]) -> StereoRig {
-    let camera = Pinhole::new(SIZE.map(|n| n as u32), [300.0, 301.0], [158.0, 121.0], lens).expect("a camera");
+    let camera = Pinhole::new(SIZE.map(|n| n as u32), [300.0, 301.0], [158.0, 121.0], lens).expect("a valid camera");
     let rotation = UnitQuaternion::from_scaled_axis(Vector3::from(turn));
-    StereoRig::new(camera, camera, Transform::new(rotation, rotation * -Vector3::from(step))).expect("a rig")
+    StereoRig::new(camera, camera, Transform::new(rotation, rotation * -Vector3::from(step))).expect("a valid rig")
 }
 
-/// Where the plane lies in the direction `d` from `origin`.
+/// The intersection of the plane with the ray from `origin` in the direction `d`.
 fn hit(origin: Vector3<f64>, d: Vector3<f64>) -> Vector3<f64> {
     origin + d * ((OFFSET - NORMAL.dot(&origin)) / NORMAL.dot(&d))
 }
 
-/// Where the right camera sees what the left one sees at `left`.
+/// The pixels of the plane's point that the left camera sees at `left`.
 pub(crate) fn truth(rig: &StereoRig, left: Pixel) -> Option<StereoPixels> {
     let ray = rig.left().normalize(&left)?.push(1.0);
     rig.project(&Point::from(hit(Vector3::zeros(), ray)))
@@ -44,17 +44,17 @@ fn noise(x: f64, y: f64) -> f64 {
     2.0 * (row(0) + v * (row(1) - row(0))) - 1.0
 }
 
-/// Cells of about 9 and 4 px, −1 to 1.
+/// A texture with cells of about 9 and 4 px, −1 to 1.
 fn texture(x: f64, y: f64) -> f64 {
     0.6 * noise(x / 0.06, y / 0.06) + 0.4 * noise(x / 0.027 + 50.0, y / 0.027)
 }
 
-/// Both images in 8 bits: texture of ± `contrast` around 110 grey levels, noise of ± `grain` at most.
+/// Both images in 8 bits: texture of ±`contrast` around 110 grey levels, with uniform noise of ±`grain`.
 pub(crate) fn images(rig: &StereoRig, contrast: f64, grain: f64) -> [Image; 2] {
     painted(rig, contrast, grain, texture)
 }
 
-/// The same with a tile of `side` (m) of that texture, over and over.
+/// Both images of a plane tiled with squares of `side` (m) of the texture.
 pub(crate) fn tiled(rig: &StereoRig, side: f64) -> [Image; 2] {
     painted(rig, 60.0, 1.0, |x, y| texture(x.rem_euclid(side), y.rem_euclid(side)))
 }
@@ -75,6 +75,6 @@ fn painted(rig: &StereoRig, contrast: f64, grain: f64, paint: impl Fn(f64, f64) 
             let grain = grain * (2.0 * hash(i as i64 + 7, 1000 * side) - 1.0);
             (110.0 + contrast * paint(p.x, p.y) + grain).round().clamp(0.0, 255.0) as f32
         };
-        Image::new(SIZE[0], SIZE[1], (0..SIZE[0] * SIZE[1]).map(pixel).collect()).expect("as many as it has")
+        Image::new(SIZE[0], SIZE[1], (0..SIZE[0] * SIZE[1]).map(pixel).collect()).expect("width × height pixels")
     })
 }

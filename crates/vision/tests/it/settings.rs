@@ -1,19 +1,19 @@
-//! Which settings the components of vision refuse, and how they say it.
+//! Tests of invalid settings and their messages.
 
 use seafix_component::{Choice, Registry};
 use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Tracker};
 
 const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
-/// What a registry says to a choice; `None`: it is built.
+/// The error message of a registry for a choice; `None` if it is valid.
 fn refusal<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Option<String> {
     registry.build(choice).err().map(|error| error.to_string())
 }
 
-/// The defaults are accepted, and no setting that is a number may be none.
+/// Asserts that the defaults are valid and that no numeric setting may be NaN or infinite.
 fn numbers_must_be_numbers<T: ?Sized>(registry: &Registry<T>) {
     for listing in registry.listings() {
-        registry.build(&Choice::named(listing.name)).expect("the defaults are settings");
+        registry.build(&Choice::named(listing.name)).expect("valid defaults");
         for (key, _) in listing.defaults.iter().filter(|(_, default)| default.is_float()) {
             for bad in NO_NUMBERS {
                 let said = refusal(registry, &Choice::named(listing.name).with(key, bad)).unwrap_or_default();
@@ -34,7 +34,7 @@ fn no_number_is_no_setting() {
     numbers_must_be_numbers(&TRIANGULATORS);
 }
 
-/// The least and greatest values of a setting are accepted, those beyond are refused by its name.
+/// Asserts that the values `inside` of a setting are accepted and those `beyond` are rejected with its name.
 fn range<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, inside: &[f64], beyond: &[f64]) {
     for &value in inside {
         assert_eq!(refusal(registry, &Choice::named(name).with(key, value)), None, "{key} = {value}");
@@ -54,7 +54,7 @@ fn harris_refuses_what_finds_nothing() {
         refusal(&DETECTORS, &Choice::named("harris").with("features", 0)).unwrap(),
         "detector `harris`: features = 0; give at least 1"
     );
-    // Seen to fail when a radius is any number: 10¹² was taken.
+    // Seen to fail without an upper limit of the radius: 10¹² was accepted.
     for name in ["fast", "harris", "shi-tomasi"] {
         assert_eq!(refusal(&DETECTORS, &Choice::named(name).with("radius", 1000)), None);
         let said = refusal(&DETECTORS, &Choice::named(name).with("radius", 1_000_000_000_000_i64)).unwrap_or_default();
@@ -177,7 +177,10 @@ fn fitted_corners_refuse_what_finds_nothing() {
 fn mutual_ratio_refuses_what_matches_nothing() {
     range(&MATCHERS, "mutual-ratio", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
     range(&MATCHERS, "mutual-ratio", "max-distance", &[0.1, 2.0], &[0.0, -0.7, 2.1]);
-    assert!(refusal(&MATCHERS, &Choice::named("mutual-ratio").with("epipolar-px", 1.0)).is_some(), "it has no band");
+    assert!(
+        refusal(&MATCHERS, &Choice::named("mutual-ratio").with("epipolar-px", 1.0)).is_some(),
+        "a setting of another matcher is accepted"
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Protection levels in absolute numbers.
+//! Protection levels against analytic values.
 
 use nalgebra::Vector3;
 use seafix_geometry::{Point, UncertainPoint};
@@ -53,7 +53,7 @@ fn levels_grow_with_noise_and_with_a_smaller_risk() {
     assert!((noisy.position / level.position - 2.0).abs() < 1e-6);
 }
 
-/// Seen to fail where the whole risk is left to errors.
+/// Fails if the probability of misidentification is not deducted from the risk.
 #[test]
 fn what_the_points_may_be_mistaken_for_is_taken_from_the_risk() {
     let (data, pose) = seen(6);
@@ -67,7 +67,7 @@ fn what_the_points_may_be_mistaken_for_is_taken_from_the_risk() {
     assert_eq!([1e-4, 0.3, f64::NAN].map(|misidentified| level(1e-4, misidentified)), [None; 3]);
 }
 
-/// One coordinate that is as good as exact takes all weight from the others, and three points any of which fit say nothing.
+/// One nearly exact coordinate takes all weight from the others; three points, any of which fit, have no scale error.
 #[test]
 fn every_fix_of_four_points_has_a_scale_error() {
     let scale_error = |count: usize, exact: bool| {
@@ -80,12 +80,12 @@ fn every_fix_of_four_points_has_a_scale_error() {
     for count in [4, 6] {
         let [even, exact] = [false, true].map(|exact| scale_error(count, exact).expect("four points or more"));
         assert!(even.value.abs().max(exact.value.abs()) < 1e-6, "{count}: {even:?} {exact:?}");
-        // What the others say of the scale is left, and the exact one cannot say it all.
+        // The information of the other coordinates on the scale is kept; the exact one does not provide it all.
         assert!((0.7..1.05).contains(&(exact.sigma / even.sigma)), "{count}: {even:?} {exact:?}");
     }
 }
 
-/// Seen to fail when the separation is left out of the level.
+/// Fails if the level omits the separation.
 #[test]
 fn one_wrong_match_is_within_the_level() {
     for wrong in 0..6 {
@@ -102,7 +102,7 @@ fn one_wrong_match_is_within_the_level() {
     }
 }
 
-/// Seen to fail when only single points are left out.
+/// Fails if only single points are excluded.
 #[test]
 fn two_wrong_matches_are_within_the_level_where_they_are_assumed() {
     let acceptance = Acceptance { two_wrong_rate: 0.01, ..Acceptance::default() };
@@ -113,21 +113,21 @@ fn two_wrong_matches_are_within_the_level_where_they_are_assumed() {
         }
         let pose = Mahalanobis::default().solve(&data).unwrap();
         let off = (pose.translation() - truth.translation()).norm();
-        // Four points are left, none of them wrong: the level holds whatever the two did.
+        // The four remaining points are correct, so the level holds for any error of the two.
         if let Some(level) = of(&data, &acceptance).1 {
             assert!(off <= level.position, "{one} {two}: {off} {level:?}");
         }
     }
     assert!(of(&seen(6).0, &acceptance).1.is_some());
-    assert_eq!(of(&seen(5).0, &acceptance).1, None, "three that are left bear no witness");
+    assert_eq!(of(&seen(5).0, &acceptance).1, None, "three remaining points provide no redundancy");
     assert!(of(&seen(5).0, &Acceptance::default()).1.is_some());
 }
 
-/// The six vertices of an octahedron about the camera, one metre from it, seen where they are with noise of `sigma` (m).
+/// The six vertices of an octahedron at one metre about the camera, measured exactly with stated noise `sigma` (m).
 ///
-/// Position and attitude have the variances σ²/6 and σ²/4 in every direction. Without the vertex +x the information on the attitude
-/// about the centroid (−1/5, 0, 0) is (4, 2.8, 2.8)/σ², so that the greatest variances are σ²(1/5 + 1/70) = σ² 3/14 of the position
-/// and σ²/2.8 of the attitude.
+/// Position and attitude have the variances σ²/6 and σ²/4 in every direction. Without the vertex +x the information on
+/// the attitude about the centroid (−1/5, 0, 0) is (4, 2.8, 2.8)/σ². The largest variances are then σ²(1/5 + 1/70) = σ²
+/// 3/14 of the position and σ²/2.8 of the attitude.
 fn octahedron(sigma: f64) -> Observations<'static> {
     let vertex = |k: usize| Vector3::ith(k / 2, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
     let points = (0..6).map(|k| Observation {
@@ -139,7 +139,7 @@ fn octahedron(sigma: f64) -> Observations<'static> {
     Observations { points: points.collect(), rig: None }
 }
 
-/// The separation of the most likely pose with its own covariance.
+/// The separation of the maximum-likelihood pose with its own covariance.
 fn solution_separation(data: &Observations<'_>, acceptance: &Acceptance) -> Separation {
     let witness = Mahalanobis::default();
     let pose = witness.solve(data).unwrap();
@@ -152,7 +152,8 @@ fn close(found: f64, expected: f64) -> bool {
     (found / expected - 1.0).abs() < 1e-6
 }
 
-/// Radii of χ₃ (`sqrt(scipy.stats.chi2.isf(p, 3))`) that a normal vector exceeds with the probabilities 5e-5, 5e-4, 0.05 and 0.1.
+/// Radii of χ₃ (`sqrt(scipy.stats.chi2.isf(p, 3))`) that a normal vector exceeds with the probabilities 5e-5, 5e-4,
+/// 0.05 and 0.1.
 const RADII: [(f64, f64); 4] = [
     (5e-5, 4.749_184_042_602_995),
     (5e-4, 4.210_700_206_491_306),
@@ -182,7 +183,7 @@ fn semi_axes_are_the_greatest_deviations_of_each_block() {
     assert!(close(position, 0.7) && close(attitude, 0.03), "{position} {attitude}");
     let quiet = Protection::quiet(&covariance, 0.05);
     assert!(close(quiet.position, 0.7 * RADII[2].1) && close(quiet.attitude, 0.03 * RADII[2].1), "{quiet:?}");
-    // Correlated: the greatest eigenvalue of ((4, 2), (2, 4)) is 6.
+    // Correlated: the largest eigenvalue of ((4, 2), (2, 4)) is 6.
     let correlated = Matrix3::new(4.0, 2.0, 0.0, 2.0, 4.0, 0.0, 0.0, 0.0, 1.0);
     assert!(close(semi_axis(&correlated), 6.0_f64.sqrt()));
     assert_eq!(semi_axis(&-Matrix3::identity()), 0.0);
@@ -192,12 +193,13 @@ fn semi_axes_are_the_greatest_deviations_of_each_block() {
     assert!(longer_than(f64::NAN, &correlated).is_some());
 }
 
-/// The share of normal errors beyond the radii of one probability is that probability: 0.1 of 20 000 draws is 2000 ± 42.
+/// The fraction of normal errors beyond the radii of a probability is that probability: 0.1 of 20 000 draws is 2000 ±
+/// 42.
 #[test]
 fn quiet_radii_are_exceeded_with_the_stated_probability() {
     use rand::{RngExt, SeedableRng};
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-    // Box and Muller, exact in the tails.
+    // Box–Muller, exact in the tails.
     let mut normal = || {
         let (u, v): (f64, f64) = (1.0 - rng.random_range(0.0..1.0), rng.random_range(0.0..1.0));
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
@@ -228,19 +230,21 @@ fn a_level_covers_another_pose_and_its_error() {
     assert!(close(level.position, 0.07) && close(level.attitude, 0.25), "{level:?}");
 }
 
-/// Half of the risk belongs to a fix without wrong matches: where wrong matches are rare, that half alone is the level.
+/// Half of the risk is allotted to a fix without wrong matches: if these are rare, that half alone determines the
+/// level.
 ///
-/// Seen to fail where the whole risk, or the risk and a half, stands in place of its half.
+/// Fails if the full risk, or 1.5 times the risk, replaces the half.
 #[test]
 fn half_of_the_risk_belongs_to_right_matches() {
     let rare = Acceptance { wrong_match_rate: 1e-3, ..Acceptance::default() };
     let level = solution_separation(&octahedron(SIGMA), &rare).protection.unwrap();
-    // Of a wrong match 5e-5/1e-3 = 0.05 is left: 2.80 √(3/14) σ is less than 4.75 σ/√6.
+    // A wrong match has 5e-5/1e-3 = 0.05: 2.80 √(3/14) σ is less than 4.75 σ/√6.
     let own = RADII[0].1 * SIGMA;
     assert!(close(level.position, own / 6.0_f64.sqrt()) && close(level.attitude, own / 2.0), "{level:?}");
 }
 
-/// The other half over the rate of wrong matches is the probability that the pose without one point may err beyond the level.
+/// The other half divided by the rate of wrong matches is the probability with which the pose without one point may
+/// exceed the level.
 #[test]
 fn the_other_half_over_the_rate_belongs_to_one_wrong_match() {
     let found = solution_separation(&octahedron(SIGMA), &Acceptance::default());
@@ -250,7 +254,7 @@ fn the_other_half_over_the_rate_belongs_to_one_wrong_match() {
         "{level:?}"
     );
     assert!(found.one.unwrap() < 1e-12 && found.two.is_none());
-    // Two wrong matches: a quarter of the risk each. Without +x and +y the greatest variances are σ²/3 and σ²/1.5.
+    // Two wrong matches: a quarter of the risk each. Without +x and +y the largest variances are σ²/3 and σ²/1.5.
     let acceptance = Acceptance { two_wrong_rate: 0.05, ..Acceptance::default() };
     let found = solution_separation(&octahedron(SIGMA), &acceptance);
     let (level, k) = (found.protection.unwrap(), RADII[1].1 * SIGMA);
@@ -258,10 +262,10 @@ fn the_other_half_over_the_rate_belongs_to_one_wrong_match() {
     assert!(found.one.unwrap() < 1e-12 && found.two.unwrap() < 1e-9);
 }
 
-/// The vertex +x is measured δ = 10 mm too far out. The fix is off by δ/6 along x. Without +x it is right. Without ±y or ±z it is off
-/// by δ 3/14 along x and turned by δ/14.
+/// The vertex +x is measured δ = 10 mm too far out. The error of the fix is δ/6 along x; without +x it is zero; without
+/// ±y or ±z it is δ 3/14 along x with a rotation of δ/14.
 ///
-/// Seen to fail where a separation is subtracted from its level.
+/// Fails if a separation is subtracted from its level.
 #[test]
 fn a_level_is_the_separation_and_the_radius_beyond_it() {
     const OFF: f64 = 0.01;
@@ -273,15 +277,16 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
     assert!(near(found.one.unwrap(), OFF / 6.0), "{found:?}");
     assert!(near(level.position, OFF / 6.0 + k * (3.0_f64 / 14.0).sqrt()), "{level:?}");
     assert!(near(level.attitude, OFF / 14.0 + k / 2.8_f64.sqrt()), "{level:?}");
-    // The model points move by δ/6, and are known to σ √(267/210) without +x.
+    // The model points move by δ/6, with an error of σ √(267/210) without +x.
     let (point, off) = found.hinge.unwrap();
     assert!(point == 0 && near(off, (OFF / 6.0).hypot(SIGMA * (267.0_f64 / 210.0).sqrt())), "{point} {off}");
-    // The same of a vertex that stands last.
+    // The result is the same for a vertex at the last index.
     data.points.rotate_left(1);
     let last = solution_separation(&data, &Acceptance::default());
     assert_eq!(last.hinge.unwrap().0, 5);
     assert!(near(last.hinge.unwrap().1, off) && near(last.protection.unwrap().position, level.position));
-    // Five times as far: the separation of the attitude alone exceeds what its covariance adds to the other levels.
+    // Five times as far: the separation of the attitude alone exceeds the contribution of its covariance to the other
+    // levels.
     let mut data = octahedron(SIGMA);
     data.points[0].measured.at.coords.x += 5.0 * OFF;
     let level = solution_separation(&data, &Acceptance::default()).protection.unwrap();
@@ -289,7 +294,7 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
     assert!((level.position - (5.0 * OFF / 6.0 + k * (3.0_f64 / 14.0).sqrt())).abs() < 2e-4, "{level:?}");
 }
 
-/// Of equals the first point is the one that the fix hangs on, and none is worse than one that leaves no number.
+/// The first of equally critical points is the hinge, and NaN is the worst error.
 #[test]
 fn the_first_of_the_worst_is_the_hinge() {
     let data = octahedron(SIGMA);
@@ -315,7 +320,8 @@ fn the_first_of_the_worst_is_the_hinge() {
     assert_eq!(watch.hinge.unwrap().0, 3);
 }
 
-/// Three of four points on a line determine no pose without the fourth: no level, no separation, and the pose hangs on it.
+/// Three collinear points of four determine no pose without the fourth: no level, no separation, and the fourth is the
+/// hinge.
 #[test]
 fn a_point_that_cannot_be_spared_leaves_no_level() {
     let mut data = octahedron(SIGMA);
@@ -329,7 +335,7 @@ fn a_point_that_cannot_be_spared_leaves_no_level() {
     assert!(found.scale_error.is_some());
 }
 
-/// Points whose second extent is half a thousandth of the first determine no pose that is trusted, and yet their scale: its standard
+/// Points with a second extent of 5e-4 of the first determine no accepted pose, but a scale error: its standard
 /// deviation is σ over the root of Σ ‖d‖² = 5 m².
 #[test]
 fn points_near_a_line_have_a_scale_and_no_level() {
@@ -348,19 +354,19 @@ fn points_near_a_line_have_a_scale_and_no_level() {
     assert!(scale_error.value.abs() < 1e-9 && close(scale_error.sigma, SIGMA / 5.0_f64.sqrt()), "{scale_error:?}");
 }
 
-/// The attitude without one vertex is known to σ/√2.8: up to 35 mrad it has a level.
+/// The attitude without one vertex has an error of σ/√2.8: up to 35 mrad there is a level.
 #[test]
 fn a_weak_attitude_without_one_point_leaves_no_level() {
     for (sigma, available) in [(0.0345, true), (0.0355, false)] {
         let found = solution_separation(&octahedron(sigma * 2.8_f64.sqrt()), &Acceptance::default());
         assert_eq!(found.protection.is_some(), available, "{sigma}: {found:?}");
-        // The pose itself can be had without any one point.
+        // The pose exists without any one point.
         assert!(found.one.is_some());
     }
 }
 
-/// Fixes of the octahedron, half of them with one wrong match in any direction, exceed a level stated for a risk of 0.2 in no more
-/// than 0.2 of the cases, and in enough that the level is no idle bound.
+/// The error of octahedron fixes, half of them with one wrong match in any direction, exceeds a level stated for a risk
+/// of 0.2 in at most 0.2 of the cases, and in at least one case, so that the level is not excessive.
 #[test]
 fn levels_are_exceeded_with_no_more_than_the_risk() {
     use rand::{RngExt, SeedableRng};

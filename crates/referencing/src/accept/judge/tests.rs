@@ -1,4 +1,4 @@
-//! Every test of a set, at its limit, in absolute numbers.
+//! Every test of a set at its limit, against analytic values.
 
 use super::*;
 use crate::{Candidates, Kabsch, ScaleError, Tolerance};
@@ -7,18 +7,18 @@ use seafix_geometry::{MeasuredPoint, UncertainPoint};
 
 const SIGMA: f64 = 0.002;
 
-/// The six vertices of an octahedron of one metre about this place, each seen from everywhere.
+/// The six vertices of an octahedron of one metre about a centre, each visible from every side.
 fn octahedron(centre: [f64; 3]) -> Vec<ModelPoint> {
     let vertex = |k: usize| Vector3::from(centre) + Vector3::ith(k / 2, if k.is_multiple_of(2) { 1.0 } else { -1.0 });
     (0..6).map(|k| ModelPoint::exact(format!("V{k}"), vertex(k).into())).collect()
 }
 
-/// A camera at this place of the object, its axes those of the object.
+/// A camera at a position in the object frame, with the object's axes.
 fn camera_at(x: f64, y: f64, z: f64) -> Transform<Object, Camera> {
     Transform::new(UnitQuaternion::identity(), Vector3::new(x, y, z))
 }
 
-/// A solver with one answer.
+/// A solver with a fixed answer.
 #[derive(Debug, Clone)]
 struct Fixed {
     pose: Transform<Object, Camera>,
@@ -42,7 +42,7 @@ impl Solver for Fixed {
         Ok(self.pose)
     }
 
-    /// Those that are worse by no more than χ²₁ at 99.9 %, 10.83.
+    /// The fixed alternatives; `max` must be χ²₁ at 99.9 %, 10.83.
     fn alternatives(&self, _: &Observations<'_>, _: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         assert!((max - 10.827_566_170_662_733).abs() < 1e-6, "{max}");
         self.alternatives.clone()
@@ -57,7 +57,7 @@ impl Solver for Fixed {
     }
 }
 
-/// What a judge needs: the octahedron seen from a pose, each of its points named.
+/// The input of a judge: the octahedron seen from a pose, with labelled points.
 struct Scene {
     model: Vec<ModelPoint>,
     cloud: Vec<MeasuredPoint>,
@@ -94,13 +94,13 @@ impl Scene {
         (0..self.model.len()).map(|i| Correspondence { model: i, cloud: i }).collect()
     }
 
-    /// The set of all points at a pose, with residuals of this χ².
+    /// The set of all points at a pose, with this χ² of the residuals.
     fn hypothesis(&self, pose: Transform<Object, Camera>, cost: f64) -> Hypothesis {
         let likelihood = Likelihood { pose, cost };
         Hypothesis { pairs: self.pairs(), pose, likelihood, score: 0.0, covariance: None, alternatives: Vec::new() }
     }
 
-    /// What precision and prior say of a pose.
+    /// The result of the tests of precision and prior for the solver's pose.
     fn precise_and_near(&self, solver: &Fixed) -> Result<(), Fallen> {
         self.judge(solver, |judge| judge.precise_and_near(&mut self.hypothesis(solver.pose, 0.0)))
     }
@@ -132,10 +132,10 @@ fn a_set_has_as_many_points_as_are_asked_for_and_the_solver_needs() {
     assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..5])), few);
 }
 
-/// Three true pairs of six model points among 60 points of clutter that may be any of them: chance gives many such sets. Pairs that
-/// no search found are not held against it.
+/// Three true pairs of six model points among 60 clutter points with every candidate allowed: the NFA is large.
+/// Labelled pairs skip the test.
 ///
-/// Seen to fail where chance refuses nothing.
+/// Fails if the NFA rejects nothing.
 #[test]
 fn three_points_of_much_clutter_are_random() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));
@@ -185,7 +185,8 @@ fn residuals_pass_up_to_the_quantile_of_their_freedom() {
     assert!(of(f64::NAN).is_err());
 }
 
-/// From the centre of the octahedron its points are one metre away: σ of the position moves each by √3 σ, of the attitude by √2 σ.
+/// The points are one metre from the centre of the octahedron: σ of the position moves each by √3 σ, σ of the attitude
+/// by √2 σ.
 #[test]
 fn a_pose_passes_whose_two_standard_deviations_are_within_the_limits() {
     let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
@@ -204,7 +205,7 @@ fn a_pose_passes_whose_two_standard_deviations_are_within_the_limits() {
     assert!(matches!(of(0.0, f64::NAN), Some(RejectionReason::Imprecise { .. })));
 }
 
-/// The prior's 5 cm and the fix's 12 cm are 13 cm together; √χ²₆ at 99.9 % is 4.739.
+/// The prior's 5 cm and the fix's 12 cm combine to 13 cm; √χ²₆ at 99.9 % is 4.739.
 #[test]
 fn a_gaussian_prior_lets_through_what_both_covariances_allow() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
@@ -243,9 +244,10 @@ fn a_box_lets_through_its_half_size_and_the_noise() {
     }
 }
 
-/// χ² of the residuals, of the prior, and 16.27, χ²₃ at 99.9 %, for each pair fewer than the largest set has.
+/// χ² of residuals and prior, plus 16.27, χ²₃ at 99.9 %, for each pair fewer than in the largest set.
 ///
-/// A vertex δ = 3 σ too far out leaves δ² 5/6 σ² = 7.5 and moves the pose by δ/6 = 1 mm; the prior is 0.1 m off with σ = 0.05 m.
+/// A vertex δ = 3 σ too far out leaves δ² 5/6 σ² = 7.5 and moves the pose by δ/6 = 1 mm; the prior has an error of 0.1
+/// m with σ = 0.05 m.
 #[test]
 fn a_score_is_minus_half_of_all_that_speaks_against_the_set() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
@@ -267,7 +269,8 @@ fn a_score_is_minus_half_of_all_that_speaks_against_the_set() {
     assert!((score(&scene) + 0.5 * (7.5 + fewer)).abs() < 1e-3, "{}", score(&scene));
 }
 
-/// Another pose of the same pairs stands beside the solver's by its χ²; a less likely one before which the points hide does not.
+/// Another pose of the same pairs is an alternative with its χ²; a less probable one from which the points are
+/// invisible is not.
 #[test]
 fn other_poses_of_a_set_are_ranked_by_what_they_are_worse() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -3.0));
@@ -289,14 +292,15 @@ fn other_poses_of_a_set_are_ranked_by_what_they_are_worse() {
     let other = of(&solver);
     assert_eq!((other.pose, other.alternatives[0].object_from_camera), (near, solver.pose));
     assert!((other.score - (own.score + 1.0)).abs() < 1e-6);
-    // Residuals that no set may have.
+    // Residuals beyond the limit of any set.
     solver.alternatives[0].worse = 40.0;
     assert!(of(&solver).alternatives.is_empty());
 }
 
-/// The camera stands at (0, 0, −3): a vertex that looks along −z is seen, and one that looks along z by acos(−3/√10) = 161.6° is not.
+/// The camera stands at (0, 0, −3): a vertex with a normal along −z is visible, and one with a normal along z at
+/// acos(−3/√10) = 161.6° is not.
 ///
-/// Seen to fail where no pose is refused for it.
+/// Fails if no pose is rejected for visibility.
 #[test]
 fn a_pose_behind_its_points_is_refused_with_the_worst_of_them() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -3.0));
@@ -316,7 +320,7 @@ fn a_pose_behind_its_points_is_refused_with_the_worst_of_them() {
         }
         other => panic!("{other:?}"),
     }
-    // The whole judgement says so.
+    // The complete judgement gives the same result.
     let kabsch = Kabsch::default();
     let found = Identification::unproved(scene.pairs(), 6, 0);
     let (outcome, _) = scene.judge(&kabsch, |judge| judge.poses(&found, None));
@@ -346,7 +350,7 @@ fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
     assert_eq!(of(&scene, Some((2, 0.0501))), Ok(()));
 }
 
-/// What is known of a fix of six points with this χ² and this stretch.
+/// The integrity of a fix of six points with this χ² and scale error.
 fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
     Integrity {
         redundancy: Redundancy::Excludable,
@@ -361,13 +365,13 @@ fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
     }
 }
 
-/// A stretch of 1 % known to 0.4 %, 2.5 standard deviations, whose square is 6.25: more than 3.84, χ²₁ at 95 %, times what the other
-/// eleven degrees of freedom leave each. Points 10 m away are then off by (1 % + 2 · 0.4 %) · 10 m = 0.18 m.
+/// A scale error of 1 % with σ 0.4 % is 2.5 standard deviations; the square, 6.25, exceeds 3.84 (χ²₁ at 95 %) times the
+/// mean of the other eleven degrees of freedom. Points at 10 m then have an error of (1 % + 2 · 0.4 %) · 10 m = 0.18 m.
 #[test]
 fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
     let scale_error = |value: f64| Some(ScaleError { value, sigma: 0.004 });
     let of = |distance: f64, chi2: f64, scale_error: Option<ScaleError>| {
-        // The centre of the points, not the origin of the object, is so far away.
+        // The distance counts to the centroid of the points, not to the origin of the object.
         let mut scene = Scene::of(octahedron([3.0, 0.0, 1.0]), &Transform::identity());
         scene.acceptance.confidence = 0.95;
         let hypothesis = scene.hypothesis(camera_at(3.0, 0.0, 1.0 - distance), chi2);
@@ -383,7 +387,7 @@ fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
     assert!(of(5.5, 17.0, scale_error(0.01)).is_ok() && of(5.6, 17.0, scale_error(0.01)).is_err());
     // 17.8 over eleven is 1.618 and 18 over eleven 1.636, times 3.8415 is 6.216 and 6.286.
     assert!(of(10.0, 6.25 + 17.8, scale_error(0.01)).is_err() && of(10.0, 6.25 + 18.0, scale_error(0.01)).is_ok());
-    // Residuals that leave less than their noise make nothing surer: 1.95² is less than 3.84, 1.97² more.
+    // Residuals below their noise do not increase the significance: 1.95² is less than 3.84, 1.97² more.
     assert!(of(30.0, 4.0, scale_error(0.0078)).is_ok() && of(30.0, 4.0, scale_error(0.00788)).is_err());
     assert!(of(30.0, 0.5, scale_error(0.0078)).is_ok());
 }
@@ -423,7 +427,8 @@ fn levels_are_raised_to_poses_that_are_no_less_likely_than_a_hundredth_of_the_ri
     assert_eq!(level(1.0, None), None);
 }
 
-/// Levels are those of the risk that is left, never less than what is known, and none where none is left or was known.
+/// Levels follow from the remaining risk, never fall below the known ones, and are absent if no risk remains or none
+/// were known.
 #[test]
 fn a_probability_of_being_mistaken_is_taken_from_the_risk_of_a_fix() {
     let scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));
@@ -434,7 +439,7 @@ fn a_probability_of_being_mistaken_is_taken_from_the_risk_of_a_fix() {
         fix.integrity.protection
     };
     let low = Protection { position: 0.01, attitude: 0.001 };
-    // Half of 2e-5 is left.
+    // Half of the remaining 2e-5.
     let of = |risk: f64| Protection::quiet(&Covariance6::isotropic(0.001, 0.01), 0.5 * risk);
     let raised = level(Some(low), 8e-5).unwrap();
     assert!(raised.position >= of(2e-5).position && raised.attitude >= of(2e-5).attitude, "{raised:?}");
@@ -444,7 +449,8 @@ fn a_probability_of_being_mistaken_is_taken_from_the_risk_of_a_fix() {
     assert_eq!((level(None, 8e-5), level(Some(high), 1e-4)), (None, None));
 }
 
-/// A fix of six points with one δ = 3 σ off: 12 degrees of freedom, χ² = 7.5, residuals of √(δ² 5/6 / 6) RMS.
+/// A fix of six points with an error of δ = 3 σ in one: 12 degrees of freedom, χ² = 7.5, an RMS residual of √(δ² 5/6 /
+/// 6).
 #[test]
 fn a_fix_reports_its_numbers() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -4.0));

@@ -1,4 +1,4 @@
-//! The search against every set of small graphs, its bounds, and what it costs.
+//! Tests of the search against every set of small graphs, of its bounds and of its cost.
 
 use nalgebra::Vector3;
 use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
@@ -6,7 +6,7 @@ use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 use super::*;
 use crate::{Candidates, Correspondence, ModelPoint, Tolerance, search::bitset::BitMatrix};
 
-/// Points for the model and the cloud of a graph whose edges are given.
+/// Points for the model and the cloud of a graph with given edges.
 struct Points {
     model: Vec<ModelPoint>,
     cloud: Vec<MeasuredPoint>,
@@ -40,7 +40,7 @@ impl Points {
     }
 }
 
-/// A graph of vertices with these model and cloud points; vertices with one of them in common are never joined.
+/// A graph of vertices with these model and cloud points; vertices that share one are never adjacent.
 fn graph(models: &[usize], clouds: &[usize], edge: impl Fn(usize, usize) -> bool) -> Association {
     let count = models.len();
     let mut adjacency = BitMatrix::zeros(count);
@@ -58,7 +58,7 @@ fn bit(number: usize) -> impl Fn(usize, usize) -> bool {
     move |i, j| number >> (j * (j - 1) / 2 + i) & 1 == 1
 }
 
-/// All largest cliques, by trying every set.
+/// All largest cliques, by testing every set.
 fn brute_force(graph: &Association) -> Vec<Vec<usize>> {
     let count = graph.vertices.len();
     let members = |set: usize| (0..count).filter(move |v| set >> v & 1 == 1);
@@ -79,12 +79,12 @@ fn check(problem: &Problem<'_>, graph: &Association, name: &str) {
     let found = search.run(1, 1000);
     assert!(found.complete && found.all && found.bound == size, "{name}: {found:?}");
     assert_eq!(found.found, largest, "{name}");
-    // The same search again, for one of them, for no more than two, for those of a size and for larger ones.
+    // The same search for one clique, for at most two, for those of a size, and for larger ones.
     let one = search.run(1, 1);
     assert!(one.complete && !one.all && one.found.len() == 1 && largest.contains(&one.found[0]), "{name}: {one:?}");
     let larger = search.run(size + 1, 1);
     assert!(larger.complete && larger.found.is_empty(), "{name}: {larger:?}");
-    // Single vertices are not counted against the cap.
+    // Single vertices do not count against the cap.
     if size == 1 {
         return;
     }
@@ -93,14 +93,14 @@ fn check(problem: &Problem<'_>, graph: &Association, name: &str) {
         two.complete && two.bound == size && two.found.iter().all(|clique| largest.contains(clique)),
         "{name}: {two:?}"
     );
-    // The first one found may come on top.
+    // The first one found may exceed the cap.
     assert!((largest.len().min(2)..=3).contains(&two.found.len()), "{name}: {two:?}");
     assert_eq!(two.all, largest.len() < 2, "{name}: {two:?}");
 }
 
-/// All 33 868 graphs of one to six vertices, each vertex with a model point and a cloud point of its own.
+/// All 33 868 graphs of one to six vertices, each with a model and a cloud point of its own.
 ///
-/// Seen to fail where a bound asks for one member more.
+/// Fails if a bound requires one member more.
 #[test]
 fn the_largest_cliques_of_every_graph_of_six_vertices() {
     for count in 1..=6 {
@@ -111,8 +111,10 @@ fn the_largest_cliques_of_every_graph_of_six_vertices() {
     }
 }
 
-/// All graphs of five vertices, with every way to share model points among neighbours in the order, and of four vertices with every way to
-/// share cloud points besides.
+/// All graphs of four or five vertices with shared points.
+///
+/// Five vertices have every partition of consecutive vertices into model points, four have every partition into cloud
+/// points besides.
 #[test]
 fn vertices_of_one_point_exclude_each_other() {
     let shared = |count: usize, joins: usize| {
@@ -126,7 +128,7 @@ fn vertices_of_one_point_exclude_each_other() {
         let graph = graph(&models, &[0, 1, 2, 3, 4], bit(number));
         check(&points.problem(), &graph, &format!("{models:?}, {number}"));
     }
-    // Set partitions by growth: each vertex has a cloud point known before or the next new one.
+    // Set partitions by growth: each vertex has a known cloud point or the next new one.
     let mut partitions = vec![vec![0]];
     for _ in 1..4 {
         partitions = partitions
@@ -150,7 +152,7 @@ fn vertices_of_one_point_exclude_each_other() {
     }
 }
 
-/// All graphs of five vertices with every small budget: what ended early has spent all of it and proves no more than is true.
+/// All graphs of five vertices with every small budget: a search that ended early spent all of it, and its bound holds.
 #[test]
 fn a_budget_ends_with_a_bound_that_holds() {
     let (points, own) = (Points::scattered(5), [0, 1, 2, 3, 4]);
@@ -173,7 +175,8 @@ fn a_budget_ends_with_a_bound_that_holds() {
     assert!(ended > 1000 && max == 5, "{ended} {max}");
 }
 
-/// Vertices of three model points and two cloud points: no clique has three members. A star of three rays: no three have two neighbours.
+/// Vertices of three model points and two cloud points have no clique of three members; in a star of three rays no
+/// three vertices have two neighbours.
 #[test]
 fn bounds_of_the_full_graph() {
     let points = Points::scattered(4);
@@ -184,7 +187,7 @@ fn bounds_of_the_full_graph() {
     let star = graph(&[0, 1, 2, 3], &[0, 1, 2, 3], |i, _| i == 0);
     let mut search = Search::new(&problem, &star, Sense::Any, 100);
     assert_eq!((search.degree.clone(), search.max_possible(), search.partite()), (vec![3, 1, 1, 1], 2, 4));
-    // A triangle with a tail of two: of three members, only those of the triangle are left.
+    // A triangle with a tail of two: only the members of the triangle remain for a clique of three.
     let points = Points::scattered(5);
     let problem = points.problem();
     let own = [0, 1, 2, 3, 4];
@@ -204,8 +207,7 @@ fn bounds_of_the_full_graph() {
     assert_eq!(search.tie(), 2);
 }
 
-/// Half of the pairs of 60 vertices are joined: to prove the largest clique takes no more tests than it did. A bound that prunes less
-/// costs more.
+/// A regression test of the cost on 60 vertices with half of the edges: a weaker bound costs more tests.
 #[test]
 fn the_proof_costs_no_more_than_it_did() {
     let count = 60;

@@ -1,4 +1,4 @@
-//! Sets as bits of words.
+//! Sets as bit masks.
 
 use std::cmp::Ordering;
 
@@ -13,7 +13,7 @@ pub(in crate::search) fn ones(bits: &[u64], from: usize) -> impl Iterator<Item =
     })
 }
 
-/// Which of up to 64 words hold a bit: known without branches that no processor foresees.
+/// The mask of nonzero words among up to 64; without branches, which would be unpredictable.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn held(words: &[u64]) -> u64 {
     let mut held = 0;
@@ -23,7 +23,7 @@ fn held(words: &[u64]) -> u64 {
     held
 }
 
-/// Calls `each` with every word that holds a bit from `from` on, and with the place of its first bit.
+/// Calls `each` with first bit index and value of every nonzero word, from bit `from` on.
 #[inline]
 pub(in crate::search) fn each_held(bits: &[u64], from: usize, mut each: impl FnMut(usize, u64)) {
     let first = from / 64;
@@ -41,7 +41,7 @@ pub(in crate::search) fn each_held(bits: &[u64], from: usize, mut each: impl FnM
     }
 }
 
-/// A word of a set that holds a bit.
+/// A nonzero word of a set.
 #[derive(Clone, Copy)]
 pub(in crate::search) struct Held {
     place: u32,
@@ -49,31 +49,31 @@ pub(in crate::search) struct Held {
 }
 
 impl Held {
-    /// All of them from a bit on.
+    /// Lists the nonzero words from a bit on.
     pub(in crate::search) fn list(set: &[u64], from: usize, held: &mut Vec<Self>) {
         held.clear();
         each_held(set, from, |begin, bits| held.push(Self { place: (begin / 64) as u32, bits }));
     }
 
-    /// Which word it is.
+    /// Index of the word.
     #[inline]
     pub(in crate::search) fn place(&self) -> usize {
         self.place as usize
     }
 
-    /// The place of its first bit.
+    /// Index of its first bit.
     #[inline]
     pub(in crate::search) fn begin(&self) -> usize {
         64 * self.place()
     }
 
-    /// Its bits.
+    /// Its set bits.
     #[inline]
     pub(in crate::search) fn ones(&self) -> impl Iterator<Item = usize> + use<> {
         ones_of(self.begin(), self.bits)
     }
 
-    /// What it shares with another set from a bit on.
+    /// The intersection with another set from a bit on.
     #[inline]
     pub(in crate::search) fn and(&self, other: &[u64], from: usize) -> u64 {
         let after = match self.place().cmp(&(from / 64)) {
@@ -85,9 +85,9 @@ impl Held {
     }
 }
 
-/// The groups of bits that hold one, each as its last bit, which is set in `lasts`.
+/// The groups of bits with a set bit, each as its last bit; `lasts` marks the last bit of every group.
 ///
-/// Added to a group's bits but the last, all of these carry into the last where any is set, and never out of it.
+/// An addition to all bits of a group but the last carries into the last if any is set, and never out of it.
 #[inline]
 pub(in crate::search) fn groups(word: u64, lasts: u64) -> u64 {
     ((word & !lasts).wrapping_add(!lasts) | word) & lasts
@@ -99,8 +99,8 @@ pub(in crate::search) fn is_set(bits: &[u64], bit: usize) -> bool {
     bits[bit / 64] >> (bit % 64) & 1 == 1
 }
 
-/// a ∧ b from a bit on, and how many groups hold one of these bits, word by word; what comes before is left as it is. `lasts` has
-/// the last bit of every group, and of every word.
+/// a ∧ b from a bit on, and the number of groups with one of these bits; earlier words of `out` are unchanged. `lasts`
+/// has the last bit of every group and of every word.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512vl+avx512bw+avx512dq+avx512vpopcntdq+popcnt",
     "x86_64+avx2+bmi1+bmi2+popcnt"
@@ -119,7 +119,7 @@ pub(in crate::search) fn intersect(a: &[u64], b: &[u64], lasts: &[u64], from: us
     count - of_first(out[first]) + of_first(out[first] & (!0 << (from % 64)))
 }
 
-/// How many bits a ∧ b has from a bit on.
+/// The number of bits of a ∧ b from a bit on.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512vl+avx512bw+avx512dq+avx512vpopcntdq+popcnt",
     "x86_64+avx2+bmi1+bmi2+popcnt"
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn groups_are_found_that_hold_a_bit() {
-        // Of 1, 2, 5, 32, 23 bits and one.
+        // Groups of 1, 2, 5, 32, 23 and 1 bits.
         let ends: [u32; 6] = [1, 3, 8, 40, 63, 64];
         let lasts = ends.iter().fold(0, |lasts, end| lasts | 1 << (end - 1));
         let last_of = |bit: u32| 1u64 << (ends.iter().find(|&&end| bit < end).expect("within") - 1);
@@ -171,7 +171,7 @@ mod tests {
     fn what_is_common_from_a_bit_on_is_counted() {
         let (a, b) = ([0b1110, !0], [0b0111, 0b11 << 62]);
         let mut out = [0; 2];
-        // Groups of one bit each, and of three, one and sixty; of two, one and sixty-one.
+        // Groups of one bit each; groups of three, one and sixty, and of two, one and sixty-one.
         let (single, lasts) = ([!0; 2], [1 << 63 | 0b1100, 1 << 63 | 0b110]);
         for (lasts, counts) in [(&single, [3, 2]), (&lasts, [2, 1])] {
             assert_eq!([2, 64].map(|from| intersect(&a, &b, lasts, from, &mut out)), counts);

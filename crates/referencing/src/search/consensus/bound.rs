@@ -1,4 +1,4 @@
-//! How likely a set can be at best, from what its first members have in common.
+//! Upper bounds of the evidence of a set, from the common neighbours of its first members.
 
 use super::{
     bits::{Held, each_held, groups, shared},
@@ -7,17 +7,19 @@ use super::{
     prior_terms::PriorTerms,
 };
 
-/// What the information of a set may fall short of that of as many average points (nats).
+/// Allowance (nats) for a set whose information is below that of as many average points.
 const SLACK: f64 = 3.0;
-/// What residuals are taken to cost at most (nats). Those of larger sets cost more, but some two of twenty true pairs are further
-/// from each other than the tolerance, which a bound by common neighbours does not see: with all that they cost, the pose of 26
-/// pairs is lost to another of 23 in one of 252 frames of a self-similar model, and already with six nats one pair of twelve is
-/// lost in one of 252 frames of fifty points.
+/// Maximum residual cost (nats) assumed by the pruning bounds.
+///
+/// The residuals of larger sets cost more. But among twenty true pairs some two differ by more than the tolerance, and
+/// a bound by common neighbours does not see that. With the full cost, the pose of 26 pairs is lost to another of 23 in
+/// one of 252 frames of a self-similar model; with six nats, one pair of twelve is lost in one of 252 frames of fifty
+/// points.
 const DISTORTION: f64 = 4.0;
-/// What rounding may cost a sum, as a share of it.
+/// Relative rounding error of a sum.
 const ROUNDING: f64 = 1e-12;
 
-/// What may come after a model point of a set: so many others, and what they bring at most.
+/// The choices after a model point of a set: their number and their maximum contribution.
 #[derive(Clone, Copy, Default)]
 pub(in crate::search) struct After {
     more: u32,
@@ -25,36 +27,36 @@ pub(in crate::search) struct After {
 }
 
 impl After {
-    /// With so many others before, and what they bring.
+    /// The total number and contribution, with the pairs before.
     pub(in crate::search) fn with(&self, (k, gains): (usize, f64)) -> (usize, f64) {
         (k + self.more as usize, gains + self.bring)
     }
 }
 
-/// Bounds of the evidence of sets.
+/// Upper bounds of the evidence of sets.
 ///
-/// A set has one pair a model point, each with that point's greatest gain at most, the share B(k) of its number, and
-/// a volume of the posterior about that of k average points, less what the residuals of k true pairs cost. Its bound
-/// grows with every model point that may join it.
+/// A set has one pair for each model point, with at most that point's greatest gain, the probability B(k) of its
+/// number, and the posterior volume of k average points, less the residual cost of k true pairs. The bound grows with
+/// every model point that may join.
 pub(in crate::search) struct Bounds<'a> {
     graph: &'a ConsistencyGraph,
     terms: &'a Terms,
     /// Greatest gain of each model point by rank, at least `grows`.
     top: Vec<f64>,
-    /// What a pair must gain so that the bound grows by it.
+    /// Minimum gain of a pair for which the bound still grows.
     grows: f64,
-    /// The greatest gain of all.
+    /// Greatest gain of all model points.
     greatest: f64,
-    /// Whether every model point has one candidate: then pairs are counted instead of model points.
+    /// Whether every model point has one candidate; pairs are then counted instead of model points.
     single: bool,
-    /// What is added to the gains of k pairs.
+    /// The term added to the gains of k pairs.
     of_number: Vec<f64>,
-    /// Smaller sets are of no interest.
+    /// Minimum size of a set of interest.
     pub(in crate::search) min: usize,
 }
 
 impl<'a> Bounds<'a> {
-    /// Bounds that prune, taken from what sets are on average.
+    /// Pruning bounds, from the properties of average sets.
     pub(in crate::search) fn of(
         (terms, prior_terms, graph): (&'a Terms, &PriorTerms, &'a ConsistencyGraph),
         min: usize,
@@ -64,14 +66,15 @@ impl<'a> Bounds<'a> {
         Self::with((terms, graph), min, of_number)
     }
 
-    /// Bounds that hold: whatever fits, `ln_posterior_volume` (k) being no less than ln of the share of the prior that the posterior of k pairs
-    /// fills.
+    /// Strict bounds, from upper bounds of the posterior volumes.
+    ///
+    /// `ln_posterior_volume` (k) is an upper bound of the log posterior volume of k pairs relative to the prior.
     pub(in crate::search) fn proved(
         (terms, graph): (&'a Terms, &'a ConsistencyGraph),
         ln_posterior_volume: &[f64],
     ) -> Self {
         let mut bounds = Self::with((terms, graph), 0, |k| terms.ln_fraction[k] + ln_posterior_volume[k]);
-        // A smaller set may be worth more by its volume than a larger one that holds it: no bound is less than that.
+        // A smaller set may exceed a larger one that contains it by its volume: the bound covers both.
         for k in 1..bounds.of_number.len() {
             bounds.of_number[k] = bounds.of_number[k].max(bounds.of_number[k - 1] - bounds.grows);
         }
@@ -95,49 +98,51 @@ impl<'a> Bounds<'a> {
         }
     }
 
-    /// What a model point brings to a bound with a pair that gains so much.
+    /// The contribution of a model point with a pair of this gain.
     pub(in crate::search) fn brings(&self, gain: f64) -> f64 {
         gain.max(self.grows)
     }
 
-    /// What one pair brings at most.
+    /// The maximum contribution of one pair.
     pub(in crate::search) fn gain(&self, v: usize) -> f64 {
         self.brings(self.terms.pairs[v].gain)
     }
 
-    /// What each model point brings at most, by rank.
+    /// The maximum contribution of each model point, by rank.
     pub(in crate::search) fn tops(&self) -> &[f64] {
         &self.top
     }
 
-    /// What a model point brings at most.
+    /// The maximum contribution of a model point.
     pub(in crate::search) fn gain_of_rank(&self, rank: usize) -> f64 {
         self.top[rank]
     }
 
-    /// What is added to the gains of `k` pairs.
+    /// The term added to the gains of `k` pairs.
     pub(in crate::search) fn of_number(&self, k: usize) -> f64 {
         self.of_number[k]
     }
 
-    /// By how much these are above others of the same problem at most (nats), where they are `enough`.
+    /// The maximum excess (nats) of these bounds over others of the same problem, among sets that reach `enough`.
     pub(in crate::search) fn above(&self, other: &Self, enough: f64) -> f64 {
         let reaching = (other.min..self.of_number.len()).filter(|&k| self.reach(0, 0.0, k) > enough);
         reaching.map(|k| self.of_number[k] - other.of_number[k]).fold(0.0, f64::max)
     }
 
-    /// The bound of `k` pairs that bring `gains`.
+    /// The bound of `k` pairs with the contribution `gains`.
     pub(in crate::search) fn of_set(&self, k: usize, gains: f64) -> f64 {
         gains + self.of_number[k]
     }
 
-    /// The bound of `own` pairs that bring `gains` and `more` of the best.
+    /// The bound of `own` pairs with the contribution `gains` and `more` pairs of the greatest gain.
     pub(in crate::search) fn reach(&self, own: usize, gains: f64, more: usize) -> f64 {
         self.of_set(own + more, gains + self.greatest * more as f64)
     }
 
-    /// How many pairs `own` ones that bring `gains` may come to with those of `common` from rank `from` on, of no more than
-    /// `count` model points, and the bound of these, if they come to `min`; where even rough ones fall short, the rough ones.
+    /// The number of pairs in reach of `own` ones and their bound, if they reach `min`.
+    ///
+    /// The pairs have the contribution `gains`; further ones come from `common`, from rank `from` on, with at most
+    /// `count` model points. A coarse bound is returned if it falls short already.
     pub(in crate::search) fn with_common(
         &self,
         (own, gains): (usize, f64),
@@ -158,18 +163,20 @@ impl<'a> Bounds<'a> {
         (k, if k < min { f64::NEG_INFINITY } else { self.of_set(k, sum) })
     }
 
-    /// `own` pairs that bring `gains` and the best of each model point of `common` from rank `from` on: how many, and what they bring.
+    /// The number and contribution of `own` pairs with the best pair of each further model point.
+    ///
+    /// The further model points are those of `common` from rank `from` on.
     pub(in crate::search) fn joined(&self, (own, gains): (usize, f64), common: &[u64], from: usize) -> (usize, f64) {
         let (mut k, mut sum, mut last) = (own, gains, u32::MAX);
         each_held(common, self.graph.starts[from], |begin, word| {
             let mut rest = groups(word, self.graph.lasts[begin / 64]);
             let mut v = begin;
             while rest != 0 {
-                // Two at a time, chosen rather than branched upon: no processor foresees how many a word holds.
+                // Two at a time by selection, since branches on the number in a word are unpredictable.
                 for _ in 0..2 {
                     v = if rest == 0 { v } else { begin + rest.trailing_zeros() as usize };
                     rest &= rest.wrapping_sub(1);
-                    // A model point whose pairs go on in the next word counts once.
+                    // A model point whose pairs continue in the next word counts once.
                     let rank = self.graph.rank[v];
                     let (one, top) = if rank == last { (0, 0.0) } else { (1, self.top[rank as usize]) };
                     (k, sum, last) = (k + one, sum + top, rank);
@@ -179,8 +186,10 @@ impl<'a> Bounds<'a> {
         (k, sum)
     }
 
-    /// Whether the same bound of three pairs or more and of those of `common` from a bit on that are set in `row` is `enough`: known
-    /// before all of it is, since it grows with every model point.
+    /// Whether the bound of some pairs with their common neighbours reaches `enough`.
+    ///
+    /// The pairs are three or more; the neighbours are those in `row` from a bit on. The bound grows with every model
+    /// point, so that the test ends early.
     pub(in crate::search) fn is_enough(
         &self,
         (own, gains): (usize, f64),
@@ -213,12 +222,12 @@ impl<'a> Bounds<'a> {
         false
     }
 
-    /// Lists what may come after each model point of a set, by rank; those that it does not hold keep what they had.
+    /// Lists the choices after each model point of a set, by rank; entries of other ranks are unchanged.
     pub(in crate::search) fn list(&self, set: &[Held], after: &mut Vec<After>) {
         self.list_of(set, &self.top, after);
     }
 
-    /// The same where model points bring no more than `top` of their rank.
+    /// The list with the contributions `top` of the ranks.
     pub(in crate::search) fn list_of(&self, set: &[Held], top: &[f64], after: &mut Vec<After>) {
         after.resize(self.top.len(), After::default());
         let (mut last, mut all) = (u32::MAX, After::default());
@@ -236,7 +245,7 @@ impl<'a> Bounds<'a> {
         }
     }
 
-    /// Whether `own` pairs that bring `gains` fall short of what is asked for even with all that may come after the last of them.
+    /// Whether `own` pairs fall short even with all choices after the last of them.
     pub(in crate::search) fn falls_short(
         &self,
         (own, gains): (usize, f64),
@@ -244,13 +253,13 @@ impl<'a> Bounds<'a> {
         (min, enough): (usize, f64),
     ) -> bool {
         let (k, sum) = after.with((own, gains));
-        // Summed in another order than the bounds that decide.
+        // The order of summation differs from that of the deciding bounds.
         k < min || self.of_set(k, sum) + ROUNDING * (1.0 + sum.abs() + enough.abs()) < enough
     }
 }
 
-/// What the residuals of `k` true pairs cost under their own pose (nats): ½χ² of 3k − 6 degrees of freedom on average, but no more
-/// than [`DISTORTION`].
+/// The mean residual cost of `k` true pairs under their own pose (nats): ½χ² of 3k − 6 degrees of freedom, limited to
+/// [`DISTORTION`].
 fn distortion(k: usize) -> f64 {
     (1.5 * k as f64 - 3.0).clamp(0.0, DISTORTION)
 }
@@ -268,7 +277,7 @@ mod tests {
         search::consensus::bits::{intersect, is_set, ones},
     };
 
-    /// The bound of some pairs and of those of a set from a rank on, one pair after the other.
+    /// The bound of some pairs and of those of a set from a rank on, computed pair by pair.
     fn one_by_one(bounds: &Bounds<'_>, own: &[usize], set: &[u64], from: usize) -> f64 {
         let gains: f64 = own.iter().map(|&v| bounds.gain(v)).sum();
         let joining = (0..bounds.graph.vertices.len()).filter(|&v| is_set(set, v));
@@ -281,9 +290,9 @@ mod tests {
         bounds.of_set(own.len() + ranks.len(), ranks.iter().fold(gains, |sum, &rank| sum + bounds.gain_of_rank(rank)))
     }
 
-    /// Model points with one to ninety candidates, so that those of some go on in the next word.
+    /// Model points with one to ninety candidates, so that some continue in the next word.
     ///
-    /// Seen to fail where a model point counts once a word, and where what comes after one leaves its neighbour out.
+    /// Fails if a model point counts once a word, and if the choices after a model point skip its neighbour.
     #[test]
     fn the_bounds_agree() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -333,6 +342,6 @@ mod tests {
                 }
             }
         }
-        assert!(threes > 1000 && spans > 100, "{threes} threes, {spans} of model points in two words");
+        assert!(threes > 1000 && spans > 100, "{threes} triples, {spans} of model points in two words");
     }
 }

@@ -1,37 +1,38 @@
-//! Clutter that is bunched about the places where the prior expects the model points.
+//! Clutter that is clumped about the predicted places of the model points.
 
 use nalgebra::Vector3;
 
 use super::prior_terms::{BOUND_SIGMAS, Known};
 use crate::Problem;
 
-/// Boxes about a predicted place, each half as wide as the one before.
+/// Number of nested boxes about a predicted place, each half as wide as the previous.
 const BOXES: usize = 3;
-/// The share of a box that the next one fills.
+/// Fraction of a box's volume that the next fills.
 const FRACTION: f64 = 0.125;
-/// So many more points within the second box than evenly spread clutter has there, in standard deviations, are no accident;
+/// Excess of points in the second box over uniform clutter, in standard deviations, that is significant.
 const NO_ACCIDENT: f64 = 4.0;
-/// and where it is less than so many times as dense there, it is as even as clutter is.
+/// Density ratio in the second box below which clutter counts as uniform.
 const CLUMPED: f64 = 2.0;
 
-/// How many cloud points lie how near to the predicted places, of all model points together.
+/// Counts of cloud points by their distance from the predicted places, over all model points.
 ///
-/// The terms of a pose take clutter to be spread evenly about each predicted place, and the clutter about any one place is too little to
-/// tell. About all of them together it is enough: where it is bunched there, as about a structure that is where the object was
-/// expected, poses near the prediction find points that fit well much more often, and each says less.
+/// The terms of a pose assume uniform clutter about each predicted place, and the clutter about a single place is too
+/// little to test that. The counts over all places suffice. If clutter is clumped there, as about a structure where the
+/// object was expected, poses near the prediction find fitting points much more often, and each point has less
+/// evidence.
 pub(super) struct ClumpedClutter {
-    /// About how many predicted places each cloud point lies, by rings: what a box holds and the next one does not.
+    /// The number of places about each cloud point by rings, the difference of a box and the next.
     rings: Vec<[usize; BOXES]>,
-    /// The sum of all, and how many points lie about any.
+    /// The sums over all points, and the number of points in any box.
     counts: [usize; BOXES],
     points: usize,
 }
 
-/// By how much clutter is denser in each ring than in all of them (nats).
+/// The excess density of clutter in each ring over the outermost box (nats).
 pub(super) struct Excess([f64; BOXES]);
 
 impl ClumpedClutter {
-    /// About the model points that have candidates. Time O(n M).
+    /// The counts about the model points with candidates. Time O(n M).
     pub(super) fn of(problem: &Problem<'_>, known: &Known) -> Self {
         let cloud: Vec<Vector3<f64>> = problem.cloud.iter().map(|point| point.position.at.coords).collect();
         let mut rings = vec![[0; BOXES]; cloud.len()];
@@ -49,7 +50,7 @@ impl ClumpedClutter {
         Self { rings, counts, points }
     }
 
-    /// Where the cloud points of a pose are the object's and all others are clutter.
+    /// The excess if the cloud points of a pose are the object's and all others are clutter.
     pub(super) fn beside(&self, of_pose: &[usize]) -> Excess {
         let (mut counts, mut points) = (self.counts, self.points);
         for &cloud in of_pose {
@@ -58,7 +59,7 @@ impl ClumpedClutter {
             points -= usize::from(*rings != [0; BOXES]);
         }
         let (all, near) = (counts.iter().sum::<usize>() as f64, counts[1..].iter().sum::<usize>() as f64);
-        // A point that lies about several places is one accident.
+        // A point that lies about several places is one event.
         let places_a_point = all / points as f64;
         let expected = FRACTION * all;
         let more = (NO_ACCIDENT * (expected * places_a_point).sqrt()).max((CLUMPED - 1.0) * expected);
@@ -74,13 +75,14 @@ impl ClumpedClutter {
 }
 
 impl Excess {
-    /// About a place where a model point was measured; none outside the boxes.
+    /// The excess at the measured place of a model point; zero outside the boxes.
     pub(super) fn about(&self, known: &Known, model: usize, at: &Vector3<f64>) -> f64 {
         About::of(known, model).ring(at).map_or(0.0, |ring| self.0[ring])
     }
 }
 
-/// The boxes about the predicted place of a model point. The first is that of a prior's shell, or as wide as three standard deviations.
+/// The boxes about the predicted place of a model point. The first is the gate of the prior, or three standard
+/// deviations wide to each side.
 struct About {
     place: Vector3<f64>,
     half: Vector3<f64>,
@@ -92,11 +94,11 @@ impl About {
         Self { place, half: known.half.map_or(spread * BOUND_SIGMAS, Vector3::repeat) }
     }
 
-    /// The ring that a place lies in.
+    /// The ring of a place.
     #[inline]
     fn ring(&self, at: &Vector3<f64>) -> Option<usize> {
         let off = at - self.place;
-        // Most are far: that is known by the first axes.
+        // Most places are far: the first axes decide.
         if off.x.abs() > self.half.x || off.y.abs() > self.half.y || off.z.abs() > self.half.z {
             return None;
         }
@@ -117,8 +119,8 @@ mod tests {
 
     const HALF: f64 = 0.4;
 
-    /// The excess by ring of eight points, ten pieces of clutter drawn about the predicted place of each; the last three of each are a pose's
-    /// if it is said so.
+    /// The excess by ring for eight points with ten clutter points about each; with `of_pose` the last three belong to
+    /// a pose.
     fn excess(mut sampled: impl FnMut(usize) -> Vector3<f64>, of_pose: bool) -> [f64; BOXES] {
         let model: Vec<ModelPoint> =
             (0..8).map(|i| ModelPoint::exact("", Vector3::new(3.0 * i as f64, 0.0, 5.0).into())).collect();
@@ -141,10 +143,12 @@ mod tests {
         places.map(|at| excess.about(known, 3, &at))
     }
 
-    /// Evenly spread clutter has none, whether a pose has some of it or what is bunched is the pose's; of clutter all within the
-    /// second box that is eight times as dense, but for the hole that it leaves in the third.
+    /// The excess of uniform clutter and of a clump.
     ///
-    /// Seen to fail where the pose's own points count, and where rings are taken for boxes.
+    /// Uniform clutter has no excess, even if a pose takes some of it or if the clump belongs to the pose. Clutter that
+    /// lies entirely within the second box is eight times as dense, except for the hole that it leaves in the third.
+    ///
+    /// Fails if the pose's own points count, and if rings are taken for boxes.
     #[test]
     fn clutter_is_as_dense_as_it_is_generated() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);

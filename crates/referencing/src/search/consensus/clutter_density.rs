@@ -1,4 +1,4 @@
-//! Clutter that crowds: where many points are, some lie well for any pose.
+//! Local density of clutter: in dense clutter some points fit any pose.
 
 use std::collections::BTreeMap;
 
@@ -13,37 +13,37 @@ use super::{
 };
 use crate::{Correspondence, Problem};
 
-/// The density about a point is that of so many neighbours, of so many that are looked up.
+/// Number of neighbours that define the density about a point, and number of neighbours looked up.
 const NEIGHBOURS: usize = 3;
 const MAX_NEIGHBOURS: usize = 8;
-/// So many times the density that was expected may be an accident: one point in 25 has it in evenly spread clutter.
+/// Ratio to the expected density up to which it may be random: uniform clutter exceeds it at one point in 25.
 const DENSE: f64 = 4.0;
 
-/// Points nearer to each other than so many standard deviations may be one place that is measured twice.
+/// Distance (standard deviations) below which two points may be one place measured twice.
 const SYMMETRIC: f64 = 5.0;
 
-/// How crowded the cloud is about its points.
+/// The local density of the cloud about its points.
 ///
-/// The terms of a pose take clutter to be spread evenly in each shell. On the edges of a box, or where it clumps, it is not:
-/// there a pose finds points that fit well much more often, and each says less.
+/// The terms of a pose assume uniform clutter in each gate. On the edges of a box or in clumps, a pose finds fitting
+/// points much more often, and each has less evidence.
 #[derive(Default)]
 pub(in crate::search) struct ClutterDensity {
-    /// Of the cloud points looked up: their nearest neighbours by the square of the distance (m²), ascending.
+    /// The nearest neighbours of the cloud points looked up, by squared distance (m²), ascending.
     nearest: BTreeMap<usize, Vec<(f64, usize)>>,
-    /// The cloud points that count.
+    /// The cloud points that count as clutter.
     counted: Option<Counted>,
-    /// How near to the predicted places the cloud points are.
+    /// The clutter about the predicted places.
     clumped_clutter: Option<ClumpedClutter>,
-    /// The share of the candidates that have another within a distance (m), where two members of a pose were so near.
+    /// A distance (m) and the fraction of candidates with another so near; `None` until it is needed.
     duplicates: Option<(f64, f64)>,
 }
 
 impl ClutterDensity {
-    /// Weighs a mode anew, with clutter as dense about each of its points as the cloud is there, or as it is about the predicted places
-    /// of all model points ([`ClumpedClutter`]).
+    /// Recomputes the evidence of a mode with the local clutter density about each of its points.
     ///
-    /// A point in a crowd may say less than nothing for a pose; it is then rather clutter than the object's, and
-    /// the evidence is summed over which of the members are the object's ([`ln_visible`]).
+    /// The density is that about the point, or that about the predicted places of all model points
+    /// ([`ClumpedClutter`]). A point in dense clutter may contribute negatively; it is then rather clutter than the
+    /// object's. The evidence is summed over the subsets of members that are the object's ([`ln_visible`]).
     pub(in crate::search) fn weigh(
         &mut self,
         problem: &Problem<'_>,
@@ -74,8 +74,8 @@ impl ClutterDensity {
         mode.ln_clutter_density = even - dense;
     }
 
-    /// The same of a point that is measured beside one of the members before it: the second of two places a few standard
-    /// deviations apart is there as often as candidates have another so near.
+    /// The excess density (nats) of a point measured beside an earlier member. The second of two points a few standard
+    /// deviations apart is as frequent as candidates have another so near.
     fn duplicate(
         &mut self,
         problem: &Problem<'_>,
@@ -99,7 +99,7 @@ impl ClutterDensity {
         (libm::log(fraction / volume) - terms.ln_density_about(v, pair.model)).max(0.0)
     }
 
-    /// By how much the density about the cloud point of a vertex exceeds what was expected (nats).
+    /// The excess density about the cloud point of a vertex over the expected (nats).
     fn cost(
         &mut self,
         problem: &Problem<'_>,
@@ -115,10 +115,10 @@ impl ClutterDensity {
         let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
             return 0.0;
         };
-        // What is nearer than the noise is one place.
+        // Points nearer than the noise are one place.
         let noise = problem.cloud[pair.cloud].position.covariance.trace() / 3.0;
         let volume = 4.0 / 3.0 * std::f64::consts::PI * square.max(noise).max(f64::MIN_POSITIVE).powf(1.5);
-        // Of candidates that were given without a prior, the others of the cloud are as near as they would be by chance.
+        // For candidates given without a prior, the other points of the cloud are at random distances.
         let even = match problem.prior {
             Some(_) => terms.ln_density_about(v, pair.model),
             None => {
@@ -131,11 +131,10 @@ impl ClutterDensity {
     }
 }
 
-/// ln of the likelihood ratio of a member's model point, whichever of its candidates it is: Σ_j r_ij over those near its place,
-/// r_ij the ratio of each and `own` ln of the member's.
+/// ln of the likelihood ratio of a member's model point over all its candidates: Σ_j r_ij over those near its place.
 ///
-/// Where clutter crowds, the best of several is as near as that by chance; only of their sum is the expectation without an
-/// object one.
+/// r_ij is the ratio of candidate j, and `own` is ln of the member's. The best of several candidates in dense clutter
+/// is near by chance; only the sum has the expectation one without an object.
 fn any_of(terms: &Terms, graph: &ConsistencyGraph, v: usize, mode: &Mode, own: f64) -> f64 {
     let rank = graph.rank[v] as usize;
     let others = (graph.starts[rank]..graph.starts[rank + 1]).filter(|&other| other != v);
@@ -143,8 +142,7 @@ fn any_of(terms: &Terms, graph: &ConsistencyGraph, v: usize, mode: &Mode, own: f
     own + libm::log1p(fractions.sum())
 }
 
-/// The share of the candidates that have another within `reach` (m). Points that are nobody's candidates are none of this
-/// search's.
+/// The fraction of the candidates that have another within `reach` (m). Points that are no candidates do not count.
 fn duplicates(problem: &Problem<'_>, reach: f64) -> f64 {
     let mut all: Vec<usize> = problem.candidates.lists.iter().flatten().copied().collect();
     all.sort_unstable();
@@ -163,12 +161,12 @@ fn duplicates(problem: &Problem<'_>, reach: f64) -> f64 {
     duplicate.iter().filter(|duplicate| **duplicate).count() as f64 / all.len() as f64
 }
 
-/// The cloud points that are clutter where they are not the object's: without a prior the candidates, else all.
+/// The cloud points that are clutter unless they are the object's: without a prior the candidates, else all.
 struct Counted {
     points: Vec<usize>,
-    /// Where they are, axis by axis.
+    /// Their coordinates by axis.
     places: [Vec<f64>; 3],
-    /// Squares of their distances from a place (m²).
+    /// Their squared distances from a place (m²).
     squares: Vec<f64>,
 }
 
@@ -185,13 +183,13 @@ impl Counted {
         Self { places, squares: vec![0.0; points.len()], points }
     }
 
-    /// The nearest neighbours of a cloud point, and the squares of their distances.
+    /// The nearest neighbours of a cloud point with their squared distances.
     fn nearest(&mut self, of: usize, at: &Vector3<f64>) -> Vec<(f64, usize)> {
         squares(&self.places, at, &mut self.squares);
         let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(MAX_NEIGHBOURS + 1);
         let mut farthest = f64::INFINITY;
         for (&square, &j) in self.squares.iter().zip(&self.points) {
-            // Nothing is nearer than what is no number, and all is that is finite as long as few are known.
+            // Negated comparison: NaN is skipped, and every finite distance passes while few are known.
             if !(square < farthest) || j == of {
                 continue;
             }
@@ -206,7 +204,7 @@ impl Counted {
     }
 }
 
-/// The squares of the distances of some places from one.
+/// The squared distances of some places from one.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn squares([x, y, z]: &[Vec<f64>; 3], at: &Vector3<f64>, squares: &mut [f64]) {
     for (square, ((x, y), z)) in squares.iter_mut().zip(x.iter().zip(y).zip(z)) {
@@ -228,7 +226,7 @@ mod tests {
     const SIGMA: f64 = 0.1;
     const HALF: f64 = 1.0;
 
-    /// Of one model point at the origin, its candidates at these places: the likelihood ratio of the nearest, and of whichever.
+    /// The likelihood ratios of the nearest candidate and of all candidates, for one model point at the origin.
     fn ratios(places: &[Vector3<f64>]) -> (f64, f64) {
         let measured = |at: &Vector3<f64>| MeasuredPoint {
             position: UncertainPoint::isotropic((*at).into(), SIGMA),
@@ -239,32 +237,32 @@ mod tests {
         let candidates = Candidates::all(1, cloud.len());
         let tolerance = Tolerance::Sigmas(4.0);
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
-        let prior_terms = PriorTerms::of(&problem).expect("there is no prior to refuse");
+        let prior_terms = PriorTerms::of(&problem).expect("no prior to reject");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);
         let motion = Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() };
         let gain = |v: &usize| terms.residual_gain(*v, &motion);
-        let nearest = (0..cloud.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("there are some");
+        let nearest = (0..cloud.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("a candidate");
         let mode = Mode { members: vec![nearest], motion, ln_evidence: 0.0, ln_even: 0.0, ln_clutter_density: 0.0 };
         let own = gain(&nearest);
         (libm::exp(own), libm::exp(any_of(&terms, &graph, nearest, &mode, own)))
     }
 
-    /// Seen to fail when only the nearest counts, and when the member counts twice.
+    /// Fails if only the nearest counts, and if the member counts twice.
     #[test]
     fn without_an_object_the_ratio_of_whichever_candidate_is_one_on_average() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let frames = 4000;
         let (mut nearest, mut whichever) = (0.0, 0.0);
         for _ in 0..frames {
-            // Two corners, so that the box of the candidates is the one they are drawn in.
+            // Two corners fix the bounding box of the candidates.
             let mut places = vec![Vector3::repeat(-HALF), Vector3::repeat(HALF)];
             places.extend((0..200).map(|_| Vector3::from_fn(|_, _| rng.random_range(-HALF..HALF))));
             let (of_nearest, of_any) = ratios(&places);
             nearest += of_nearest / f64::from(frames);
             whichever += of_any / f64::from(frames);
         }
-        // 200 of the 202 are drawn; its standard deviation is .015.
+        // 200 of the 202 are random; the standard deviation of the mean is .015.
         assert!((whichever - 1.0).abs() < 0.06, "{whichever}");
         assert!(nearest < 0.9, "{nearest}");
     }

@@ -1,29 +1,29 @@
-//! What it costs that distances in the cloud are not those of the model.
+//! Distance residuals: lower bounds of the residual cost from distances alone.
 
 use nalgebra::Vector3;
 
 use super::likelihood::Term;
 
-/// What second order may add to the variance of a distance, as a share of it; it also keeps three places on a line apart.
+/// Relative allowance for second-order terms in the variance of a distance; it also keeps collinear places regular.
 const CURVED: f64 = 0.1;
 
-/// So much strain (nats) is let pass: it may be of a pair near the right one, in whose place a better is chosen once the pose is fitted.
+/// Residual (nats) that is tolerated: a pair near the right one may cause it and is replaced once the pose is fitted.
 const PASSES: f64 = 3.0;
 
-/// What the bound of a set loses to its strain (nats).
+/// The reduction of a set's bound by its distance residual (nats).
 #[inline]
 pub(in crate::search) fn lost_to(distance_residual: f64) -> f64 {
     (distance_residual - PASSES).max(0.0)
 }
 
-/// The distance of two pairs: how it differs, and where it points.
+/// The distance of two pairs, with its error and direction.
 #[derive(Clone, Copy)]
 pub(in crate::search) struct Edge {
-    /// Measured minus known (m).
+    /// Measured minus model distance (m).
     scale_error: f64,
-    /// From the first measured place to the second.
+    /// Direction from the first measured place to the second.
     along: Vector3<f64>,
-    /// Of the stretch (m²).
+    /// Variance of the distance error (m²).
     variance: f64,
 }
 
@@ -40,15 +40,16 @@ impl Edge {
     }
 }
 
-/// ½ χ² of the distance of two pairs: no pose that both fit has less of a residual (nats).
+/// ½ χ² of the distance of two pairs: a lower bound of their residual cost under any pose (nats).
 #[inline]
 pub(in crate::search) fn residual_of_two(a: &Term, b: &Term) -> f64 {
     let edge = Edge::of(a, b);
     0.5 * edge.scale_error * edge.scale_error / edge.variance
 }
 
-/// ½ χ² of the three distances of three pairs: dᵀ (J Σ Jᵀ)⁻¹ d / 2, J what the errors of three places make of their distances.
-/// No pose that all fit has less of a residual (nats), errors taken to be small beside the distances.
+/// ½ χ² of the three distances of three pairs: dᵀ (J Σ Jᵀ)⁻¹ d / 2, J the derivative of the distances by the places.
+///
+/// A lower bound of their residual cost under any pose (nats), for errors that are small relative to the distances.
 #[inline]
 pub(in crate::search) fn residual_of_three([a, b, c]: [&Term; 3], [ab, ac, bc]: [&Edge; 3]) -> f64 {
     let (aa, bb, cc) = (ab.variance, ac.variance, bc.variance);
@@ -63,7 +64,7 @@ pub(in crate::search) fn residual_of_three([a, b, c]: [&Term; 3], [ab, ac, bc]: 
         + z * z * (aa * bb - of_a * of_a)
         + 2.0 * (x * y * q + x * z * r + y * z * (of_a * of_b - aa * of_c));
     let distance_residual = 0.5 * square / determinant;
-    // Places that coincide have no direction: nothing is known.
+    // Coincident places have no direction: no information.
     if distance_residual.is_finite() { distance_residual.max(0.0) } else { 0.0 }
 }
 
@@ -79,7 +80,7 @@ mod tests {
 
     const SIGMA: f64 = 0.01;
 
-    /// ½ χ² of the best pose of these measured places, equally well known.
+    /// ½ χ² of the best pose of these measured places with equal isotropic noise.
     fn min_residual(model: &[Vector3<f64>; 3], cloud: &[Vector3<f64>; 3]) -> f64 {
         let points = model.map(|at| ModelPoint::exact("", at.into()));
         let measured =
@@ -90,7 +91,7 @@ mod tests {
         (0..3).map(|i| residual(i).powi(2)).sum::<f64>() / (2.0 * SIGMA * SIGMA)
     }
 
-    /// Seen to fail with the sign of the second point's share turned, and where the variance is that of one point.
+    /// Fails with the opposite sign of the second point's part, and with the variance of one point only.
     #[test]
     fn the_residual_of_three_is_the_smallest_residual_but_for_what_is_curved() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -117,7 +118,7 @@ mod tests {
             let [ab, ac, bc] = [Edge::of(&a, &b), Edge::of(&a, &c), Edge::of(&b, &c)];
             let distance_residual = residual_of_three([&a, &b, &c], [&ab, &ac, &bc]);
             let min = min_residual(&model, &cloud);
-            // In a flat triangle the distances hang together, and what is allowed for curvature costs more of χ².
+            // In a flat triangle the distances are correlated, and the allowance for curvature costs more of χ².
             let fraction = if flat < 0.5 { 0.0 } else { 0.8 };
             assert!(
                 distance_residual <= min + 0.02 && distance_residual >= fraction * min - 0.1,
@@ -126,7 +127,7 @@ mod tests {
             let of_edge = |edge: Edge| 0.5 * edge.scale_error * edge.scale_error / edge.variance;
             assert!(
                 [ab, ac, bc].into_iter().all(|edge| of_edge(edge) <= distance_residual + 1e-9),
-                "an edge alone costs more"
+                "a single edge has a larger residual"
             );
             compared += 1;
         }
@@ -147,7 +148,7 @@ mod tests {
             residual_of_three([&a, &b, &c], [&Edge::of(&a, &b), &Edge::of(&a, &c), &Edge::of(&b, &c)])
         };
         assert_eq!(distance_residual([(0.0, 0.0), (0.0, 1.0), (2.0, 3.0)]), 0.0);
-        // The end point a σ too far: a third of χ² stays, the rest is shared.
+        // The end point is one σ too far: a third of χ² remains, the rest is shared.
         let along = distance_residual([(0.0, 0.0), (1.0, 1.0), (4.0, 3.0)]);
         assert!((0.0..1.0 / 3.0).contains(&along) && along > 0.1, "{along}");
     }

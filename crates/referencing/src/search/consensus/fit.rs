@@ -1,4 +1,4 @@
-//! The most likely motion of some pairs, by Gauss's and Newton's steps.
+//! The MAP motion of some pairs, by Gauss–Newton steps.
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3, Vector6};
 
@@ -9,27 +9,28 @@ use super::{
     solve6::{factor as factor_of, solve},
 };
 
-/// A fit whose step is shorter than this (squared, in standard deviations) has converged.
+/// Squared step length (in standard deviations) below which a fit has converged.
 const CONVERGED: f64 = 1e-12;
 
-/// The posterior of some pairs about one motion, made linear in the step (φ, τ): a turn about where the model's centroid is, and a
-/// shift.
+/// The posterior of some pairs, linearised about a motion.
+///
+/// The step is (φ, τ): a rotation about the model's centroid and a translation.
 pub(in crate::search) struct Linear {
     motion: Motion,
-    /// Where the centroid is.
+    /// The centroid under the motion.
     about: Vector3<f64>,
-    /// How far the motion is from what the prior predicts.
+    /// Difference η of the motion from the prior's.
     eta: Option<Vector6<f64>>,
-    /// Factor of the information, H.
+    /// Cholesky factor of the information H.
     factor: Cholesky<f64, U6>,
-    /// To the maximum.
+    /// The step to the maximum.
     step: Vector6<f64>,
-    /// The Newton decrement: the square of the step in standard deviations.
+    /// The Newton decrement: the squared step length in standard deviations.
     decrement: f64,
 }
 
 impl Linear {
-    /// `None` where the pairs and the prior leave the motion open.
+    /// The linearisation; `None` if pairs and prior do not determine the motion.
     pub(in crate::search) fn at(
         terms: &Terms,
         prior_terms: &PriorTerms,
@@ -88,28 +89,28 @@ impl Linear {
         self.moved_by(1.0)
     }
 
-    /// The motion after so much of the step.
+    /// The motion after a fraction of the step.
     pub(in crate::search) fn moved_by(&self, fraction: f64) -> Motion {
         let step = self.step * fraction;
         self.motion.moved(&step.fixed_rows::<3>(0).into(), &step.fixed_rows::<3>(3).into(), &self.about)
     }
 
-    /// By how much the step lowers what residuals and prior cost (nats), if turns were small.
+    /// The decrease of the cost of residuals and prior by the step (nats), to first order.
     pub(in crate::search) fn gained(&self) -> f64 {
         0.5 * self.decrement
     }
 
-    /// Of the information.
+    /// Cholesky factor of the information.
     pub(in crate::search) fn factor(&self) -> &Cholesky<f64, U6> {
         &self.factor
     }
 
-    /// Whether the step leads nowhere else.
+    /// Whether the step is negligible.
     fn converged(&self) -> bool {
         self.decrement < CONVERGED
     }
 
-    /// What pair `v` would have as its log-likelihood ratio after the step, if turns were small.
+    /// The log-likelihood ratio of pair `v` after the step, to first order; `None` beyond the gate.
     pub(in crate::search) fn of_pair(&self, terms: &Terms, v: usize) -> Option<f64> {
         let pair = &terms.pairs[v];
         let place = self.motion.apply(&pair.model);
@@ -117,7 +118,7 @@ impl Linear {
         pair.of_residual(&(pair.cloud - place - phi.cross(&(place - self.about)) - tau))
     }
 
-    /// ln of the prior density after the step, if turns were small.
+    /// ln of the prior density after the step, to first order.
     pub(in crate::search) fn ln_density(&self, prior_terms: &PriorTerms) -> f64 {
         match (&prior_terms.known, &self.eta) {
             (Some(known), Some(eta)) => prior_terms.ln_density_of(known, &(eta + self.step)),
@@ -125,13 +126,13 @@ impl Linear {
         }
     }
 
-    /// ln of the volume that the posterior fills.
+    /// ln of the posterior volume.
     pub(in crate::search) fn ln_volume(&self) -> f64 {
         6.0 * HALF_LN_2PI - libm::log(self.factor.l_dirty().diagonal().product())
     }
 }
 
-/// The most likely motion of these pairs near one, and the factor of its information.
+/// The MAP motion of these pairs near a start, and the factor of its information.
 pub(in crate::search) fn fit(
     terms: &Terms,
     prior_terms: &PriorTerms,
@@ -143,7 +144,7 @@ pub(in crate::search) fn fit(
     fit_on(first, terms, prior_terms, members, rounds)
 }
 
-/// The same, the first of the rounds being made.
+/// The fit from a given first linearisation.
 pub(in crate::search) fn fit_on(
     first: Linear,
     terms: &Terms,
@@ -163,7 +164,7 @@ pub(in crate::search) fn fit_on(
     Some((motion, linear.factor))
 }
 
-/// [lever]× w, row by row, without the products with its zeros.
+/// [lever]× w, row by row, without the products with zeros.
 #[inline]
 fn crossed(lever: &Vector3<f64>, w: &Matrix3<f64>) -> [[f64; 3]; 3] {
     let (x, y, z) = (lever.x, lever.y, lever.z);

@@ -1,4 +1,4 @@
-//! Which pairs may belong to one pose: distances agree, and the prior allows the rotation between them.
+//! The consistency graph: pairs whose distances agree and whose rotation the prior allows.
 
 use nalgebra::Vector3;
 
@@ -8,42 +8,43 @@ use crate::{
     lanes::{LANES, packed},
 };
 
-/// So many standard deviations of the prior's rotation may lie between two pairs.
+/// Maximum rotation between two pairs, in standard deviations of the prior.
 const TURN_SIGMAS: f64 = 4.5;
-/// What rounding to single precision may cost a distance, half of it at either end (m per metre from the centre).
+/// Single-precision rounding error of a distance, half of it at either end (m per metre from the centre).
 const ROUNDING: f32 = 4e-7;
-/// Squares of longer distances from the centre (m) are no numbers in single precision: what is farther is compatible with nothing.
+/// Maximum distance from the centre (m) whose square is finite in single precision; a farther point is compatible with
+/// nothing.
 const FARTHEST: f64 = 1e15;
 
 /// The candidate pairs with their compatibility.
 ///
-/// Stands in an order that depends on coordinates alone: model points with few candidates first, of equals those farthest from their
-/// centroid, so that a search from the front meets each set at points that are ambiguous least and far apart: three in a row, as along
-/// an edge or a line of a grid, fix no pose.
+/// The order depends on coordinates alone. Model points with few candidates come first, equals by descending distance
+/// from the centroid: a search from the front meets each set at its least ambiguous points, far apart. Three points in
+/// a row, as along an edge or a grid line, determine no pose.
 pub(in crate::search) struct ConsistencyGraph {
     pub(in crate::search) vertices: Vec<Correspondence>,
-    /// Where the pairs of each model point begin; one more than there are.
+    /// Index of the first pair of each model point, with one entry past the last.
     pub(in crate::search) starts: Vec<usize>,
-    /// The last pair of each model point, one bit each, and the last bit of each word.
+    /// Mask of the last pair of each model point, and of the last bit of each word.
     pub(in crate::search) lasts: Vec<u64>,
-    /// The cloud points of the pairs have smaller numbers.
+    /// Upper limit of the cloud indices of the pairs.
     pub(in crate::search) clouds: usize,
-    /// Place of each vertex' model point in this order.
+    /// Rank of each vertex' model point in this order.
     pub(in crate::search) rank: Vec<u32>,
-    /// Words a row.
+    /// Number of words of a row.
     words: usize,
     bits: Vec<u64>,
-    /// Pair tests spent.
+    /// Number of pair tests.
     pub(in crate::search) pair_tests: u64,
 }
 
-/// Coordinates side by side, single precision, about the cloud's centre.
+/// Coordinates by axis in single precision, about the cloud's centre.
 #[derive(Default)]
 struct Columns {
     /// Measured place, model place, and measured minus predicted place.
     at: [Vec<f32>; 9],
-    /// Half of what a distance may differ by (m), and of what rounding may cost it: a point far from the centre is known less
-    /// well than the others, and costs them nothing.
+    /// Half the tolerance of a distance plus half its rounding error (m). The rounding error of a point far from the
+    /// centre is larger, and the tolerance of the others is not affected.
     reach: Vec<f32>,
 }
 
@@ -60,11 +61,11 @@ impl ConsistencyGraph {
         let mut graph =
             Self { vertices, starts, lasts, clouds, rank, words, bits: vec![0; words * count], pair_tests: 0 };
         let turn = prior_terms.known.as_ref().map(|known| {
-            // Beyond the first order a turn by ω moves a point by ω²/2 of its lever.
+            // Beyond first order, a rotation by ω moves a point by ω²/2 of its lever.
             let turn = TURN_SIGMAS * known.attitude;
             (turn + 0.5 * turn * turn) as f32
         });
-        // A turn moves nothing by more than twice its lever.
+        // A rotation moves nothing by more than twice its lever.
         let turn = turn.filter(|turn| *turn < 2.0);
         let mut row = vec![0; words];
         let by_cloud = VerticesByCloud::of(&graph.vertices, clouds);
@@ -85,7 +86,7 @@ impl ConsistencyGraph {
         &self.bits[a * self.words..(a + 1) * self.words]
     }
 
-    /// Takes over what passed the gate, less what shares a cloud point or fails the exact test.
+    /// Copies the pairs that passed the gate, without those that share a cloud point or fail the exact test.
     fn fill(&mut self, problem: &Problem<'_>, a: usize, from: usize, near: &[u64], by_cloud: &VerticesByCloud) {
         let (pair, words) = (self.vertices[a], self.words);
         let row = &mut self.bits[a * words..(a + 1) * words];
@@ -122,7 +123,7 @@ impl VerticesByCloud {
     fn of(vertices: &[Correspondence], clouds: usize) -> Self {
         let mut begins = vec![0; clouds + 1];
         vertices.iter().for_each(|pair| begins[pair.cloud] += 1);
-        // From numbers to ends, and from ends to begins as the lists are filled from behind.
+        // From counts to ends, and from ends to begins as the lists are filled from behind.
         (1..=clouds).for_each(|cloud| begins[cloud] += begins[cloud - 1]);
         let mut sorted = vec![0; vertices.len()];
         for (v, pair) in vertices.iter().enumerate().rev() {
@@ -143,13 +144,13 @@ fn coherent(columns: &Columns, a: usize, from: usize, row: &mut [u64]) {
     mark::<false>(columns, a, from, 0.0, row);
 }
 
-/// The same, and whose offset from the prediction differs by no more than a turn by such an angle (rad) makes of the lever.
+/// Marks the vertices that are coherent and whose offset from the prediction a rotation by `turn` (rad) allows.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn compatible(columns: &Columns, a: usize, from: usize, turn: f32, row: &mut [u64]) {
     mark::<true>(columns, a, from, turn, row);
 }
 
-/// Both, compiled for each as it is called.
+/// The body of both, compiled for the target of each caller.
 #[inline(always)]
 fn mark<const TURNED: bool>(columns: &Columns, a: usize, from: usize, turn: f32, row: &mut [u64]) {
     let chunks = columns.at.each_ref().map(|column| column[from * LANES..].as_chunks::<LANES>().0);
@@ -182,7 +183,7 @@ fn square([x, y, z]: [f32; 3]) -> f32 {
     x * x + y * y + z * z
 }
 
-/// Whether the roots of two squares A and B differ by r at most: A + B ≤ r² or (A − B)² ≤ r² (2 (A + B) − r²).
+/// Whether the roots of two squares A and B differ by at most r: A + B ≤ r² or (A − B)² ≤ r² (2 (A + B) − r²).
 #[inline(always)]
 fn agree(known: f32, measured: f32, tolerance: f32) -> bool {
     let (sum, difference, r2) = (known + measured, known - measured, tolerance * tolerance);
@@ -193,7 +194,7 @@ impl Columns {
     fn of(problem: &Problem<'_>, prior_terms: &PriorTerms, vertices: &[Correspondence]) -> Self {
         let mut columns = Self::default();
         let cloud = |pair: &Correspondence| problem.cloud[pair.cloud].position.at.coords;
-        // What lies far outside moves the centre of the others no further than they are.
+        // The centre of the largest part: outliers do not move it.
         let middle = prior_terms.parts.as_ref().and_then(|parts| Some((parts, parts.in_largest()?)));
         let inside = |pair: &&Correspondence| middle.is_none_or(|(parts, middle)| parts.together(pair.cloud, middle));
         let (mut sum, mut used) = (Vector3::zeros(), 0.0);
@@ -210,11 +211,11 @@ impl Columns {
                 columns.at[6 + axis].push(offset[axis] as f32);
             }
             let (seen, known) = ((at - centre).amax(), (model - prior_terms.centroid).amax());
-            // No number at all where it is too far.
+            // NaN if the point is too far.
             let reach = if seen <= FARTHEST { reach(problem, *pair).0 as f32 } else { f32::NAN };
             columns.reach.push(reach + 0.5 * ROUNDING * seen.max(known) as f32);
         }
-        // Nothing is compatible with what fills up the last word.
+        // The padding of the last word is compatible with nothing.
         let full = vertices.len().next_multiple_of(LANES);
         columns.at.iter_mut().for_each(|column| column.resize(full, f32::NAN));
         columns.reach.resize(full, f32::NAN);
@@ -222,7 +223,7 @@ impl Columns {
     }
 }
 
-/// The candidate pairs by model point, and where each model point's begin.
+/// The candidate pairs by model point, and the index of each model point's first pair.
 fn vertices(problem: &Problem<'_>) -> (Vec<Correspondence>, Vec<usize>) {
     let by =
         |a: &Vector3<f64>, b: &Vector3<f64>| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
@@ -230,7 +231,7 @@ fn vertices(problem: &Problem<'_>) -> (Vec<Correspondence>, Vec<usize>) {
     let at = |i: usize| &problem.model[i].at.coords;
     let listed: Vec<usize> = (0..lists.len()).filter(|&i| !lists[i].is_empty()).collect();
     let centroid = listed.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / listed.len().max(1) as f64;
-    // To seven digits: of points equally far, as sums in another order may differ in the last.
+    // To seven digits: equal distances may differ in the last digit by the order of summation.
     let lever = |i: usize| (at(i) - centroid).norm_squared() as f32;
     let mut order: Vec<(usize, f32, usize)> = listed.into_iter().map(|i| (lists[i].len(), lever(i), i)).collect();
     order.sort_unstable_by(|(few, far, i), (many, near, k)| {

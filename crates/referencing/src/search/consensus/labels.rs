@@ -1,4 +1,4 @@
-//! Putative pairs that mistake model points for their like.
+//! Mislabelled putative pairs: matches that confuse model points of similar appearance.
 
 use super::{
     graph::ConsistencyGraph,
@@ -10,29 +10,30 @@ use crate::{
     a_contrario::{Shuffled, shuffled},
 };
 
-/// Fewer mistakes than this at one pose are no pattern.
+/// Minimum number of wrong pairs at one pose that form a pattern.
 const FEW: usize = 4;
-/// Places that are not further apart than this many variances (three standard deviations) are one.
+/// Squared distance (variances; three standard deviations) up to which two places are one.
 const APART: f64 = 9.0;
-/// Chance is never sure.
+/// Maximum probability of a random match.
 const MAX_PROBABILITY: f64 = 0.99;
-/// So many poses are looked at, the likeliest.
+/// Maximum number of poses examined, the best first.
 const MAX: usize = 24;
 
 impl Occupied<'_> {
-    /// What poses that put the model onto the same places in another order say of the pairs.
+    /// The evidence of poses that put the model onto the same places in another order.
     ///
-    /// A grid, a ring or a frame stands as well in many ways. Where appearance proposes partners among points that look alike (the
-    /// corners of a frame, the bolts of a row), each of these ways is met by as many pairs as chance makes of the alike, and the
-    /// likeliest is but the one that has most. Shuffled over all partners, those that lie at the place of model point i are met with
-    /// m_i q_i, m_i its partners and q_i the share of all that lie there. If the poses elsewhere have S of F such places together,
+    /// A grid, a ring or a frame has self-symmetries. If a matcher proposes partners among points of similar appearance
+    /// (the corners of a frame, the bolts of a row), each of these poses is supported by as many pairs as random
+    /// confusion produces, and the best pose is only the one with most. Under a random shuffle of all partners, the
+    /// place of model point i gets a match with probability m_i q_i, with its number of partners m_i and the fraction
+    /// q_i of all partners that lie there. If the poses elsewhere have matches at S of F such places,
     ///
     /// Λ = B(S, F)/Π m_i q_i Π (1 − m_i q_i)
     ///
-    /// is the evidence that they are met more often. Then the likeliest pose, with k of n points, is one of them with the share
-    /// B(k + S, n + F), as many as they are, or stands out with B(k, n) · B(S, F).
+    /// is the evidence that these are more frequent than random. The best pose, with k of n points, is then one of them
+    /// with the probability B(k + S, n + F), or it stands out with B(k, n) · B(S, F).
     ///
-    /// `None` of pairs that nobody proposed, and where no other pose is met.
+    /// `None` for pairs without a matcher, and if no other pose has matches.
     pub(in crate::search) fn mistaken(
         &self,
         problem: &Problem<'_>,
@@ -42,7 +43,7 @@ impl Occupied<'_> {
         if !shuffled(problem) {
             return None;
         }
-        // Seldom is there a pose to ask.
+        // Computed on demand: seldom is there a pose to test.
         let mut nfa = None;
         let variance = terms.pairs.iter().map(|pair| pair.variance).fold(0.0, f64::max);
         let (mut met, mut places, mut ln_nfa, mut poses) = (0, 0, 0.0, 0);
@@ -58,7 +59,7 @@ impl Occupied<'_> {
             for (i, point) in problem.model.iter().enumerate() {
                 let (place, of_best) = (other.motion.apply(&point.at.coords), self.best.motion.apply(&point.at.coords));
                 let met_at_random = nfa.meets(i, place).min(MAX_PROBABILITY);
-                // Where both put the point, nothing is told of mistakes.
+                // A place that both poses share gives no information on confusion.
                 if met_at_random <= 0.0 || (place - of_best).norm_squared() <= APART * variance {
                     continue;
                 }

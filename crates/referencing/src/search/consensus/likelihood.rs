@@ -1,4 +1,4 @@
-//! How much better a pose explains the cloud than clutter alone.
+//! The likelihood ratio of a pose against clutter alone.
 
 use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, UncertainPoint, so3::skew};
@@ -6,33 +6,33 @@ use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 use super::{Motion, fit::fit, graph::ConsistencyGraph, prior_terms::PriorTerms, solve6::factor as factor_of};
 use crate::{Correspondence, Problem, Tolerance, parts::Parts};
 
-/// ½ ln 2π: a Gaussian of d dimensions is exp(−d·½ ln 2π − ½ ln det Σ) at its maximum, and a maximum of a density with the
-/// information H fills exp(d·½ ln 2π − ½ ln det H).
+/// ½ ln 2π. The maximum of a Gaussian of d dimensions is exp(−d·½ ln 2π − ½ ln det Σ); a maximum of a density with the
+/// information H has the volume exp(d·½ ln 2π − ½ ln det H).
 pub(in crate::search) const HALF_LN_2PI: f64 = 0.918_938_533_204_672_7;
 
-/// A pair further from where the pose puts it than this is no part of it (χ²₃).
+/// Gate of a pair about its place under the pose (χ²₃).
 const FAR: f64 = 25.0;
 
-/// What rounding may cost a coordinate, as a share of the greatest.
+/// Rounding error of a coordinate relative to the greatest.
 const ROUNDING: f64 = 1e-9;
 
-/// What one pair says.
+/// The likelihood term of one pair.
 #[derive(Clone, Copy)]
 pub(in crate::search) struct Term {
-    /// Where it was measured.
+    /// The measured place.
     pub(in crate::search) cloud: Vector3<f64>,
-    /// Where the model has it.
+    /// The place in the model.
     pub(in crate::search) model: Vector3<f64>,
-    /// What the measurement's error weighs.
+    /// The inverse covariance of the measurement.
     pub(in crate::search) weight: Matrix3<f64>,
-    /// No less than the variance of the error along any direction (m²).
+    /// Upper bound of the variance of the error along any direction (m²).
     pub(in crate::search) variance: f64,
-    /// ln of the likelihood ratio without residual.
+    /// ln of the likelihood ratio at zero residual.
     pub(in crate::search) gain: f64,
 }
 
 impl Term {
-    /// ln of the likelihood ratio with this residual (m); `None` where that is too great.
+    /// ln of the likelihood ratio with this residual (m); `None` beyond the gate.
     #[inline]
     pub(in crate::search) fn of_residual(&self, r: &Vector3<f64>) -> Option<f64> {
         let d2 = self.distance(r);
@@ -46,21 +46,20 @@ impl Term {
     }
 }
 
-/// What the pairs of a problem say when they are true.
+/// The likelihood terms of a problem's pairs.
 ///
-/// A true pair contributes ln N(c − p; 0, Σ) − ln ρ to the log-likelihood ratio against clutter, ρ (1/m³) the
-/// density of cloud points about the model point's predicted place. How many of the n points are visible
-/// is not known: all numbers are equally likely beforehand, and one set of k then has the share
-/// B(k) = k! (n − k)! / (n + 1)!.
+/// A true pair contributes ln N(c − p; 0, Σ) − ln ρ to the log-likelihood ratio against clutter, with the density ρ
+/// (1/m³) of cloud points about the predicted place of the model point. The number of visible points is unknown: all
+/// numbers from 0 to n are equally probable, and one set of k has the probability B(k) = k! (n − k)! / (n + 1)!.
 pub(in crate::search) struct Terms {
-    /// Of each vertex.
+    /// The term of each vertex.
     pub(in crate::search) pairs: Vec<Term>,
-    /// Of each model point: ln of the density of cloud points about its predicted place; without a prior of the whole cloud.
+    /// ln of the density of cloud points about each predicted place; without a prior, that of the complete cloud.
     pub(in crate::search) ln_density: Vec<f64>,
-    /// Of each vertex, without a prior: by how much the cloud is denser in its part (nats). Empty with one.
+    /// The excess density of each vertex's part over the cloud (nats), without a prior; empty with one.
     excess: Vec<f64>,
-    /// ln of the volumes that the posterior of 0…n points fills, taken for points that lie and are known as the candidates are on
-    /// average.
+    /// ln of the posterior volumes of 0…n points, for points with the average position and covariance of the
+    /// candidates.
     pub(in crate::search) ln_volume: Vec<f64>,
     /// ln B(k), k = 0…n.
     pub(in crate::search) ln_fraction: Vec<f64>,
@@ -76,12 +75,12 @@ impl Terms {
         let pairs = Vec::with_capacity(count);
         let mut terms = Self { pairs, ln_density, excess, ln_volume: Vec::new(), ln_fraction: fractions(n) };
         let turned = prior_terms.known.as_ref().map_or(Matrix3::identity(), |known| known.motion.rotation);
-        // Points that are called exact are taken to be as good as a twenty-fifth of what the tolerance allows each.
+        // A point without noise counts as good as a twenty-fifth of its part of the tolerance.
         let min = match problem.tolerance {
             Tolerance::Fixed(delta) => (0.02 * delta).powi(2),
             Tolerance::Sigmas(_) => (ROUNDING * extent(problem)).powi(2),
         };
-        // What one pair says of the motion on average: Jᵀ W J (about the centroid).
+        // The average information of one pair on the motion: Jᵀ W J (about the centroid).
         let mut average = Matrix6::zeros();
         // Many pairs share a covariance: the last inverse is kept.
         let mut last: Option<(Matrix3<f64>, Matrix3<f64>, f64, f64)> = None;
@@ -111,20 +110,20 @@ impl Terms {
         self.ln_density[model] + self.excess.get(v).copied().unwrap_or(0.0)
     }
 
-    /// The log-likelihood ratio of one pair under a pose, however far it is from it.
+    /// The log-likelihood ratio of one pair under a pose, without a gate.
     pub(in crate::search) fn residual_gain(&self, v: usize, motion: &Motion) -> f64 {
         let pair = &self.pairs[v];
         pair.gain - 0.5 * pair.distance(&(pair.cloud - motion.apply(&pair.model)))
     }
 
-    /// The log-likelihood ratio of one pair under a pose; `None` when it is too far from it.
+    /// The log-likelihood ratio of one pair under a pose; `None` beyond the gate.
     pub(in crate::search) fn of_pair(&self, v: usize, motion: &Motion) -> Option<f64> {
         let pair = &self.pairs[v];
         pair.of_residual(&(pair.cloud - motion.apply(&pair.model)))
     }
 }
 
-/// 3 ln 2π − ½ ln det (P + k H₁) for k = 0…n, H₁ what one pair says on average.
+/// ln posterior volumes 3 ln 2π − ½ ln det (P + k H₁) for k = 0…n; H₁ is the average information of one pair.
 fn volumes(average: &Matrix6<f64>, prior_terms: &PriorTerms, n: usize) -> Vec<f64> {
     let of = |h: Matrix6<f64>| factor_of(&h).map_or(f64::INFINITY, |chol| ln_volume(&chol));
     match &prior_terms.known {
@@ -141,7 +140,7 @@ fn extent(problem: &Problem<'_>) -> f64 {
     problem.model.iter().map(|point| point.at.coords.amax()).fold(f64::MIN_POSITIVE, f64::max)
 }
 
-/// The information of a measurement's error and ln of its density at zero; one without a covariance says nothing.
+/// The information of a measurement and ln of its density at zero; zero information without a covariance.
 fn peak(noise: &Matrix3<f64>) -> (Matrix3<f64>, f64) {
     match noise.cholesky() {
         Some(chol) => {
@@ -173,10 +172,10 @@ fn densities(problem: &Problem<'_>, prior_terms: &PriorTerms) -> Vec<f64> {
         .collect()
 }
 
-/// How many places lie in a box of these half sides about another.
+/// The number of places in a box of these half-sizes about another.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
 fn inside((x, y, z): (&[f64], &[f64], &[f64]), place: &Vector3<f64>, half: &Vector3<f64>) -> u64 {
-    // No closures: they are not compiled for the same processor.
+    // No closures: they are not compiled for the same target.
     let mut count = 0;
     for ((x, y), z) in x.iter().zip(y).zip(z) {
         let near = ((x - place.x).abs() <= half.x) & ((y - place.y).abs() <= half.y) & ((z - place.z).abs() <= half.z);
@@ -195,13 +194,13 @@ fn fractions(n: usize) -> Vec<f64> {
     fractions
 }
 
-/// ln B(k) of n points.
+/// ln B(k) for n points.
 pub(in crate::search) fn ln_fraction(k: usize, n: usize) -> f64 {
     let ln_factorial = |k: usize| libm::lgamma(k as f64 + 1.0);
     ln_factorial(k) + ln_factorial(n - k) - ln_factorial(n + 1)
 }
 
-/// ln of the density of where a point that is at `place` is measured; `None` too far from there.
+/// ln of the density of a measurement given its true place; `None` beyond the gate.
 pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vector3<f64>) -> Option<f64> {
     let r = seen.at.coords - place;
     let far = FAR * seen.covariance.trace();
@@ -211,18 +210,18 @@ pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vect
     (d2 <= FAR).then_some(ln_peak - 0.5 * d2)
 }
 
-/// A pose with its pairs: a maximum of the posterior density.
+/// A pose with its pairs: a local maximum of the posterior density.
 #[derive(Debug, Clone)]
 pub(in crate::search) struct Mode {
     /// Vertices, ascending.
     pub(in crate::search) members: Vec<usize>,
     pub(in crate::search) motion: Motion,
-    /// ln of its evidence against "no object here", by Laplace: the likelihood ratio and the prior density at
-    /// the maximum, times the volume (2π)³/√det H that the posterior fills.
+    /// ln of the evidence ratio against absence by Laplace's approximation: the likelihood ratio and the prior density
+    /// at the maximum, times the posterior volume (2π)³/√det H.
     pub(in crate::search) ln_evidence: f64,
-    /// The same where clutter is spread evenly.
+    /// The evidence under uniform clutter.
     pub(in crate::search) ln_even: f64,
-    /// What of it crowded clutter took (nats).
+    /// The evidence lost to dense clutter (nats).
     pub(in crate::search) ln_clutter_density: f64,
 }
 
@@ -234,7 +233,7 @@ impl Mode {
         pairs
     }
 
-    /// The pairs, those that fit the motion best first.
+    /// The pairs in ascending order of their residuals.
     pub(in crate::search) fn closest_first(&self, terms: &Terms, graph: &ConsistencyGraph) -> Vec<Correspondence> {
         let mut members: Vec<(f64, usize)> =
             self.members.iter().map(|&v| (terms.pairs[v].gain - terms.residual_gain(v, &self.motion), v)).collect();
@@ -242,7 +241,7 @@ impl Mode {
         members.into_iter().map(|(_, v)| graph.vertices[v]).collect()
     }
 
-    /// ln of the evidence of some of the members alone, which of the points are visible left aside; nothing where they fix no pose.
+    /// ln evidence of some members alone, without the probability of their number; zero if they determine no pose.
     pub(in crate::search) fn ln_evidence_of(&self, terms: &Terms, prior_terms: &PriorTerms, members: &[usize]) -> f64 {
         if members.len() < 3 && prior_terms.known.is_none() {
             return 0.0;
@@ -252,7 +251,7 @@ impl Mode {
         gains + prior_terms.ln_density(&motion) + ln_volume(&factor)
     }
 
-    /// Whether a vertex belongs to it.
+    /// Whether a vertex is a member.
     pub(in crate::search) fn holds(&self, v: usize) -> bool {
         self.members.binary_search(&v).is_ok()
     }
@@ -275,7 +274,7 @@ pub(in crate::search) fn half_ln_det<const N: usize>(chol: &Cholesky<f64, Const<
     chol.l_dirty().diagonal().iter().map(|&x| libm::log(x)).sum()
 }
 
-/// ln of the volume that a posterior of this information fills: (2π)³/√det H.
+/// ln of the volume of a posterior with this information: (2π)³/√det H.
 pub(in crate::search) fn ln_volume(information: &Cholesky<f64, U6>) -> f64 {
     6.0 * HALF_LN_2PI - half_ln_det(information)
 }

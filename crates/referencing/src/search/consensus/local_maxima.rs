@@ -1,4 +1,4 @@
-//! From a rough motion to the maximum of the posterior near it.
+//! Ascent from a prior motion to the local maximum of the posterior density.
 
 use std::{cell::Cell, collections::BTreeSet};
 
@@ -14,19 +14,19 @@ use super::{
 };
 use crate::ModelPoint;
 
-/// Rounds of choosing pairs and fitting.
+/// Maximum number of rounds of choosing pairs and fitting.
 const ROUNDS: usize = 8;
-/// What pairs may bring that join a set only when its motion is fitted (nats).
+/// Allowance (nats) for pairs that join a set only once its motion is fitted.
 const JOINING: f64 = 8.0;
-/// What turns that are not small may hide of a motion's worth (nats). More costs time, less loses modes: what the step foretells
-/// is seldom a nat off.
+/// Allowance (nats) for large rotations in the prediction of a step. More costs time, less loses modes; the prediction
+/// is seldom off by a nat.
 const TURNING: f64 = 3.0;
-/// The least set that a pose can come from.
+/// Minimum number of pairs that determine a pose.
 const MIN: usize = 3;
 
 type Factor = Cholesky<f64, U6>;
 
-/// Finds the modes of one problem.
+/// The modes of one problem, by iterated choice of pairs and fit.
 pub(in crate::search) struct Climb<'a> {
     pub(in crate::search) model: &'a [ModelPoint],
     pub(in crate::search) terms: &'a Terms,
@@ -34,14 +34,15 @@ pub(in crate::search) struct Climb<'a> {
     pub(in crate::search) graph: &'a ConsistencyGraph,
     /// Cloud points that no mode may use.
     pub(in crate::search) taken: &'a BTreeSet<usize>,
-    /// Pairs compared with a motion so far.
+    /// Number of pairs compared with a motion so far.
     pub(in crate::search) compared: Cell<u64>,
 }
 
 impl Climb<'_> {
-    /// Chooses pairs and fits in turn until the choice stands.
+    /// Alternates the choice of pairs and the fit until the choice is stable.
     ///
-    /// `None` as soon as no evidence of `min` (nats) is in sight, or where the first choice is one that was `climbed` from before.
+    /// `None` as soon as the evidence `min` (nats) is out of reach, or if an ascent from the first choice was made
+    /// before (`climbed`).
     pub(in crate::search) fn from(
         &self,
         members: &[usize],
@@ -49,7 +50,7 @@ impl Climb<'_> {
         min: f64,
         climbed: impl FnOnce(&[usize]) -> bool,
     ) -> Option<Mode> {
-        // What fitted three noisy points roughly mostly fits no motion: that is seen at once.
+        // Most sets near the pose of three noisy points fit no motion: this is detected before the first step.
         let first = Linear::at(self.terms, self.prior_terms, members, start)?;
         if self.foreseen(members, &first) + TURNING < min {
             return None;
@@ -79,14 +80,14 @@ impl Climb<'_> {
         self.mode(chosen, motion, &factor)
     }
 
-    /// These pairs, ascending, under their most likely motion; `None` where it is none that a prior's box allows.
+    /// The mode of these pairs (ascending) under their MAP motion; `None` if the prior's box excludes the motion.
     pub(in crate::search) fn mode(&self, members: Vec<usize>, motion: Motion, factor: &Factor) -> Option<Mode> {
         if !self.prior_terms.holds(self.model, &motion, factor) {
             return None;
         }
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
         let score = gains + self.terms.ln_fraction[members.len()] + self.prior_terms.ln_density(&motion);
-        // No posterior fills more than the prior: of points nearly in a row, without one, the first order says that.
+        // No posterior exceeds the prior in volume; for nearly collinear points without a prior, the first order would.
         let ln_evidence = score + ln_volume(factor).min(-self.prior_terms.ln_peak);
         ln_evidence.is_finite().then_some(Mode {
             members,
@@ -97,42 +98,44 @@ impl Climb<'_> {
         })
     }
 
-    /// Whether each of some pairs may be seen under a motion, and is not too far from it.
+    /// Whether each of some pairs may be visible under a motion and is not too far from it.
     pub(in crate::search) fn allows(&self, members: &[usize], motion: &Motion) -> bool {
         let camera = self.sides(motion);
         members.iter().all(|&v| self.terms.of_pair(v, motion).is_some() && self.shows(v, camera.as_ref()))
     }
 
-    /// Where the camera is; `None` for the image of a model, which has no sides.
+    /// The camera's position; `None` for a reflected model, whose points have no visible sides.
     fn sides(&self, motion: &Motion) -> Option<Vector3<f64>> {
         (motion.rotation.determinant() > 0.0).then(|| motion.origin())
     }
 
-    /// Whether the model point of a vertex shows itself to the camera.
+    /// Whether the model point of a vertex is visible to the camera.
     fn shows(&self, v: usize, camera: Option<&Vector3<f64>>) -> bool {
         camera.is_none_or(|camera| self.model[self.graph.vertices[v].model].shows_itself(camera))
     }
 
-    /// About the evidence of those members that stay, and of one or two pairs that may join them.
+    /// Approximate evidence of the members that remain, with one or two pairs that may join them.
     fn promise(&self, members: &[usize], motion: &Motion, factor: &Factor) -> f64 {
         let gains = members.iter().filter_map(|&v| self.terms.of_pair(v, motion));
         self.ln_fraction_of(gains) + self.prior_terms.ln_density(motion) + ln_volume(factor) + JOINING
     }
 
-    /// The same before the step is made.
+    /// The approximate evidence ([`Self::promise`]) before the step.
     fn foreseen(&self, members: &[usize], linear: &Linear) -> f64 {
         let gains = members.iter().filter_map(|&v| linear.of_pair(self.terms, v));
         self.ln_fraction_of(gains) + linear.ln_density(self.prior_terms) + linear.ln_volume() + JOINING
     }
 
-    /// What pairs gain, with the share of their number; nothing where too few of them are left.
+    /// The sum of the gains and ln B of their number; −∞ if too few remain.
     fn ln_fraction_of(&self, gains: impl Iterator<Item = f64>) -> f64 {
         let (k, sum) = gains.fold((0, 0.0), |(k, sum), gain| (k + 1, sum + gain));
         if k < MIN - 1 { f64::NEG_INFINITY } else { sum + self.terms.ln_fraction[k] }
     }
 
-    /// The likeliest one-to-one set under a motion: of pairs that share a model point or a cloud point the better, so that a model point
-    /// that loses its best pair to another has its next, and of these as many as the likelihood gains by.
+    /// The maximum-likelihood one-to-one set under a motion.
+    ///
+    /// Greedy: the better of two pairs that share a model point or a cloud point wins, so that a model point that loses
+    /// its best pair to another takes its next. The set keeps the number of pairs that maximises the likelihood.
     fn choose(&self, motion: &Motion) -> Vec<usize> {
         self.compared.set(self.compared.get() + self.graph.vertices.len() as u64);
         let starts = &self.graph.starts;
@@ -188,7 +191,7 @@ mod tests {
 
     /// Two model points 10 cm apart are both nearest to a cloud point between them; the second has another 7 cm beyond.
     ///
-    /// Seen to fail where each model point has but its best pair.
+    /// Fails if each model point has its best pair only.
     #[test]
     fn a_model_point_that_loses_its_best_pair_to_another_has_its_next() {
         let places = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [1.0, 0.0, 0.2], [0.0, 1.0, -0.3], [-0.8, -0.5, 0.4]];

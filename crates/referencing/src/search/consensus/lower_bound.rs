@@ -1,4 +1,4 @@
-//! What some pairs cost at least, and the pose under which they do.
+//! Lower bounds of the residual cost of a set of pairs, with the pose that attains them.
 
 use nalgebra::{Cholesky, Matrix6, U6};
 
@@ -9,24 +9,25 @@ use super::{
     prior_terms::PriorTerms,
 };
 
-/// Steps of a fit at most: from the pose of all members but the last a few suffice, from that of a wide prior not always.
+/// Maximum number of steps of a fit: a few suffice from the pose of all members but the last, not always from a wide
+/// prior.
 pub(super) const ROUNDS: usize = 30;
-/// A fit that would gain less by its next step (nats) has come to its end.
+/// Gain of the next step (nats) below which a fit has converged.
 const CONVERGED: f64 = 1e-2;
-/// Of a step that leads nowhere lower so many times the half is tried.
+/// Maximum number of times a step that does not descend is halved.
 const HALVES: i32 = 6;
-/// Where pairs contradict each other a fit is slow or ends where no step leads lower: its end is no lower than this (nats).
+/// Allowance (nats) for a fit that ends without a descending step or is slow, as for contradicting pairs.
 const SLOW: f64 = 1.0;
-/// Poses known better than this (rad, the root of the sum of the variances) put their points where the first order has them.
+/// Rotation uncertainty (rad, root of the sum of the variances) up to which first order holds for the points.
 const FIRST_ORDER: f64 = 0.1;
 
-/// What some pairs say of the pose together.
+/// Laplace's approximation of the posterior of some pairs.
 #[derive(Clone, Copy)]
 pub(super) struct LaplacePosterior {
     pub(super) motion: Motion,
-    /// Of η about the motion: the inverse of the information.
+    /// Covariance of η about the motion: the inverse of the information.
     pub(super) covariance: Matrix6<f64>,
-    /// ln of the share of the prior that it fills.
+    /// ln of the posterior volume relative to the prior.
     pub(super) ln_posterior_volume: f64,
 }
 
@@ -36,16 +37,16 @@ impl LaplacePosterior {
         Self { motion, covariance: information.inverse(), ln_posterior_volume }
     }
 
-    /// Whether the pose is known so well that turns within its error are small.
+    /// Whether rotations within the error of the pose are small.
     pub(super) fn is_of_first_order(&self) -> bool {
         let turn: f64 = (0..3).map(|i| self.covariance[(i, i)]).sum();
         turn <= FIRST_ORDER * FIRST_ORDER
     }
 }
 
-/// Fits of some pairs that end where no step leads lower.
+/// Fits of some pairs by damped Gauss–Newton steps.
 ///
-/// Costs are those of residuals and prior, ½ χ² (nats), against pairs in their places and the likeliest pose of the prior.
+/// Costs are those of residuals and prior, ½ χ² (nats), relative to zero residuals and the mode of the prior.
 #[derive(Clone, Copy)]
 pub(super) struct Fits<'a> {
     pub(super) terms: &'a Terms,
@@ -54,17 +55,19 @@ pub(super) struct Fits<'a> {
 }
 
 impl Fits<'_> {
-    /// What the members cost at least near a pose that is known well, and that pose.
+    /// Lower bound of the members' cost near a well-known pose, and the pose that attains it.
     pub(super) fn refined(&self, near: &Motion) -> Option<(f64, LaplacePosterior)> {
         let Self { terms, prior_terms, members } = *self;
-        // Two steps: what one foretells may be some hundredths of a nat too much, and then it is no bound.
+        // Two steps: the prediction of one may be some hundredths of a nat too high and would be no bound.
         let motion = Linear::at(terms, prior_terms, members, near)?.moved();
         let linear = Linear::at(terms, prior_terms, members, &motion)?;
         let cost = self.cost(&motion) - linear.gained();
         Some((cost, LaplacePosterior::of(linear.moved(), linear.factor(), prior_terms)))
     }
 
-    /// The least that the members cost under a pose, from that of the members before and from that of three of them, and that pose.
+    /// Minimum cost of the members under a pose.
+    ///
+    /// The fit starts from the pose of the previous members and from that of three members.
     pub(super) fn min_cost(&self, before: Option<Motion>) -> Option<(f64, LaplacePosterior)> {
         let mut min: Option<(f64, LaplacePosterior)> = None;
         for start in before.into_iter().chain(self.of_any_three()) {
@@ -76,7 +79,7 @@ impl Fits<'_> {
         min
     }
 
-    /// What the members cost at least (nats) where steps that each lower it lead to, and that pose.
+    /// The minimum cost (nats) reached by descending steps, and its pose.
     fn descended(&self, start: Motion) -> Option<(f64, LaplacePosterior)> {
         let Self { terms, prior_terms, members } = *self;
         let (mut motion, mut cost, mut left) = (start, self.cost(&start), ROUNDS);
@@ -95,7 +98,7 @@ impl Fits<'_> {
         }
     }
 
-    /// What residuals and prior cost the members under a motion (nats).
+    /// The cost of residuals and prior of the members under a motion (nats).
     pub(super) fn cost(&self, motion: &Motion) -> f64 {
         let Self { terms, prior_terms, members } = *self;
         let pairs = members.iter().map(|&v| &terms.pairs[v]);
@@ -103,7 +106,7 @@ impl Fits<'_> {
         residuals + prior_terms.ln_peak - prior_terms.ln_density(motion)
     }
 
-    /// A pose of the last member and of two others that fix one with it.
+    /// A pose from the last member and two others that determine one with it.
     fn of_any_three(&self) -> Option<Motion> {
         let (&last, others) = self.members.split_last()?;
         let of = |v: usize| &self.terms.pairs[v];

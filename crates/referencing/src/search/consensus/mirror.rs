@@ -1,4 +1,4 @@
-//! Whether the object's mirror image explains more than a pose does.
+//! The mirror image of the object as an alternative to a pose.
 
 use std::{cell::Cell, collections::BTreeSet};
 
@@ -17,22 +17,21 @@ use crate::{
     lanes::{LANES, packed},
 };
 
-/// An image must be likelier than the pose by this much (nats): a flat object is its own image.
+/// Minimum evidence (nats) of an image over the pose, since a planar object is its own image.
 const MARGIN: f64 = 3.0;
-/// Threes of so many members, spread evenly over all, are reflected: at most so many threes, and one to so many pairs where
-/// there are few.
+/// Limits of the reflected triples: number of members, number of triples, and number of pairs for each triple.
 const SPREAD: usize = 10;
 const MAX_THREES: usize = 64;
 const PAIRS_A_THREE: usize = 8;
-/// What fits roughly what three noisy points say (χ²₃).
+/// Gate about a motion from three noisy points (χ²₃).
 const LOOSE: f64 = 50.0;
 
-/// The mirror image of the model that shares a flat part with the mode, where it explains the cloud better; such
-/// a mode is what is left of that image, and no pose of the object.
+/// The mirror image of the model that shares a planar part with the mode, if it has more evidence.
 ///
-/// The model is reflected in the plane that its members lie in best, and in those of some threes of them, in case that one of
-/// the members is not the image's; from where most pairs fit, pairs are chosen and the motion is fitted as for any pose. The
-/// prior says nothing of images: both are weighed without.
+/// Such a mode is the remainder of that image and no pose of the object. The model is reflected in the best-fitting
+/// plane of its members, and in the planes of some of their triples, since one of the members may not belong to the
+/// image. From the reflection with most fitting pairs, pairs are chosen and the motion is fitted as for any pose. The
+/// prior gives no information on images: both are weighed without it.
 pub(in crate::search) fn mirror_image(
     model: &[ModelPoint],
     (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
@@ -70,13 +69,13 @@ pub(in crate::search) fn mirror_image(
     })
 }
 
-/// A motion after a reflection of the model in the plane through a point with this normal.
+/// A motion preceded by the reflection of the model in the plane through a point with this normal.
 fn reflected(motion: &Motion, through: &Vector3<f64>, normal: &Vector3<f64>) -> Motion {
     let rotation = motion.rotation * (Matrix3::identity() - normal * normal.transpose() * 2.0);
     Motion { rotation, translation: motion.apply(through) - rotation * through }
 }
 
-/// At most so many threes of the members, evenly spread.
+/// At most `max` triples of the members, evenly spread.
 fn threes(members: &[usize], max: usize) -> impl Iterator<Item = [usize; 3]> {
     let some: Vec<usize> = members.iter().copied().step_by(members.len().div_ceil(SPREAD).max(1)).collect();
     let k = some.len();
@@ -86,7 +85,7 @@ fn threes(members: &[usize], max: usize) -> impl Iterator<Item = [usize; 3]> {
     all.into_iter().step_by(step)
 }
 
-/// Of each model point the pair that fits a motion best, if it fits it roughly; `None` where these are not `more_than` so many.
+/// The best pair within the gate of each model point; `None` if they are not more than `more_than`.
 fn near(
     terms: &Terms,
     graph: &ConsistencyGraph,
@@ -118,8 +117,9 @@ fn near(
     (best.len() > more_than).then(|| best.into_iter().map(|(_, v)| v).collect())
 }
 
-/// Where each pair's points are in model and cloud, axis by axis, and how far (m²) its cloud point may be from where a motion puts
-/// its model point; in whole words, filled up with what is within reach of nothing.
+/// The pairs' coordinates in model and cloud by axis, with their squared gates (m²) about a motion.
+///
+/// The columns are padded to complete words with entries that are within reach of nothing.
 struct Places {
     at: [Vec<f64>; 6],
     reach2: Vec<f64>,
@@ -133,7 +133,7 @@ impl Places {
             column.resize(full, f64::NAN);
             column
         };
-        // χ² is no less than that of the greatest variance.
+        // χ² is at least that of the greatest variance.
         Self {
             at: std::array::from_fn(|axis| {
                 filled(&|pair| if axis < 3 { pair.model[axis] } else { pair.cloud[axis - 3] })
@@ -172,7 +172,7 @@ mod tests {
         assert!(of(2, 64).is_empty());
         assert_eq!(of(4, 64), [[0, 2, 4], [0, 2, 6], [0, 4, 6], [2, 4, 6]]);
         assert_eq!(of(4, 2), [[0, 2, 4], [0, 4, 6]]);
-        // Every third of thirty, and every other of 120 threes of these.
+        // Every third of thirty members, and every other of their 120 triples.
         let some = of(30, 64);
         assert_eq!((some.len(), some[0], some[59]), (60, [0, 6, 12], [36, 48, 54]));
     }

@@ -1,4 +1,4 @@
-//! The parts of [`RigidConsensus`](super::RigidConsensus).
+//! The components of [`RigidConsensus`](super::RigidConsensus): terms of the likelihood, branch and bound, proof.
 
 mod bits;
 mod bound;

@@ -1,9 +1,9 @@
-//! Rigid motions in the form that the inner loops want.
+//! Rigid motions in matrix form, for the inner loops.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, Object, Transform, so3};
 
-/// p_camera = R p_object + t.
+/// A rigid motion p_camera = R p_object + t.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::search) struct Motion {
     pub(in crate::search) rotation: Matrix3<f64>,
@@ -24,12 +24,12 @@ impl Motion {
         self.rotation * p + self.translation
     }
 
-    /// Where the camera is (object frame).
+    /// The camera's position (object frame).
     pub(in crate::search) fn origin(&self) -> Vector3<f64> {
         -(self.rotation.transpose() * self.translation)
     }
 
-    /// Turned by φ about a place and then moved by τ.
+    /// The motion rotated by φ about a place, then translated by τ.
     pub(in crate::search) fn moved(&self, phi: &Vector3<f64>, tau: &Vector3<f64>, about: &Vector3<f64>) -> Self {
         let turn = so3::exp(phi).to_rotation_matrix().into_inner();
         Self { rotation: turn * self.rotation, translation: turn * (self.translation - about) + about + tau }
@@ -37,8 +37,8 @@ impl Motion {
 
     /// The least-squares motion of three points, in closed form.
     ///
-    /// Both threes lie in planes; the best motion lays one plane into the other, centroid onto centroid, and
-    /// what is left is an angle: tan θ = Σ (p × c)·n / Σ p·c. `None` where either three is nearly a line.
+    /// The optimal motion maps the plane of one triangle to that of the other, centroid to centroid; the remaining
+    /// angle is tan θ = Σ (p × c)·n / Σ p·c. `None` if either triangle is nearly a line.
     pub(in crate::search) fn of_three(model: [&Vector3<f64>; 3], cloud: [&Vector3<f64>; 3]) -> Option<Self> {
         let (from, to) = (Plane::of(model)?, Plane::of(cloud)?);
         let (mut sine, mut cosine) = (0.0, 0.0);
@@ -62,13 +62,13 @@ impl Motion {
     }
 }
 
-/// The plane of three points with axes in it.
+/// The plane of three points, with axes in it.
 struct Plane {
     centre: Vector3<f64>,
     axes: [Vector3<f64>; 3],
 }
 
-/// Sine of the angle between two sides below which three points are a line.
+/// Sine of the angle between two sides below which three points are collinear.
 const SLIM: f64 = 0.02;
 
 impl Plane {

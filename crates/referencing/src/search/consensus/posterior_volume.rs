@@ -1,4 +1,4 @@
-//! How much of the prior the posterior of some pairs fills, at most.
+//! Upper bounds of the posterior volume relative to the prior.
 
 use super::{
     graph::ConsistencyGraph,
@@ -7,19 +7,19 @@ use super::{
 };
 use crate::ModelPoint;
 
-/// Of more model points the threes are not listed: the bound of their information is zero.
+/// Maximum number of model points for which triples are listed; beyond, the information bound is zero.
 const MAX_POINTS: usize = 64;
 
-/// ln of the density of the prior at its maximum times the volume that the posterior of k pairs fills, for k = 0…n, at most, and at most
-/// zero: no posterior fills more than the prior.
+/// ln of the posterior volume of k pairs times the maximum prior density, k = 0…n: an upper bound, at most zero.
 ///
-/// About their weighted centroid the information of points of equal noise along all axes, w_i, is a block each for shift and turn:
-/// det H = W³ det (tr(C) I − C), W = Σ w_i and C = Σ w_i l_i l_iᵀ. With the eigenvalues of C, det (tr(C) I − C) = e₁e₂ − e₃ ≥ ⁸⁄₉ e₁e₂, where
+/// About their weighted centroid the information of points with isotropic weights w_i consists of a block for the
+/// translation and one for the rotation: det H = W³ det (tr(C) I − C), W = Σ w_i and C = Σ w_i l_i l_iᵀ. With the
+/// elementary symmetric functions e of the eigenvalues of C, det (tr(C) I − C) = e₁e₂ − e₃ ≥ ⁸⁄₉ e₁e₂, where
 ///
-/// W e₁ = Σ_{i<j} w_i w_j |p_i − p_j|²,  W e₂ = Σ_{i<j<l} w_i w_j w_l |(p_j − p_i) × (p_l − p_i)|²,
+/// W e₁ = Σ_{i<j} w_i w_j |p_i − p_j|²,  W e₂ = Σ_{i<j<l} w_i w_j w_l |(p_j − p_i) × (p_l − p_i)|².
 ///
-/// and k points have no less of these than the smallest terms of as many twos and threes sum up to. With a prior of information P,
-/// det^⅙ (P + H) ≥ det^⅙ P + det^⅙ H (Minkowski).
+/// For k points these are at least the sums of the smallest terms of as many pairs and triples. With a prior of
+/// information P, det^⅙ (P + H) ≥ det^⅙ P + det^⅙ H (Minkowski).
 pub(super) fn ln_posterior_volume(
     model: &[ModelPoint],
     (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
@@ -47,7 +47,7 @@ pub(super) fn ln_posterior_volume(
         // det H = W³ · ⁸⁄₉ · (W e₁/W) · (W e₂/W).
         let determinant = 8.0 / 9.0 * of_one.sum(k) * of_two.sum(twos) * of_three.sum(threes);
         let ln_determinant = libm::log(determinant);
-        // A prior in its own volume: ln p at the maximum is −½ ln det Σ − 3 ln 2π.
+        // The prior in units of its own volume: ln p at the maximum is −½ ln det Σ − 3 ln 2π.
         let ln_prior = -2.0 * (prior_terms.ln_peak + 6.0 * HALF_LN_2PI);
         *filled = match &prior_terms.known {
             Some(_) => -3.0 * libm::log1p(libm::exp((ln_determinant + ln_prior) / 6.0)),
@@ -57,14 +57,14 @@ pub(super) fn ln_posterior_volume(
     ln_posterior_volume
 }
 
-/// Bits of a number that its group leaves aside: eight groups between a power of two and the next.
+/// Number of low bits that a group ignores: eight groups between a power of two and the next.
 const GROUPED: u32 = f64::MANTISSA_DIGITS - 1 - 3;
 
-/// Sums of the smallest of some numbers, none of them negative, by groups of numbers that are nearly equal: no more than the true
-/// sums, and no less than eight ninths of them.
+/// Sums of the smallest of some non-negative numbers, by groups of nearly equal ones: at most the exact sums, and at
+/// least eight ninths of them.
 struct Smallest {
     first: u64,
-    /// How many are left of each group.
+    /// Number of remaining members of each group.
     groups: Vec<usize>,
     at: usize,
     taken: usize,
@@ -81,7 +81,7 @@ impl Smallest {
         Self { first, groups, at: 0, taken: 0, sum: 0.0 }
     }
 
-    /// Of so many, no fewer than before and no more than there are.
+    /// The sum of the `count` smallest; `count` must not decrease between calls and not exceed the number of values.
     fn sum(&mut self, count: usize) -> f64 {
         while self.taken < count && self.at < self.groups.len() {
             let some = self.groups[self.at].min(count - self.taken);
@@ -107,9 +107,9 @@ mod tests {
         search::consensus::{Motion, fit::Linear},
     };
 
-    /// Of every set of a few points, with a prior and without: the posterior fills less than is said of so many.
+    /// The posterior volume of every set of a few points, with a prior and without, is below its bound.
     ///
-    /// Seen to fail with four times the determinant, and with points twice as well known as they are.
+    /// Fails with four times the determinant, and with points of twice the precision.
     #[test]
     fn no_set_of_points_leaves_more_open() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -144,7 +144,7 @@ mod tests {
                 closest = closest.min(max[members.len()] - filled);
             }
         }
-        assert!(closest < 0.5, "of all points it is the value but for groups: {closest}");
+        assert!(closest < 0.5, "for all points the bound is tight up to the grouping: {closest}");
     }
 
     #[test]

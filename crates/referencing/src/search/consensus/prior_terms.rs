@@ -1,4 +1,4 @@
-//! The rough pose as a density over rigid motions.
+//! The prior pose as a probability density over rigid motions.
 
 use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, U6, Vector3, Vector6};
 use seafix_geometry::so3::{log_of_matrix, skew};
@@ -9,21 +9,21 @@ use super::{
 };
 use crate::{ModelPoint, Prior, PriorBound, Problem, parts::Parts};
 
-/// A bound of the prior is taken for so many standard deviations: bounds are given so that they hold.
+/// Number of standard deviations that a bound of the prior stands for, since bounds are given to hold.
 pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
 
-/// What is known of the pose before any pair is.
+/// The prior's terms of a likelihood.
 ///
-/// Motions are compared by η = (φ, τ): the rotation from the rough attitude (rad, camera axes) and the step of
+/// Motions are compared by η = (φ, τ): the rotation from the prior attitude (rad, camera axes) and the translation of
 /// the model's centroid (m). dφ dτ is the measure of every density here.
 pub(in crate::search) struct PriorTerms {
-    /// The motion that the prior predicts; `None` without a prior.
+    /// The prior motion; `None` without a prior.
     pub(in crate::search) known: Option<Known>,
     /// Centroid of the model.
     pub(in crate::search) centroid: Vector3<f64>,
     /// ln of the density at its maximum.
     pub(in crate::search) ln_peak: f64,
-    /// Where clutter lies; `None` with a prior, which draws shells of its own.
+    /// The parts of the cloud; `None` with a prior, which has gates of its own.
     pub(in crate::search) parts: Option<Parts>,
 }
 
@@ -32,11 +32,11 @@ pub(in crate::search) struct Known {
     pub(in crate::search) motion: Motion,
     /// Information on η.
     pub(in crate::search) information: Matrix6<f64>,
-    /// Greatest standard deviation of the rotation (rad).
+    /// Maximum standard deviation of the rotation (rad).
     pub(in crate::search) attitude: f64,
-    /// Each model point as predicted, and how far it may be from there along each axis (m, one sigma).
+    /// Predicted place of each model point, with its standard deviation along each axis (m).
     pub(in crate::search) places: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// Half-size of the box that a pose must leave every model point in, along each camera axis (m).
+    /// Half-size of a box prior along each camera axis (m): the pose must leave every model point within it.
     pub(in crate::search) half: Option<f64>,
 }
 
@@ -45,7 +45,8 @@ impl PriorTerms {
         let n = problem.model.len().max(1) as f64;
         let centroid = problem.model.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / n;
         let Some(prior) = problem.prior else {
-            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the boxes of the candidates' parts.
+            // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the boxes of the candidates'
+            // parts.
             let parts = Parts::of(problem);
             let ln_peak = -parts.ln_volume() - libm::log(8.0 * std::f64::consts::PI.powi(2));
             return Some(Self { known: None, centroid, ln_peak, parts: Some(parts) });
@@ -81,8 +82,7 @@ impl PriorTerms {
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
     }
 
-    /// Whether the prior's box holds every model point where a motion known with this information puts it, or
-    /// would but for the error of the motion.
+    /// Whether the prior's box holds every model point under a motion, up to the motion's error.
     pub(in crate::search) fn holds(
         &self,
         model: &[ModelPoint],
@@ -119,7 +119,7 @@ impl PriorTerms {
     }
 }
 
-/// Covariance (m²) of where a point with this lever about the centroid (m) is, to first order τ − [lever]× φ, with that of η.
+/// Covariance (m²) of the place of a point with this lever about the centroid (m): τ − [lever]× φ to first order.
 pub(in crate::search) fn spread(covariance: &Matrix6<f64>, lever: &Vector3<f64>) -> Matrix3<f64> {
     let lever = skew(lever);
     let (turn, mixed) = (covariance.fixed_view::<3, 3>(0, 0), covariance.fixed_view::<3, 3>(0, 3));

@@ -1,4 +1,4 @@
-//! Patterns that repeat by a step: what goes on beyond the object looks like a part of it.
+//! Patterns that repeat by a translation: their continuation beyond the object looks like a part of it.
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -8,39 +8,41 @@ use super::{
 };
 use crate::{ModelPoint, Problem, site::diameter};
 
-/// Of larger models no pattern is looked for: time grows with the cube.
+/// Maximum number of model points for the detection of a pattern, which takes cubic time.
 const MAX_POINTS: usize = 128;
-/// Threes in a row, one step apart, that make a pattern: so many, and this share of the points.
+/// Minimum number of equally spaced collinear triples of a pattern, and the minimum fraction of the points.
 const MIN_ROWS: usize = 3;
 const MIN_FRACTION: f64 = 0.25;
-/// What a point may be off its place in a row, as a share of the model's diameter.
+/// Tolerance of a point's place in a row, as a fraction of the model's diameter.
 const OFF_FRACTION: f64 = 0.015;
-/// A step is no shorter than so many times that.
+/// Minimum step in units of that tolerance.
 const MIN_STEP: f64 = 3.0;
-/// An object with so many points that do not repeat shows itself by them.
+/// Number of points outside the pattern that suffice to identify an object.
 const TELLING: usize = 3;
 /// Sine of the angle between two steps below which they are one direction.
 const SAME: f64 = 0.3;
 
-/// The points of a model that repeat by a step (a lattice, a ladder, a row of bolts), and where they would go on.
+/// The points of a model that repeat by a translation, with their continuation beyond the model.
+///
+/// Examples are a lattice, a ladder and a row of bolts.
 pub(in crate::search) struct Pattern {
-    /// Whether a model point is one of them.
+    /// Whether a model point belongs to the pattern.
     repeats: Vec<bool>,
     /// The next places beyond the model (object frame).
     beyond: Vec<Vector3<f64>>,
 }
 
-/// ln of the evidence that the cloud shows such a pattern, against clutter alone (nats).
+/// ln evidence of a repeated pattern in the cloud, relative to clutter alone (nats).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RepeatedPattern {
-    /// The pattern goes on where the likeliest pose has the object, which is not there.
+    /// The pattern continues at the best pose, and the object is absent.
     pub alone: f64,
-    /// The pattern goes on, and the object is there.
+    /// The pattern continues, and the object is present.
     pub around: f64,
 }
 
 impl Pattern {
-    /// `None` of a model without one.
+    /// The pattern of a model; `None` without one.
     pub(in crate::search) fn of(model: &[ModelPoint]) -> Option<Self> {
         let n = model.len();
         let min = ((MIN_FRACTION * n as f64).ceil() as usize).max(MIN_ROWS);
@@ -56,7 +58,7 @@ impl Pattern {
             let mut beside = along[from..].iter().take_while(|p| p.x <= place.x + off);
             beside.any(|p| (*p - place).norm_squared() <= off * off)
         };
-        // Every point between two others: the steps to it, each once.
+        // Every midpoint of two others: the step to it, each once.
         let mut steps: Vec<Vector3<f64>> = Vec::new();
         for a in 0..n {
             for c in 0..a {
@@ -79,7 +81,7 @@ impl Pattern {
                 pattern.repeats[i] = true;
             }
         }
-        // Others may lie on the same lattice, or on a finer one, with none beside them.
+        // Isolated points may lie on the same lattice or on a finer one.
         let (own, finer) = (Lattice::of(&basis, 1.0), Lattice::of(&repeated(&at, off), 0.5));
         let of_it: Vec<usize> = (0..n).filter(|&i| pattern.repeats[i]).collect();
         let on = |p: &Vector3<f64>| {
@@ -98,16 +100,16 @@ impl Pattern {
         Some(pattern)
     }
 
-    /// The points that tell the object from the pattern by themselves, if they are enough.
+    /// The points that distinguish the object from the pattern, if they suffice.
     pub(in crate::search) fn distinctive(&self) -> Option<Vec<bool>> {
         let distinctive: Vec<bool> = self.repeats.iter().map(|repeats| !repeats).collect();
         (distinctive.iter().filter(|&&distinctive| distinctive).count() >= TELLING).then_some(distinctive)
     }
 
-    /// What the pattern alone, or around the object, explains of the cloud as well as a pose does.
+    /// The evidence of the pattern alone, and around the object, for the points of a mode.
     ///
-    /// Points of the pattern are as visible within the object as beyond it, all numbers being equally likely; the points
-    /// that do not repeat are the object's alone.
+    /// Points of the pattern are as visible within the object as beyond it, and all numbers are equally probable;
+    /// points outside the pattern belong to the object only.
     pub(in crate::search) fn repeated_pattern(
         &self,
         problem: &Problem<'_>,
@@ -138,14 +140,14 @@ impl Pattern {
         }
         let shown = mode.ln_evidence - ln_fraction(k, n) - own;
         let goes_on = gains + ln_fraction(seen + further, all + self.beyond.len());
-        // Where so many points do not repeat they have to tell the object: the same pattern may end anywhere.
+        // Enough points outside the pattern must identify the object: the pattern itself may end anywhere.
         let ends = if n - all >= TELLING { ln_fraction(seen, all) } else { f64::NEG_INFINITY };
         let alone = shown + goes_on.max(ends);
         RepeatedPattern { alone, around: alone + own + ln_fraction(k - seen, n - all) }
     }
 }
 
-/// Up to three steps, the shortest in as many directions, by each of which [`MIN_ROWS`] points or more follow others.
+/// The shortest steps in up to three directions by each of which [`MIN_ROWS`] points or more follow others.
 fn repeated(at: &[Vector3<f64>], off: f64) -> Vec<Vector3<f64>> {
     let mut steps: Vec<Vector3<f64>> = Vec::new();
     for (a, from) in at.iter().enumerate() {
@@ -178,7 +180,7 @@ fn independent(mut steps: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
     basis
 }
 
-/// All sums of whole multiples of one to three steps, or of a share of them.
+/// All integer combinations of one to three steps, or of a fraction of them.
 struct Lattice {
     basis: Vec<Vector3<f64>>,
     /// The least-squares multiples of a step.
@@ -193,7 +195,7 @@ impl Lattice {
         Self { multiples: inverse.unwrap_or_else(|| DMatrix::zeros(basis.len(), 3)), basis }
     }
 
-    /// How far a step is from the nearest one of these.
+    /// The distance of a step from the nearest lattice vector.
     fn off(&self, step: &Vector3<f64>) -> f64 {
         let multiples = &self.multiples * step;
         let full = self.basis.iter().zip(multiples.iter()).map(|(basis, m)| basis * m.round());
@@ -201,7 +203,7 @@ impl Lattice {
     }
 }
 
-/// One of a step and its reverse.
+/// Whether a step, rather than its reverse, is the canonical one of the two.
 fn forward(step: &Vector3<f64>) -> bool {
     step.iter().copied().find(|x| x.abs() > 1e-9).is_none_or(|x| x > 0.0)
 }
@@ -227,13 +229,13 @@ mod tests {
     fn a_lattice_repeats_and_goes_on_at_each_side() {
         let off = [[0.735, 0.66, 0.18], [0.105, 0.56, 0.09], [0.955, 0.09, 0.07], [0.425, 0.15, 0.22]];
         assert_eq!(pattern(lattice(6, 5).into_iter().chain(off)), Some((30, 22)));
-        // A ladder of six rungs goes on at its two ends.
+        // A ladder of six rungs continues at its two ends.
         assert_eq!(pattern(lattice(6, 2)), Some((12, 4)));
     }
 
     #[test]
     fn what_stands_alone_on_the_lattice_does_not_report_the_object() {
-        // A row, a column, and points with none beside them.
+        // A row, a column, and isolated points.
         let row = (0..6).map(|x| (x, 0));
         let nodes: Vec<(i32, i32)> = row.chain([(5, 2), (5, 3), (5, 4), (5, 5), (0, 2), (2, 3), (3, 5)]).collect();
         let places: Vec<[f64; 3]> = nodes.iter().map(|&(x, y)| [0.3 * f64::from(x), 0.3 * f64::from(y), 0.0]).collect();

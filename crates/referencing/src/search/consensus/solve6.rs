@@ -1,8 +1,10 @@
-//! Six equations: what the fits of a search spend most of their time on.
+//! Systems of six equations, which dominate the time of the fits.
 
 use nalgebra::{Cholesky, Matrix6, U6, Vector6};
 
-/// The Cholesky factor of a matrix of which the lower triangle is read, bit for bit as nalgebra's, whose loops over six rows are not unrolled.
+/// The Cholesky factor of a matrix, from its lower triangle.
+///
+/// Bit for bit equal to nalgebra's, whose loops over six rows are not unrolled.
 #[inline]
 pub(super) fn factor(matrix: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
     let mut l = *matrix;
@@ -13,7 +15,7 @@ pub(super) fn factor(matrix: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
                 l[(i, j)] += factor * l[(i, k)];
             }
         }
-        // Written so that a NaN is refused too.
+        // The negated comparison rejects NaN too.
         if !(l[(j, j)] > 0.0) {
             return None;
         }
@@ -26,7 +28,7 @@ pub(super) fn factor(matrix: &Matrix6<f64>) -> Option<Cholesky<f64, U6>> {
     Some(Cholesky::pack_dirty(l))
 }
 
-/// The solution with this factor, bit for bit as nalgebra's.
+/// The solution with this factor, bit for bit equal to nalgebra's.
 #[inline]
 pub(super) fn solve(factor: &Cholesky<f64, U6>, of: &Vector6<f64>) -> Vector6<f64> {
     let (l, mut x) = (factor.l_dirty(), *of);
@@ -55,7 +57,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for round in 0..1000 {
             let a = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
-            // Now and then one that has no factor.
+            // Some matrices are indefinite.
             let matrix = a * a.transpose() - Matrix6::identity() * if round % 7 == 0 { 0.1 } else { 0.0 };
             let of = Vector6::from_fn(|_, _| rng.random_range(-1.0..1.0));
             let (own, known) = (factor(&matrix), matrix.cholesky());

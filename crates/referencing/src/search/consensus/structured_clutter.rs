@@ -1,4 +1,4 @@
-//! Clutter that imitates the object, as the cloud itself shows it.
+//! Structured clutter: evidence from the cloud itself that clutter resembles the object.
 
 use nalgebra::Vector3;
 
@@ -9,27 +9,29 @@ use super::{
 };
 use crate::{Problem, search::alike::slack};
 
-/// What a pose elsewhere explains of the cloud that the likeliest pose says nothing of, and what follows for it.
+/// The evidence of clutter that resembles the object, from a pose elsewhere.
 ///
-/// Clutter spread evenly shows a pose of evidence Λ once in Λ frames. A frame where a pose *elsewhere* has that much, in places
-/// where the likeliest pose has no point of the object, shows that its clutter is not spread evenly: it repeats the object's own
-/// distances (it goes on where the object has part of a grating, say), and then the likeliest pose may be such an imitation too.
+/// Uniform clutter shows a pose of evidence Λ in about one of Λ frames. A pose *elsewhere* of that evidence, in places
+/// where the best pose has no point of the object, shows that clutter is not uniform: it repeats the object's own
+/// distances (as a grating that continues beyond a part of it). The best pose may then be such clutter too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructuredClutter {
-    /// ln of the evidence that clutter imitates the object (nats): that of the pose elsewhere, given what of its pairs are
-    /// points that the likeliest pose explains as the object's, over the places where that has none.
+    /// ln evidence that clutter resembles the object (nats): that of the pose elsewhere, given its pairs that the best
+    /// pose explains as the object's, over the places that the best pose leaves free.
     pub ln_evidence: f64,
-    /// ln of how much likelier the whole is if the likeliest pose is an imitation as well, one share of the places being filled
-    /// in both, than if the object is there and has a share of its own (nats).
+    /// ln likelihood ratio (nats) of absence over presence, given that clutter resembles the object.
+    ///
+    /// Absence: the best pose is such clutter too, with one visible fraction for the places of both poses. Presence:
+    /// the object has a visible fraction of its own.
     pub ln_alone: f64,
 }
 
-/// Where the likeliest pose has the object's points.
+/// The places of the model points under the best pose.
 pub(in crate::search) struct Occupied<'a> {
     pub(super) best: &'a Mode,
-    /// Along the first axis.
+    /// Sorted along the first axis.
     places: Vec<Vector3<f64>>,
-    /// Model points that no clutter imitates: those that do not repeat where others do.
+    /// Model points without a counterpart in clutter: the points outside the pattern of a model with one.
     distinctive: Vec<bool>,
 }
 
@@ -47,17 +49,17 @@ impl<'a> Occupied<'a> {
         beside.any(|p| (p - place).norm_squared() <= off * off)
     }
 
-    /// Whether a pair's cloud point lies where the likeliest pose has the object.
+    /// Whether a pair's cloud point lies at a place of the object under the best pose.
     pub(super) fn holds_place(&self, problem: &Problem<'_>, terms: &Terms, graph: &ConsistencyGraph, v: usize) -> bool {
         self.near(&terms.pairs[v].cloud, slack(problem, graph.vertices[v]))
     }
 
-    /// What another pose says of the clutter.
+    /// The structured clutter that another pose shows.
     ///
-    /// Of its k′ pairs those whose cloud point lies where the object is are the object's own; given these, which fix most of the
-    /// pose, the other s of f free places have the evidence Λ(all)/Λ(own) with the share B(s, f). With k of n points at the
-    /// likeliest pose, an imitation like this one shows both with the share B(k + s, n + f), the object with B(k, n)·B(s, f);
-    /// points that no clutter imitates count for the object alone.
+    /// Among its k′ pairs those whose cloud point lies at a place of the object are the object's own. Given these,
+    /// which determine most of the pose, the other s of f free places have the evidence Λ(all)/Λ(own) with the
+    /// probability B(s, f). With k of n points at the best pose, such clutter shows both with the probability B(k + s,
+    /// n + f), the object with B(k, n)·B(s, f). Points without a counterpart in clutter count for the object alone.
     pub(in crate::search) fn structured_clutter(
         &self,
         problem: &Problem<'_>,

@@ -1,15 +1,15 @@
-//! Which of the points that fit a pose are the object's.
+//! The sum over the subsets of a mode's members that are the object's.
 
-/// No more of the members than so many are left out at once: beyond, what they add is lost.
+/// Maximum number of members excluded at once; the contribution of larger exclusions is neglected.
 const MAX_LEFT_OUT: usize = 1024;
 
-/// ln Σ_V B(|V|) Π_{i∈V} r_i over the subsets V of the members of a mode, r_i = exp(`gains`[i]) the likelihood ratio of
-/// each and B the share of one set of so many visible points (`ln_fraction`).
+/// ln Σ_V B(|V|) Π_{i∈V} r_i over the subsets V of the members of a mode.
 ///
-/// A pair that fits is the object's or clutter that happens to be there. Where r ≫ n nearly all of the sum is the set of all
-/// members; a pair whose ratio is about one says nothing, whichever it is.
+/// r_i = exp(`gains`[i]) is the likelihood ratio of each member. B (`ln_fraction`) is the probability of one visible
+/// set of this size. A pair that fits is the object's, or clutter that happens to be there. If r ≫ n, nearly all of the
+/// sum is the set of all members; a pair with a ratio of about one has no information either way.
 pub(super) fn ln_visible(gains: &[f64], ln_fraction: &[f64]) -> f64 {
-    // Coefficients of Π_i (r_i + z), each factor over the greater of its two: z counts the members left out.
+    // Coefficients of Π_i (r_i + z), each factor divided by the greater of its two: z counts the excluded members.
     let mut left_out = vec![1.0];
     let mut ln_scale = 0.0;
     for &gain in gains {
@@ -68,7 +68,8 @@ mod tests {
         let sure = vec![40.0; 20];
         let product = 800.0 + fractions[20];
         assert!((ln_visible(&sure, &fractions) - product).abs() < 1e-9);
-        // Ten more in crowds cost what it takes that they are hidden and clutter is there, and not what they lack.
+        // Ten more in dense clutter cost the probability that they are hidden and clutter is there, and not their
+        // deficit.
         let with = |gain: f64| ln_visible(&[&sure[..], &[gain; 10]].concat(), &fractions);
         assert!((with(-30.0) - product).abs() < 1e-9);
         assert!(with(0.0) > with(-30.0) && with(0.0) < with(1.0));

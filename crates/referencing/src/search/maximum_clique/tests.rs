@@ -1,4 +1,4 @@
-//! What the search says beside the largest set.
+//! Tests of the answer beside the largest set: alternatives, bounds, rejections and cost.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// Every cloud point may be every model point.
+    /// Every cloud point is a candidate of every model point.
     fn of(model: &[[f64; 3]], cloud: &[[f64; 3]]) -> Self {
         let seen = |at: &[f64; 3]| UncertainPoint::isotropic(Point::from(*at), 1e-3);
         Self {
@@ -34,7 +34,7 @@ impl Scene {
         }
     }
 
-    /// Cloud point j may be model point j modulo their number.
+    /// Cloud point j is a candidate of model point j modulo their number.
     fn named(mut self) -> Self {
         let count = self.model.len();
         self.candidates = Candidates::from_pairs(count, (0..self.cloud.len()).map(|j| (j % count, j)));
@@ -80,8 +80,8 @@ const PYRAMID: [[f64; 3]; 8] = [
     [0.5, -0.5, 0.7],
 ];
 
-/// A stump of a square pyramid is itself after every quarter turn: three other sets of eight, each of which shares no pair with the best.
-/// They do not place the object where the best does, so that all are told however few are asked for.
+/// A truncated square pyramid maps onto itself by every quarter turn: three other sets of eight share no pair with the
+/// best. They give other poses, so that all are in the answer, whatever number is requested.
 #[test]
 fn the_other_sets_of_a_symmetric_object_are_reported() {
     let scene = Scene::of(&PYRAMID, &PYRAMID);
@@ -93,7 +93,8 @@ fn the_other_sets_of_a_symmetric_object_are_reported() {
     }
 }
 
-/// Nine points, each measured twice within 2 mm: 512 sets, all alike. As many as are asked for are told, those first that share least.
+/// Nine points, each measured twice within 2 mm: 512 sets with the same pose. The answer holds the requested number,
+/// those with the fewest common pairs first.
 #[test]
 fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
     let places = scattered(9);
@@ -106,7 +107,7 @@ fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
     assert_eq!(found.alternatives.iter().map(shared).collect::<Vec<_>>(), [0, 1, 1, 1, 1]);
     let all = scene.search(&MaximumClique { alternatives: 511, ..MaximumClique::default() }).unwrap();
     assert_eq!((all.alternatives.len(), all.alternatives_complete), (511, true));
-    // Whether sets are alike costs tests, and is asked only where there are more rivals than are to be told.
+    // The proof of equal poses costs tests, and is made only if there are more alternatives than requested.
     let apart = Scene::of(&places, &[&places[..], &moved(&places, [9.0, 0.0, 0.0])].concat()).named();
     let pair_tests =
         |alternatives| apart.search(&MaximumClique { alternatives, ..MaximumClique::default() }).unwrap().pair_tests;
@@ -117,16 +118,16 @@ fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
         pair_tests(1),
         pair_tests(64)
     );
-    // Thirteen points have more such sets than are looked at: that they are alike decides, and they are not complete.
+    // Thirteen points have more such sets than the limit: the equal pose decides, and they are incomplete.
     let places = scattered(13);
     let scene = Scene::of(&places, &[&places[..], &moved(&places, [0.002, 0.0, 0.0])].concat()).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
     assert_eq!((found.pairs.len(), found.alternatives.len(), found.alternatives_complete), (13, 64, false));
     assert!(found.optimal && found.undecided.is_none());
-    // All that were looked at are told where so many are asked for: they are decided by being alike.
+    // A sufficient number requests all sets found: their equal pose decides.
     let found = scene.search(&MaximumClique { alternatives: 10_000, ..MaximumClique::default() }).unwrap();
     assert_eq!((found.alternatives.len(), found.alternatives_complete, found.undecided), (MAX_TIES, false, None));
-    // With a whole second object a metre away as well they are not alike, and what is undecided is told with the numbers.
+    // With a complete second object nine metres away they differ, and the undecided answer has its numbers.
     let doubled = [&places[..], &moved(&places, [0.002, 0.0, 0.0])].concat();
     let scene = Scene::of(&places, &[&doubled[..], &moved(&doubled, [9.0, 0.0, 0.0])].concat()).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
@@ -139,7 +140,7 @@ fn sets_that_are_alike_are_reported_as_far_as_asked_for() {
     }
 }
 
-/// The set with the least residual, and of equals, but for rounding, the first.
+/// The set of minimum residual; among equals up to rounding, the first.
 #[test]
 fn the_smallest_residual_decides_between_sets_of_one_size() {
     let places = scattered(5);
@@ -168,8 +169,8 @@ fn alternatives_that_fraction_smallest_stand_first() {
     assert_eq!(alternatives, [other([9, 8, 7, 6]), other([0, 1, 8, 7]), other([7, 8, 2, 3]), other([0, 1, 2, 9])]);
 }
 
-/// A mirror image of four points that are not flat is refused; distances alone accept it. One of six points leaves its four flat ones,
-/// undecided.
+/// A mirror image of four points that are not coplanar is rejected; distances alone accept it. One of six points leaves
+/// its four coplanar ones, undecided.
 #[test]
 fn mirror_images_are_reported() {
     let mirrored = |places: &[[f64; 3]]| places.iter().map(|[x, y, z]| [*x, *y, -z]).collect::<Vec<_>>();
@@ -185,14 +186,14 @@ fn mirror_images_are_reported() {
     let found = scene.search(&MaximumClique::default()).unwrap();
     assert_eq!((found.pairs.len(), found.undecided), (4, Some(Rejected::Mirrored { best: 6, proved: false })));
     assert_eq!(scene.search(&distances).unwrap().undecided, None);
-    // Three true points beside a fourth that agrees with two of them are three, and no image.
+    // Three true points beside a fourth that agrees with two of them are three points, and no image.
     let mut cloud = four;
     cloud[3] = [30.0, 4.0, 11.0];
     let found = Scene::of(&four, &cloud).named().search(&MaximumClique::default()).unwrap();
     assert_eq!((found.pairs, found.undecided), (named(3), None));
 }
 
-/// Of an object whose image has as many points as the set found the set stands: larger ones alone contradict it.
+/// A set stands if its image has as many points: only a larger image contradicts it.
 #[test]
 fn an_image_no_larger_than_the_set_contradicts_nothing() {
     let five = scattered(5);
@@ -205,7 +206,7 @@ fn an_image_no_larger_than_the_set_contradicts_nothing() {
     assert_eq!(found.undecided, Some(Rejected::Mirrored { best: 5, proved: false }));
 }
 
-/// Too small sets are told with their size and the tests that they took; too many pairs are not searched.
+/// Too small a set is rejected with its size and the pair tests; too many pairs are not searched.
 #[test]
 fn what_is_too_small_or_too_large_is_reported() {
     let four = scattered(4);
@@ -222,7 +223,7 @@ fn what_is_too_small_or_too_large_is_reported() {
     assert!(scene.search(&MaximumClique { max_pairs: 16, ..MaximumClique::default() }).is_ok());
 }
 
-/// Four named points have six pair tests; what the proof spends is added. A budget of one leaves the proof out.
+/// Four labelled points have six pair tests, and the proof adds its own. A budget of one omits the proof.
 #[test]
 fn tests_are_those_of_the_graph_and_of_the_proof() {
     let four = scattered(4);
@@ -239,21 +240,22 @@ fn tests_are_those_of_the_graph_and_of_the_proof() {
     }
 }
 
-/// Forty-five points are tested by the first sixteen while the set grows, and as a whole in the end: five on the wrong side of a
-/// plane go, and with them the proof.
+/// Forty-five points with five on the wrong side of a plane: these are dropped, and with them the proof.
+///
+/// The points are tested against the first sixteen while the set grows, and completely in the end.
 #[test]
 fn large_sets_are_tested_for_mirror_images_as_a_full() {
     let mut places: Vec<[f64; 3]> = scattered(45).iter().map(|[x, y, z]| [*x, *y, z - 1.0]).collect();
     let scene = Scene::of(&places, &places).named();
     let found = scene.search(&MaximumClique::default()).unwrap();
     assert!(found.pairs == named(45) && found.optimal && found.alternatives_complete, "{found:?}");
-    // The pairs of the graph, and all fours of 45 points in the end.
+    // The pairs of the graph, and all quadruples of 45 points in the end.
     let grown = 237_170;
     assert_eq!(found.pair_tests, 990 + grown + 148_995);
     let flat = MaximumClique { orientation: false, ..MaximumClique::default() };
     let found = scene.search(&flat).unwrap();
     assert!(found.pairs == named(45) && found.pair_tests < 2_000, "{}", found.pair_tests);
-    // Those that are nearly flat are coherent with their image.
+    // Nearly coplanar points are coherent with their image.
     for at in &mut places {
         at[2] *= 1e-4;
     }

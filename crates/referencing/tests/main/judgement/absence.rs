@@ -1,11 +1,13 @@
-//! Whether an object is believed to be there, by the clutter about it.
+//! The test of an object's presence, depending on the clutter.
 
 use seafix_referencing::RepeatedPattern;
 
 use super::*;
 
-/// What is said with this `acceptance.absence` of an object of seventeen points, six of them seen, with this evidence (nats),
-/// and that of a pattern alone that looks like it, beside 120 other points: where `clutter` puts three numbers that are uniform in 0…1.
+/// The outcome for an object of seventeen points, six of them visible, beside 120 clutter points.
+///
+/// `absence` is `acceptance.absence`; `ln_evidence` (nats) is that of the object, `alone` that of a repeated pattern
+/// without the object. `clutter` maps three numbers uniform in 0…1 to a position.
 fn with_evidence(
     absence: f64,
     ln_evidence: f64,
@@ -37,7 +39,7 @@ fn with_evidence(
     judge(&problem, Ok(found), &Kabsch::default(), &acceptance, None).outcome
 }
 
-/// Seen to fail when the exponent is another, when a space is never or always seen, and when patterns count as chance.
+/// Fails with another exponent, if clutter never or always fills space, and if patterns count as random sets.
 #[test]
 fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
     let space = |[u, v, w]: [f64; 3]| Point::new(4.0 * u - 2.0, 4.0 * v - 2.0, 3.0 + 2.0 * w);
@@ -47,7 +49,7 @@ fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
         Outcome::Rejected(RejectionReason::Absent { limit, .. }) => limit,
         other => panic!("{other:?}"),
     };
-    // Twice as large as what the limit of 2e-5 is stated for: twice it, or 2^-2.5 of it.
+    // The model is twice the size for which the limit of 2e-5 is stated: twice the limit, or 2^-2.5 of it.
     assert!((limit(with_evidence(2e-5, 9.0, None, space)) - 4e-5).abs() < 1e-12);
     for clutter in [&surface as &dyn Fn([f64; 3]) -> Point<Camera>, &line] {
         assert!((limit(with_evidence(2e-5, 9.0, None, clutter)) - 3.5355e-6).abs() < 1e-9);
@@ -55,9 +57,9 @@ fn where_clutter_lies_on_lines_and_surfaces_more_is_asked_of_a_large_model() {
         assert!(matches!(with_evidence(2e-5, 13.5, None, clutter), Outcome::Fix(_)));
     }
     assert!(matches!(with_evidence(2e-5, 11.0, None, space), Outcome::Fix(_)));
-    // Who asks for nothing is refused nothing.
+    // A limit of almost one rejects nothing.
     assert!(matches!(with_evidence(0.999_999, 0.0, None, line), Outcome::Fix(_)));
-    // A pattern that looks like it is held to the same limit wherever clutter lies.
+    // A repeated pattern has the same limit for every distribution of the clutter.
     for (clutter, nfa) in [(&space as &dyn Fn([f64; 3]) -> Point<Camera>, 4e-5), (&line, 3.5355e-6)] {
         assert!(matches!(with_evidence(2e-5, 40.0, Some(29.5), clutter), Outcome::Fix(_)));
         assert!((limit(with_evidence(2e-5, 40.0, Some(30.5), clutter)) - 4e-5).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! Errors over a condition that has numbers.
+//! Figures of errors over a numeric condition.
 
 use super::{caption, distinct, figure, panels, series};
 use crate::{
@@ -10,12 +10,12 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// The first condition with numbers that vary.
+/// The first numeric condition that varies.
 pub(in crate::content) fn numeric(summary: &RunSummary) -> Option<String> {
     keys(summary).into_iter().next()
 }
 
-/// All conditions with numbers that vary.
+/// All numeric conditions that vary.
 pub(in crate::content) fn keys(summary: &RunSummary) -> Vec<String> {
     let axes = summary.rows.first().into_iter().flat_map(Row::conditions);
     let varies = |key: &String| {
@@ -30,16 +30,18 @@ pub(in crate::content) fn on(row: &Row, key: &str) -> Option<f64> {
     row.axes.iter().find(|axis| axis.key == key).and_then(|axis| axis.value.parse().ok())
 }
 
-/// What tells a row's line from the others of a figure over `key`.
+/// The name of a row's series in a figure over `key`: its method and its other conditions.
 pub(in crate::content) fn name(row: &Row, key: &str) -> String {
     let others = row.conditions().filter(|axis| axis.key != key);
     others.fold(row.method(), |name, axis| format!("{name}, {} {}", short(&axis.key), axis.value))
 }
 
-/// A quantity, its spread in a row, and its name and unit.
+/// A quantity with its distribution in a row and its axis label.
 type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
 
-/// m1 and m2 over the condition, with the paper's range and, over the distance, both laws.
+/// The figure of fit RMS and TRE over the condition, with the paper's range.
+///
+/// Over distance it also shows growth with z and z².
 pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let key = numeric(summary)?;
     let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
@@ -50,13 +52,13 @@ pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     ticks.sort_by(f64::total_cmp);
     ticks.dedup();
     let (&first, &last) = (ticks.first()?, ticks.last()?);
-    // Values over more than a decade would stand on each other at one end.
+    // Values over more than a decade would overlap at one end of a linear axis.
     let wide = first > 0.0 && last / first > 12.0;
     let reach = if wide { (last / first).ln() } else { last - first };
     let mut heads = vec![Head::words("series"), Head::numbers(headed(&key)), Head::words("metric")];
     heads.extend(["p5 (mm)", "median (mm)", "p95 (mm)"].map(Head::numbers));
     let mut data =
-        Table::new("error-over-condition", text!["Every point of the figure of error over the condition."], heads);
+        Table::new("error-over-condition", text!["The data of the figure of error over the condition."], heads);
     let metrics: [Metric; 2] = [(Field::Fit, |row| row.fit, "fit RMS (mm)"), (Field::Tre, |row| row.tre, "TRE (mm)")];
     let mut plotted = Vec::new();
     for (field, value, label) in metrics {
@@ -81,7 +83,7 @@ pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
                     [series_name.clone().into(), place.into(), field.name().into()].into_iter().chain(ends).collect(),
                 );
             }
-            // Series of the same place stand beside each other.
+            // Series with the same abscissa are shifted apart.
             let shift = 0.012 * reach * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
             let at = |x: f64| if wide { x * shift.exp() } else { x + shift };
             let line: Vec<[f64; 2]> = points.iter().map(|(x, s, _)| [at(*x), s.median * 1e3]).collect();
@@ -109,18 +111,18 @@ pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let chart = Chart { panels: plotted, columns: 2, page: true, shape: 0.78, legend };
     let laws = if ranges(&key) { " Thin grey lines: growth with the distance z and with its square." } else { "" };
     let said = format!(
-        "Error over {}: medians of the fixes found, bars from the 5 % to the 95 % quantile, moved apart a little; the shaded range is the m1 that the paper reports for its virtual scene at 2–5 m.{laws}",
+        "Error over {}: medians of the fixes, with bars from the 5 % to the 95 % quantile, slightly shifted apart. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m.{laws}",
         short(&key)
     );
     figure("error-over-condition", caption(&said, run), &chart, data)
 }
 
-/// Whether a condition is how far off the objects are, or nearly so.
+/// Whether a condition is the distance to the objects, or nearly so.
 fn ranges(key: &str) -> bool {
     matches!(short(key), "distance" | "altitude")
 }
 
-/// z and z², through the middle of the values at the least distance.
+/// The laws z and z² through the median of the values at the smallest distance.
 fn laws(ticks: &[f64], all: &[[f64; 2]]) -> Vec<Layer> {
     let (Some(&first), Some(&last)) = (ticks.first(), ticks.last()) else { return Vec::new() };
     let mut near: Vec<f64> = all.iter().filter(|p| (p[0] - first).abs() < 0.1 * (last - first)).map(|p| p[1]).collect();
@@ -138,11 +140,13 @@ fn laws(ticks: &[f64], all: &[[f64; 2]]) -> Vec<Layer> {
         .into()
 }
 
-/// A quantity whose distribution is shown, its unit, and what its axis is called.
+/// A quantity with its unit and its axis label.
 type Distributed = (Field, Unit, &'static str);
 
-/// How the errors of the fixes found are distributed, a box a trial: m2, and over a share of outliers what the literature on
-/// robust methods shows, attitude, position and time.
+/// The figure of error distributions, with one box for every trial.
+///
+/// It shows the TRE; over a fraction of outliers it shows attitude error, position error and search time, as the
+/// literature on robust registration does.
 pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let groups = panels(run, 12);
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
@@ -152,16 +156,16 @@ pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let over_outliers = keys(summary).iter().any(|key| short(key) == "outliers");
     let shown: &[Distributed] = if over_outliers {
         &[
-            (Field::Attitude, Unit::Degrees, "attitude of the fixes found (deg)"),
-            (Field::Position, Unit::Millimetres, "position of the fixes found (mm)"),
+            (Field::Attitude, Unit::Degrees, "attitude error (deg)"),
+            (Field::Position, Unit::Millimetres, "position error (mm)"),
             (Field::SearchTime, Unit::Plain, "search (ms)"),
         ]
     } else {
-        &[(Field::Tre, Unit::Millimetres, "TRE of the fixes found (mm)")]
+        &[(Field::Tre, Unit::Millimetres, "TRE (mm)")]
     };
     let heads = [Head::words("condition"), Head::words("series"), Head::words("metric")].into_iter();
     let heads = heads.chain(["n", "p5", "p25", "median", "p75", "p95"].map(Head::numbers));
-    let mut data = Table::new("distribution", text!["The boxes of the figure of distributions."], heads.collect());
+    let mut data = Table::new("distribution", text!["The data of the figure of distributions."], heads.collect());
     let conditions: Vec<String> = groups.iter().map(|(condition, _)| condition.clone()).collect();
     let mut plotted = Vec::new();
     for &(field, unit, label) in shown {
@@ -190,7 +194,7 @@ pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
                 data.line(false, line);
             }
         }
-        // Runs without durations have none.
+        // A run without durations has no panel of times.
         if layers.iter().any(|layer| matches!(layer, Layer::Boxes { values, .. } if !values.is_empty())) {
             let (x, y) = (Axis::named("", conditions.clone()), Axis::logarithmic(label));
             plotted.push(Panel { x, y, layers, ..Panel::default() });
@@ -199,11 +203,11 @@ pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let page = groups.len() * names.len() > 6;
     let chart = Chart { panels: plotted, columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
-    let said = "Distribution over the fixes found: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
+    let said = "Distribution over the fixes: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
     figure("distribution", caption(said, run), &chart, data)
 }
 
-/// How many fixes of the sample were found.
+/// The number of fixes in the sample.
 fn n(trial: &Trial, field: Field, n: usize) -> Number {
     let key = crate::Key::of(trial, field.topic(), format!("sampled {} of found", field.name()));
     Number::count(n, key)

@@ -1,4 +1,4 @@
-//! Whether covariances are honest.
+//! Figures of the consistency of covariances: the NEES histogram and the coverage curve.
 
 use super::{caption, distinct, figure};
 use crate::{
@@ -10,11 +10,11 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// Width of a column of the histogram, and where it ends.
+/// The width of a column of the histogram, and the number of columns.
 const STEP: f64 = 1.5;
 const COLUMNS: usize = 16;
 
-/// The normalised errors squared of all fixes found beside the density of χ² with six degrees of freedom.
+/// The histogram of the NEES of all fixes, with the density of χ² with six degrees of freedom.
 pub(super) fn histogram(run: &Run) -> Option<Figure> {
     let trials: Vec<_> = run.trials.iter().collect();
     let all = || {
@@ -32,7 +32,7 @@ pub(super) fn histogram(run: &Run) -> Option<Figure> {
     all().for_each(|nees| counts[((nees / STEP) as usize).min(COLUMNS - 1)] += 1);
     let density = |x: f64| x * x * (-x / 2.0).exp() / 16.0;
     let heads = ["from", "to", "fixes", "density"].map(Head::numbers).to_vec();
-    let mut data = Table::new("nees", text!["The columns of the histogram of NEES."], heads);
+    let mut data = Table::new("nees", text!["The data of the NEES histogram."], heads);
     let mut columns = Vec::new();
     for (index, &count) in counts.iter().enumerate() {
         let (from, to) = (index as f64 * STEP, (index + 1) as f64 * STEP);
@@ -59,25 +59,26 @@ pub(super) fn histogram(run: &Run) -> Option<Figure> {
         layers: vec![Layer::Columns { series: 0, values: columns }, Layer::Line { series: 1, points: curve }],
         ..Panel::default()
     };
-    let legend = vec![Entry::line("fixes found", 0), Entry::line("χ², six degrees of freedom", 1)];
+    let legend = vec![Entry::line("fixes", 0), Entry::line("χ², six degrees of freedom", 1)];
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.66, legend };
     let said = format!(
-        "Normalised error squared of {n} fixes found, of all trials: the curve is where an honest covariance puts it. The last column holds all beyond."
+        "NEES (normalised estimation error squared) of the {n} fixes of all trials that are not wrong. The curve is the density for a consistent covariance. The last column holds all larger values."
     );
     figure("nees", caption(&said, run), &chart, data)
 }
 
-/// The confidences at which bounds are tried (%).
+/// The confidence levels (%) at which coverage is counted.
 const LEVELS: [f64; 14] = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9];
-/// Fewer fixes say nothing of a share.
+/// Minimum number of fixes of a series; fewer give no useful fraction.
 const FEWEST: usize = 20;
-/// More lines than this hide each other: then all trials are one.
+/// Maximum number of lines; with more series all trials are merged into one.
 const LINES: usize = 7;
 
-/// The share of fixes, wrong ones among them, that err by less than the bound of each confidence; on the diagonal where the
-/// covariance is honest, above it where it is too large.
+/// The coverage curve: the fraction of fixes, wrong ones included, within their error bound at each confidence level.
+///
+/// It is on the diagonal for a consistent covariance, above it for one that is too large.
 pub(super) fn coverage(run: &Run) -> Option<Figure> {
-    // Of a thinned log all failures are there and few of the others.
+    // A decimated log has all failures and few of the other frames.
     if run.trials.iter().any(|trial| trial.every() > 1) {
         return None;
     }
@@ -88,7 +89,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     }
     let heads = [Head::words("series"), Head::numbers("confidence (%)"), Head::numbers("NEES below")];
     let heads = heads.into_iter().chain(["fixes within (%)", "low (%)", "high (%)"].map(Head::numbers));
-    let mut data = Table::new("coverage", text!["Every point of the curve of coverage."], heads.collect());
+    let mut data = Table::new("coverage", text!["The data of the coverage curve."], heads.collect());
     let (mut bands, mut lines, mut n) = (Vec::new(), Vec::new(), 0);
     for (series, name) in names.iter().enumerate() {
         let own = |trial: &&Trial| !apart || RunSummary::name(run, trial) == *name;
@@ -102,7 +103,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
         let trajectory = trials.iter().any(|trial| proportion::is_trajectory(&trial.header));
         let (mut line, mut band) = (Vec::new(), Vec::new());
         for level in LEVELS {
-            // As printed: the key is computed again from it.
+            // The rounded bound is part of the key, from which the number is computed again.
             let bound = (quantile(level / 100.0) * 1e4).round() / 1e4;
             let events: Vec<bool> = nees.iter().map(|nees| *nees <= bound).collect();
             let within = 100.0 * events.iter().filter(|event| **event).count() as f64 / events.len() as f64;
@@ -142,7 +143,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.8, legend };
     let called = proportion::called(run.trials.iter().map(|trial| &trial.header));
     let said = format!(
-        "Coverage: of {n} fixes, wrong ones among them, the share whose error is within the bound of each confidence by their own covariance{}. On the dashed diagonal the covariance is honest, above it too large, below it too small.",
+        "Coverage: the fraction of {n} fixes, wrong ones included, whose error is within the bound that their covariance gives for each confidence level{}. A consistent covariance is on the dashed diagonal; above it the covariance is too large, below it too small.",
         if banded {
             format!(", with {}", called.replace("intervals", "bands"))
         } else {
@@ -152,7 +153,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     figure("coverage", caption(&said, run), &chart, data)
 }
 
-/// The quantile of χ² with six degrees of freedom: its distribution is 1 − e^(−x/2) (1 + x/2 + x²/8).
+/// The quantile of χ² with six degrees of freedom, whose distribution function is 1 − e^(−x/2) (1 + x/2 + x²/8).
 fn quantile(p: f64) -> f64 {
     let below = |x: f64| 1.0 - (-x / 2.0).exp() * (1.0 + x / 2.0 + x * x / 8.0);
     let (mut low, mut high) = (0.0, 100.0);

@@ -1,4 +1,4 @@
-//! What a search costs.
+//! The figure of search cost over problem size.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,14 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// So many searches are told apart by colour, mark and line.
+/// Maximum number of searches that colour, mark and line can distinguish.
 const MAX: usize = 10;
-/// A median of fewer attempts is not drawn.
+/// Minimum number of attempts of a plotted median.
 const MIN: usize = 3;
 
-/// Pair tests and time of the search over how many candidates there were, both axes logarithmic; time where durations were
-/// logged.
+/// The figure of pair tests and search time over the number of candidates, on logarithmic axes.
+///
+/// It has times only if durations are logged.
 pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     let names = distinct(run.trials.iter().map(|trial| trial.method()[0].clone()));
     if names.len() > MAX {
@@ -25,8 +26,7 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     }
     let heads = [Head::words("search"), Head::words("cost"), Head::numbers("candidates"), Head::numbers("n")];
     let heads = heads.into_iter().chain(["p5", "median", "p95"].map(Head::numbers));
-    let mut data =
-        Table::new("search-cost", text!["Every point of the figure of the cost of the search."], heads.collect());
+    let mut data = Table::new("search-cost", text!["The data of the figure of search cost."], heads.collect());
     let mut panels = Vec::new();
     for (field, label, decimals) in [(Field::Tests, "pair tests", 1), (Field::SearchTime, "search (ms)", 4)] {
         let mut layers = Vec::new();
@@ -55,7 +55,7 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
             layers.push(Layer::Marks { series, points: line, radius: 2.0 });
         }
         if layers.iter().any(Layer::draws) {
-            let (x, y) = (Axis::logarithmic("candidates in all lists"), Axis::logarithmic(label));
+            let (x, y) = (Axis::logarithmic("candidates of an attempt"), Axis::logarithmic(label));
             panels.push(Panel { x, y, layers, ..Panel::default() });
         }
     }
@@ -63,13 +63,13 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     let both = panels.len() > 1;
     let chart = Chart { panels, columns: 2, page: both, shape: 0.8, legend };
     let said = format!(
-        "What a search costs over the size of its problem, the number of candidates: tests of pairs{}; medians of half octaves with {MIN} attempts or more, bars from the 5 % to the 95 % quantile. Searches that count no tests have no line.",
+        "Search cost over the number of candidates: pair tests{}. Points are medians over half octaves with at least {MIN} attempts, bars run from the 5 % to the 95 % quantile. Searches that do not count pair tests have no line.",
         if both { " and time" } else { "" }
     );
     figure("search-cost", caption(&said, run), &chart, data)
 }
 
-/// The costs of all attempts, by the number of candidates in half octaves.
+/// The costs of all attempts, grouped by half octaves of the number of candidates.
 fn bins(trials: &[&Trial], field: Field) -> BTreeMap<i32, Vec<f64>> {
     let mut bins: BTreeMap<i32, Vec<f64>> = BTreeMap::new();
     for (_, row) in trials.iter().flat_map(|trial| trial.attempts()) {

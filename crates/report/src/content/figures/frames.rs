@@ -1,4 +1,4 @@
-//! The error of every fix over the frames.
+//! The figure of the error of every fix over the frames.
 
 use super::{caption, distinct, figure, series};
 use crate::{
@@ -9,10 +9,10 @@ use crate::{
     run::Run,
 };
 
-/// Marks of more fixes than this hide each other.
+/// Maximum number of plotted fixes; more marks hide each other.
 const MAX: usize = 4000;
 
-/// m1 and m2 of every fix.
+/// The figure of fit RMS and TRE of every fix.
 pub(super) fn errors(run: &Run) -> Option<Figure> {
     let names = distinct(run.trials.iter().map(|trial| RunSummary::name(run, trial)));
     let fixes: usize = run.trials.iter().map(|trial| trial.attempts().count()).sum();
@@ -27,10 +27,10 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
         Head::numbers("TRE (mm)"),
     ];
     let mut data =
-        Table::new("error-over-frames", text!["Every point of the figure of error over frames."], heads.to_vec());
+        Table::new("error-over-frames", text!["The data of the figure of error over frames."], heads.to_vec());
     let metrics = [(Field::Fit, "fit RMS (mm)"), (Field::Tre, "TRE (mm)")];
     let mut points = vec![vec![Vec::new(); names.len()]; 2];
-    // What errs alike in a frame stands side by side.
+    // Marks of equal errors in one frame are placed side by side.
     let aside = |index: usize| 0.6 * ((index as f64 + 0.5) / names.len() as f64 - 0.5);
     for trial in &run.trials {
         let index = series(&names, &RunSummary::name(run, trial));
@@ -71,6 +71,6 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
         Vec::new()
     };
     let chart = Chart { panels: panels.collect(), columns: 2, page: true, shape: 0.7, legend };
-    let said = "Error of every fix over the frames; a frame without a mark gave none. The shaded range is the m1 that the paper reports for its virtual scene at 2–5 m, another scene and camera.";
+    let said = "Error of every fix over the frames; a frame without a mark has no fix. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m, which has another scene and camera.";
     figure("error-over-frames", caption(said, run), &chart, data)
 }

@@ -1,4 +1,4 @@
-//! Success over two conditions at once.
+//! The figure of the fix rate over two conditions.
 
 use super::{axis, caption, distinct};
 use crate::{
@@ -10,8 +10,9 @@ use crate::{
     run::Run,
 };
 
-/// A heat map a method over the first two conditions with numbers, or else over the only two axes, where every cell is
-/// one trial.
+/// The heat maps of the fix rate, one for every method, over the first two numeric conditions.
+///
+/// Runs without them use their only two axes, with one trial in every cell.
 pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let numeric = axis::keys(summary);
     let keys = if numeric.len() < 2 { varying(summary) } else { numeric };
@@ -31,8 +32,8 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
         let numbers = summary.rows.iter().all(|row| axis::on(row, key).is_some());
         Head { numbers, ..Head::words(headed(key)) }
     };
-    let heads = vec![Head::words("series"), head(first), head(second), Head::numbers("found (%)")];
-    let mut data = Table::new("success", text!["Every cell of the figure of success."], heads);
+    let heads = vec![Head::words("series"), head(first), head(second), Head::numbers("fixes (%)")];
+    let mut data = Table::new("success", text!["The data of the figure of fix rates over two conditions."], heads);
     let mut panels = Vec::new();
     for name in &names {
         let mut values = Vec::new();
@@ -60,10 +61,10 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
         panels,
         legend: Vec::new(),
     };
-    super::figure("success", caption("Share of the attempts found, in %, over two conditions.", run), &chart, data)
+    super::figure("success", caption("Fix rate (fixes in % of the attempts) over two conditions.", run), &chart, data)
 }
 
-/// The axes along which trials differ, where these are two.
+/// The two axes along which trials differ; `None` if their number is not two.
 fn varying(summary: &RunSummary) -> Vec<String> {
     let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
     let differs = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
@@ -75,7 +76,7 @@ fn value(row: &Row, key: &str) -> String {
     row.axes.iter().find(|axis| axis.key == key).map_or_else(String::new, |axis| axis.value.clone())
 }
 
-/// The values of an axis: numbers by size, words as they come.
+/// The values of an axis: numbers in increasing order, words in order of appearance.
 fn ticks(summary: &RunSummary, key: &str) -> Vec<String> {
     let mut values = distinct(summary.rows.iter().map(|row| value(row, key)));
     if summary.rows.iter().all(|row| axis::on(row, key).is_some()) {

@@ -1,4 +1,4 @@
-//! The figures of the results; each is left out where the logs have nothing for it.
+//! The figures of the results; a figure without data in the logs is omitted.
 
 mod axis;
 mod consistency;
@@ -26,7 +26,7 @@ pub(super) use axis::{keys, name, numeric, on};
 pub(super) use cost::search_cost;
 pub(super) use sawtooth::figure as sawtooth;
 
-/// Those that show results.
+/// The figures of the section with the results.
 pub(super) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
     let main = || {
         if super::limits::known(summary) { None } else { axis::errors(run, summary).or_else(|| frames::errors(run)) }
@@ -46,13 +46,13 @@ pub(super) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
     plotted.into_iter().flatten().map(Block::Figure).collect()
 }
 
-/// Camera, noise and source of what all trials share, in one sentence.
+/// A sentence on source, camera, baseline and number of frames.
 fn conditions(run: &Run) -> String {
     let rig = &run.header().rig;
     let sources = distinct(run.trials.iter().map(|trial| trial.header.source.clone())).join("; ");
     let frames = distinct(run.trials.iter().map(|trial| trial.count().to_string())).join(" or ");
     format!(
-        "Source: {sources}; {} × {} px, f = {:.0} px, baseline {:.2} m; {frames} frames a trial.",
+        "Source: {sources}; {} × {} px, f = {:.0} px, baseline {:.2} m; {frames} frames per trial.",
         rig.left.size[0],
         rig.left.size[1],
         rig.left.matrix[0][0],
@@ -60,7 +60,7 @@ fn conditions(run: &Run) -> String {
     )
 }
 
-/// What a figure needs besides its drawing.
+/// A figure from its caption, chart and data; `None` for an empty chart.
 pub(super) fn figure(
     id: &str,
     caption: Text,
@@ -70,10 +70,10 @@ pub(super) fn figure(
     Some(Figure { id: id.to_owned(), caption, drawing: chart.draw()?, data })
 }
 
-/// The groups of trials on the same frames, at most `max` of them, with what their members are called.
+/// The groups of trials on the same frames with the names of their members, at most `max` groups.
 fn panels(run: &Run, max: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
     let groups = paired::groups(run);
-    // Of many conditions the first, the last, and some between.
+    // With many conditions, the first, the last and evenly spaced ones between are kept.
     let step = groups.len().div_ceil(max).max(1);
     let chosen = groups.iter().step_by(step);
     chosen
@@ -84,12 +84,12 @@ fn panels(run: &Run, max: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
         .collect()
 }
 
-/// A caption that ends with what all trials share.
+/// A caption that ends with the sentence on source and camera.
 pub(super) fn caption(said: &str, run: &Run) -> Text {
     text![format!("{said} {}", conditions(run))]
 }
 
-/// The series of a name among all names.
+/// The index of the series with a name.
 pub(super) fn series(names: &[String], name: &str) -> usize {
     names.iter().position(|known| known == name).unwrap_or(0)
 }

@@ -1,4 +1,4 @@
-//! How many attempts were found and how many fixes were wrong, a line a trial.
+//! The figure of the rates of fixes and wrong fixes, one line for every trial.
 
 use super::caption;
 use crate::{
@@ -10,10 +10,10 @@ use crate::{
     run::Run,
 };
 
-/// More lines are no picture.
+/// Maximum number of trials in the figure.
 const MAX: usize = 36;
 
-/// The shares of the attempts with their 95 % intervals.
+/// The figure: rates of fixes and wrong fixes among the attempts, with 95 % intervals.
 pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let n = summary.rows.len();
     if !(2..=MAX).contains(&n) {
@@ -21,7 +21,7 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     }
     let heads =
         [Head::words("trial"), Head::words("outcome"), Head::numbers("%"), Head::numbers("low"), Head::numbers("high")];
-    let mut data = Table::new("rates", text!["Every point of the figure of rates."], heads.to_vec());
+    let mut data = Table::new("rates", text!["The data of the figure of rates."], heads.to_vec());
     let mut layers = Vec::new();
     for (series, group) in ["found", "wrong"].into_iter().enumerate() {
         let (mut spans, mut marks) = (Vec::new(), Vec::new());
@@ -35,24 +35,24 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
                 marks.push([fraction, at]);
             }
             let name = RunSummary::name(run, trial);
-            data.line(false, vec![name.into(), group.into(), fraction.into(), low.into(), high.into()]);
+            let outcome = phrases::outcome(group).into();
+            data.line(false, vec![name.into(), outcome, fraction.into(), low.into(), high.into()]);
         }
         layers.push(Layer::Spans { series, values: spans });
         layers.push(Layer::Marks { series, points: marks, radius: 2.2 });
     }
     let names = run.trials.iter().rev().map(|trial| RunSummary::name(run, trial)).collect();
     let panel = Panel {
-        x: Axis::linear("share of the attempts (%)").within([-1.0, 101.0]),
+        x: Axis::linear("attempts (%)").within([-1.0, 101.0]),
         y: Axis::named("", names),
         layers,
         ..Panel::default()
     };
     let shape = ((n as f64 * 15.0 + 34.0) / 482.0).clamp(0.16, 1.2);
-    let legend = vec![Entry::mark("found", 0), Entry::mark("wrong", 1)];
+    let legend = vec![Entry::mark("fixes", 0), Entry::mark("wrong fixes", 1)];
     let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend };
     let intervals = proportion::called(run.trials.iter().map(|trial| &trial.header));
-    let said = format!(
-        "Share of the attempts that were found, and of those that gave a wrong fix, with {intervals}; what is missing to 100 % was refused."
-    );
+    let said =
+        format!("Fixes and wrong fixes in % of the attempts, with {intervals}. The remaining attempts were rejected.");
     super::figure("rates", caption(&said, run), &chart, data)
 }

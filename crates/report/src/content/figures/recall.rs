@@ -1,4 +1,4 @@
-//! The share of attempts with an error below a bound.
+//! The figure of recall: the fraction of attempts with an error below a bound.
 
 use super::{caption, distinct, panels, series};
 use crate::{
@@ -10,13 +10,15 @@ use crate::{
     run::Run,
 };
 
-/// So many lines between their bands can be told apart.
+/// Maximum number of lines with bands that remain distinguishable.
 const BANDS: usize = 3;
 
-/// Recall over the error m2, with 95 % bands; refused and wrong attempts are never below any bound.
+/// The figure of recall over the TRE with 95 % bands.
+///
+/// Rejected attempts and wrong fixes are below no bound.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let mut groups = panels(run, 6);
-    // More bands than a few in one panel hide each other.
+    // Many bands in one panel hide each other.
     if let [(_, members)] = &groups[..]
         && members.len() > BANDS
     {
@@ -28,7 +30,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     }
     let heads = [Head::words("condition"), Head::words("series"), Head::numbers("TRE below (mm)")];
     let heads = heads.into_iter().chain(["recall (%)", "low (%)", "high (%)"].map(Head::numbers));
-    let mut data = Table::new("recall", text!["Every point of the figure of recall."], heads.collect());
+    let mut data = Table::new("recall", text!["The data of the figure of recall."], heads.collect());
     let mut plotted = Vec::new();
     for (condition, members) in &groups {
         let (mut bands, mut lines) = (Vec::new(), Vec::new());
@@ -42,7 +44,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
             let (mut line, mut band) = (Vec::new(), Vec::new());
             for ((threshold, bound), (low, high)) in proportion::bounds().zip(proportion::band(trajectory, &errors)) {
                 let k = errors.iter().filter(|error| **error <= bound).count();
-                // One rounding: of a tie another order of the two would print another last digit.
+                // A single rounding: dividing and multiplying in another order could change the last printed digit.
                 let fraction = 100.0 * k as f64 / n as f64;
                 let [low, high] = [low, high].map(|fraction| 100.0 * fraction);
                 line.push([threshold, fraction]);
@@ -55,7 +57,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
                 cells.extend([("percent", fraction), ("low", low), ("high", high)].map(as_number));
                 data.line(false, cells);
             }
-            // Areas of several would hide each other.
+            // Several filled bands would hide each other.
             let series = series(&names, name);
             bands.push(match members.len() {
                 1 => Layer::Band { series, values: band },
@@ -79,7 +81,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let chart = Chart { panels: plotted, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
     let bands = proportion::called(run.trials.iter().map(|trial| &trial.header)).replace("intervals", "bands");
     let said = format!(
-        "Recall: the share of all attempts whose the TRE is below a bound, with {bands}; refused and wrong attempts are below none."
+        "Recall: the fraction of all attempts whose TRE is below a bound, with {bands}. Rejected attempts and wrong fixes are below no bound."
     );
     super::figure("recall", caption(&said, run), &chart, data)
 }

@@ -1,4 +1,4 @@
-//! How the error grows between fixes, and what it would be without them.
+//! The figure of error growth between fixes, with and without further fixes.
 
 use super::{caption, figure as finish};
 use crate::{
@@ -10,11 +10,12 @@ use crate::{
     run::{Run, Trial},
 };
 
-/// At most so many trials, one above the other.
+/// Maximum number of trials, one panel each.
 const PANELS: usize = 4;
 
-/// Error of the camera's position over time: navigated, and the first fix carried by odometry alone; a mark at every fix.
-/// The gaps are stretches without a pose.
+/// The figure of the camera position error over time, navigated and by odometry only.
+///
+/// Odometry starts at the first fix. Every fix has a mark; gaps are times without a pose.
 pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let trials: Vec<&Trial> =
         run.trials.iter().filter(|trial| trial.sample().any(|frame| frame.navigated.is_some())).take(PANELS).collect();
@@ -22,10 +23,10 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         Head::words("trial"),
         Head::numbers("frame"),
         Head::numbers("navigated position error (mm)"),
-        Head::numbers("without further fixes, position error (mm)"),
-        Head::words("fixed"),
+        Head::numbers("odometry-only position error (mm)"),
+        Head::words("fix"),
     ];
-    let mut data = Table::new("sawtooth", text!["Every point of the figure of the error between fixes."], heads.into());
+    let mut data = Table::new("sawtooth", text!["The data of the figure of error growth between fixes."], heads.into());
     let mut panels = Vec::new();
     for trial in trials {
         let start = trial.span()[0];
@@ -65,7 +66,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         };
         let few = fixes.len() * 4 < trial.count();
         let mut layers: Vec<Layer> = lines(alone, 1).chain(lines(runs, 0)).collect();
-        // Where nearly every frame has a fix, marks would hide the line.
+        // Marks would hide the line if nearly every frame had a fix.
         layers.extend(few.then_some(Layer::Marks { series: 2, points: fixes, radius: 1.8 }));
         panels.push(Panel {
             title: trial.header.axes.iter().map(condition).collect::<Vec<_>>().join(", "),
@@ -75,7 +76,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
             ..Panel::default()
         });
     }
-    // One scale for all: they are there to be compared.
+    // All panels have one scale, so that they can be compared.
     let values = panels.iter().flat_map(|panel| &panel.layers).flat_map(Layer::reach).map(|point| point[1]);
     let [low, high] = values.filter(|v| *v > 0.0).fold([f64::INFINITY, 0.0_f64], |[l, h], v| [l.min(v), h.max(v)]);
     if low < high {
@@ -88,10 +89,10 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         shape: 0.3,
         legend: vec![
             Entry::line("navigated", 0),
-            Entry::line("first fix carried by odometry alone", 1),
-            Entry::mark("a fix", 2),
+            Entry::line("odometry only, from the first fix", 1),
+            Entry::mark("fix", 2),
         ],
     };
-    let said = "Error of the camera’s position relative to the object it was fixed at, between fixes and without further ones. Where a line is broken no pose was known.";
+    let said = "Camera position error relative to the object of the last fix, navigated and by odometry only from the first fix. Gaps are times without a pose.";
     finish("sawtooth", caption(said, run), &chart, data)
 }

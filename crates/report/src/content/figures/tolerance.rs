@@ -1,4 +1,4 @@
-//! Which points are identified along the tolerance of distances.
+//! The figure of precision and recall of identified points along the distance tolerance.
 
 use seafix_log::Outcome;
 
@@ -12,11 +12,12 @@ use crate::{
     run::{AttemptRow, Run},
 };
 
-/// More methods, or more conditions, are no picture.
+/// Maximum number of methods, and of conditions, in the figure.
 const MAX: usize = 7;
 
-/// Precision over recall of the identified points along the tolerance Δ, a line a method, a panel a condition. The tolerance
-/// with the greatest harmonic mean of both has a ring.
+/// The figure of precision over recall of identified points along the tolerance Δ.
+///
+/// Every method has a line, every condition a panel. A ring marks the tolerance with the largest F1 score.
 pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let key = axis::keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
     let condition = |row: &Row| {
@@ -30,7 +31,7 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
     }
     let heads = [Head::words("condition"), Head::words("method"), Head::numbers(headed(&key))].into_iter();
     let heads = heads.chain(["recall", "precision"].map(Head::numbers)).collect();
-    let mut data = Table::new("precision-recall", text!["Every point of the figure of precision over recall."], heads);
+    let mut data = Table::new("precision-recall", text!["The data of the figure of precision over recall."], heads);
     let mut panels = Vec::new();
     for title in &conditions {
         let (mut layers, mut rings, mut notes) = (Vec::new(), Vec::new(), Vec::new());
@@ -38,7 +39,7 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
             let mut points: Vec<(f64, [f64; 2])> = Vec::new();
             let rows = summary.rows.iter().zip(&run.trials);
             for (row, trial) in rows.filter(|(row, _)| condition(row) == *title && row.method() == *name) {
-                // What a refused attempt had in hand is no answer; what it could have seen counts.
+                // A rejected attempt has no correspondences, but its visible points count.
                 let sum = |field: Field, of: fn(&AttemptRow) -> bool| -> f64 {
                     trial.attempts().filter(|(_, row)| of(row)).filter_map(|(_, row)| row.get(field)).sum()
                 };
@@ -46,7 +47,7 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
                 let (correct, identified) = (sum(Field::Correct, fixed), sum(Field::Identified, fixed));
                 let visible = sum(Field::Visible, |_| true);
                 let tolerance = axis::on(row, &key)?;
-                // Without an answer there is no precision.
+                // Precision is undefined without a fix.
                 if !(visible > 0.0 && identified > 0.0) {
                     continue;
                 }
@@ -88,7 +89,7 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
             ..Panel::default()
         });
     }
-    // The same scale in all, with room for words above.
+    // All panels have the same scale, with room for text above.
     let reached = panels.iter().flat_map(|panel| &panel.layers).flat_map(Layer::reach).map(|point| point[1]);
     let room = 0.15 * (1.0 - reached.fold(0.9, f64::min));
     panels.iter_mut().for_each(|panel| panel.y.range = Some([1.0 - room / 0.15 - room, 1.0 + room]));
@@ -97,13 +98,13 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
     let columns = if panels.len() == 4 { 2 } else { panels.len().min(3) };
     let chart = Chart { panels, columns, page, shape: if columns == 2 { 0.62 } else { 0.8 }, legend };
     let said = format!(
-        "Precision of the points that fixes identified over recall of those in view of all attempts, refused ones included, along {}: its least and its greatest value stand at the ends of each line, and a ring is round the value with the greatest harmonic mean of both, on these very frames.",
+        "Precision of the points that fixes identified, over recall of the visible points of all attempts including rejected ones, along {}. The numbers are its smallest and largest value, at the ends of each line, and its value with the largest F1 score on these frames, marked by a ring.",
         headed(&key)
     );
     figure("precision-recall", caption(&said, run), &chart, data)
 }
 
-/// Notes a word at a place, beside those of places so near that they would overlap.
+/// Adds a label at a point, or extends the label of a near point that it would overlap.
 fn note(notes: &mut Vec<([f64; 2], Vec<String>)>, word: String, at: [f64; 2]) {
     let near = |known: &[f64; 2]| (known[0] - at[0]).abs() < 0.16 && (known[1] - at[1]).abs() < 0.12;
     match notes.iter_mut().find(|(known, _)| near(known)) {

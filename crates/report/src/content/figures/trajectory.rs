@@ -1,4 +1,4 @@
-//! Where the vehicle was, and where fixes put it.
+//! The figure of the trajectory: true and estimated camera positions.
 
 use seafix_log::TrialHeader;
 
@@ -12,10 +12,12 @@ use crate::{
     run::Run,
 };
 
-/// Of more frames than this some are left out: their places would lie on each other.
+/// Maximum number of plotted frames; the positions of more would overlap.
 const PLACES: usize = 1000;
 
-/// From above and from the side: truth, fixes, what was carried between them, feature points and the boxes around the objects; of the first trial.
+/// The figure of the first trial's trajectory, from above and from the side.
+///
+/// It shows true positions, fixes, navigated and odometry-only trajectories, feature points and bounding boxes.
 pub(super) fn figure(run: &Run) -> Option<Figure> {
     let trial = &run.trials[0];
     if !proportion::is_trajectory(&trial.header) {
@@ -33,7 +35,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     if truth.is_empty() || fixes.is_empty() || objects.is_empty() {
         return None;
     }
-    // What a navigator carried, where there is one: by its fixes, and the first fix by odometry alone.
+    // With a navigator there are two trajectories: navigated, and odometry only from the first fix.
     let navigated = || frames().filter_map(|frame| Some((frame, frame.navigated.as_ref()?)));
     let sails = navigated().next().is_some();
     let carried = |which: usize| {
@@ -42,7 +44,7 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     };
     let heads = [Head::words("what"), Head::words("name"), Head::numbers("frame")];
     let heads = heads.into_iter().chain(["north (m)", "east (m)", "down (m)"].map(Head::numbers));
-    let mut data = Table::new("trajectory", text!["Every place of the figure of the way."], heads.collect());
+    let mut data = Table::new("trajectory", text!["The data of the figure of the trajectory."], heads.collect());
     for (frame, at) in frames().filter_map(|frame| Some((frame, frame.truth?))) {
         data.line(false, line(trial, "truth", "", (frame.number, frame.stamp_ns), at));
     }
@@ -81,13 +83,13 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         Panel { x: Axis::linear(labels[0]), y: Axis::linear(labels[1]), layers, equal: true, ..Panel::default() }
     };
     let mut legend = vec![
-        if sails { Entry::line("camera, true", 0) } else { Entry::mark("camera, true", 0) },
-        Entry::mark("camera, by the fix and the survey", 1),
+        if sails { Entry::line("true camera positions", 0) } else { Entry::mark("true camera positions", 0) },
+        Entry::mark("fixes", 1),
         Entry::mark("feature points", 6),
-        Entry::line("shells of the objects", 2),
+        Entry::line("bounding boxes", 2),
     ];
     if sails {
-        legend.extend([Entry::line("first fix carried by odometry alone", 3), Entry::line("navigated", 4)]);
+        legend.extend([Entry::line("odometry only, from the first fix", 3), Entry::line("navigated", 4)]);
     }
     let chart = Chart {
         panels: vec![panel((0, 1), ["north (m)", "east (m)"], false), panel((0, 2), ["north (m)", "height (m)"], true)],
@@ -97,9 +99,9 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         legend,
     };
     let said = format!(
-        "The way from above and from the side, equal scales: the true places of the left camera, those by the fixes found and the survey,{} the feature points and the min–max shells of their objects. {}Log {}.",
-        if sails { " the way that was navigated and the first fix carried on by odometry alone," } else { "" },
-        if every > 1 { format!("One frame in {every} is drawn. ") } else { String::new() },
+        "Trajectory from above and from the side, on equal scales: true positions of the left camera, positions by the fixes and the survey,{} feature points and the bounding boxes of the objects. {}Log {}.",
+        if sails { " the navigated trajectory, the trajectory by odometry only from the first fix," } else { "" },
+        if every > 1 { format!("One frame in {every} is shown. ") } else { String::new() },
         trial.file()
     );
     super::figure("trajectory", caption(&said, run), &chart, data)
@@ -129,7 +131,7 @@ fn line(
     vec![what.into(), name.to_owned().into(), frame.into(), number(0), number(1), number(2)]
 }
 
-/// The surveyed places of the feature points in the world, an object each.
+/// The surveyed positions of the feature points in the world, by object.
 fn objects(header: &TrialHeader) -> Vec<Vec<[f64; 3]>> {
     let Some(site) = header.world_from_site else { return Vec::new() };
     let of = |target: &seafix_log::TargetModel| {

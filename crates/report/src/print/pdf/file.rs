@@ -1,4 +1,4 @@
-//! The file around the pages: fonts, pictures, the tree of pages.
+//! The PDF file: page tree, fonts and pictures.
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,17 @@ use subsetter::{Profile, subset};
 
 use super::{super::fonts::Font, sheet::Sheets};
 
-/// Of the compression of streams: 0 none, 10 best.
+/// The compression level of streams, from 0 (none) to 10 (best).
 const LEVEL: u8 = 8;
 
-/// Hands out the numbers of a file's objects.
+/// A PDF file under construction, with the next object number.
 pub(super) struct File {
     pdf: Pdf,
     next: i32,
 }
 
 impl File {
-    /// The file of these pages, each of this size. No dates, no random identifiers: the same pages, the same bytes.
+    /// The PDF file of these pages, each of this size. It has no dates or random identifiers: equal pages, equal bytes.
     pub(super) fn write(sheets: Sheets, title: &str, size: [f64; 2]) -> Vec<u8> {
         let mut file = Self { pdf: Pdf::new(), next: 1 };
         let (catalog, tree, info) = (file.id(), file.id(), file.id());
@@ -72,7 +72,7 @@ impl File {
         id
     }
 
-    /// Embeds the glyphs that are used, under their own numbers, and says what they mean for search and copying.
+    /// Embeds the used glyphs under their original numbers, with a map to Unicode for search and copying.
     fn font(&mut self, font: Font, glyphs: &BTreeMap<u16, char>) -> Ref {
         let loaded = font.loaded();
         let numbers: Vec<u16> = std::iter::once(0).chain(glyphs.keys().copied()).collect();

@@ -1,4 +1,4 @@
-//! A paper as PDF, typeset here: A4, one column of 170 mm, fonts embedded.
+//! A report as PDF: typeset on A4 in one column of 170 mm, with embedded fonts.
 
 mod file;
 mod paragraph;
@@ -13,11 +13,11 @@ use super::fonts::Font;
 use crate::document::{Block, Document, Figure, Picture, Span, bold, italic};
 use crate::figure::Drawing;
 
-/// Sizes of type (pt).
+/// The font sizes of body text and small text (pt).
 const BODY: f64 = 10.0;
 const SMALL: f64 = 8.6;
 
-/// The whole paper.
+/// The complete PDF of a report.
 pub(crate) fn pdf(document: &Document) -> Vec<u8> {
     let mut paper = Paper { sheets: Sheets::new(), sections: 0, tables: 0, figures: 0 };
     paper.title(document);
@@ -30,19 +30,19 @@ pub(crate) fn pdf(document: &Document) -> Vec<u8> {
     File::write(paper.sheets, &document.title, sheet::PAGE)
 }
 
-/// One figure by itself, on a sheet of its size.
+/// A single figure as PDF, on a page of its size.
 pub(crate) fn figure_pdf(drawing: &Drawing) -> Vec<u8> {
     let mut sheets = Sheets::of(drawing.size);
     sheets.draw(drawing, 0.0);
     File::write(sheets, "", drawing.size)
 }
 
-/// Text over the whole width.
+/// The style of text over the full width.
 fn plain(size: f64, align: Align) -> Style {
     Style { size, align, width: WIDTH, left: LEFT, font: Font::Regular }
 }
 
-/// Width and height of a picture on the page.
+/// The width and height of a picture on the page (pt).
 fn pictured(picture: &Picture) -> [f64; 2] {
     let width = if picture.size[0] < 1000 { 0.62 * WIDTH } else { WIDTH };
     [width, width * f64::from(picture.size[1]) / f64::from(picture.size[0].max(1))]
@@ -71,7 +71,7 @@ impl Paper {
         }
     }
 
-    /// A section's heading, on one page with the beginning of what stands below it.
+    /// The heading of a section, kept on one page with the beginning of its first block.
     fn heading(&mut self, title: &str, below: f64) {
         self.sections += 1;
         self.sheets.space(14.0);
@@ -132,12 +132,12 @@ impl Paper {
         self.sheets.space(12.0);
     }
 
-    /// What a caption needs below its figure.
+    /// The height of a caption below its figure (pt).
     fn caption_height(&self, text: &[Span]) -> f64 {
         10.0 + 1.25 * SMALL * paragraph::lines(text, plain(SMALL, Align::Both)) as f64
     }
 
-    /// What a block needs on the page it begins on.
+    /// The minimum height of a block on its first page (pt).
     fn beginning(&self, block: &Block) -> f64 {
         match block {
             Block::Table(table) => 8.0 + table::beginning(table),

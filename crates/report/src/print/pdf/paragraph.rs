@@ -1,20 +1,20 @@
-//! Running text broken into lines, as many words to a line as fit.
+//! Paragraphs, broken greedily into lines.
 
 use super::{super::fonts::Font, sheet::Sheets};
 use crate::document::Span;
 
-/// How text is set.
+/// The style of a text.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Style {
     pub(super) size: f64,
     pub(super) align: Align,
     pub(super) left: f64,
     pub(super) width: f64,
-    /// Of plain text.
+    /// The font of plain text.
     pub(super) font: Font,
 }
 
-/// Which edges of a paragraph are straight.
+/// The alignment of a paragraph.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Align {
     Left,
@@ -23,28 +23,28 @@ pub(super) enum Align {
     Right,
 }
 
-/// Height of a line by the size of its type.
+/// The line height in units of the font size.
 pub(super) const LEADING: f64 = 1.25;
 
-/// A run of signs of one font.
+/// A run of characters in one font.
 #[derive(Debug, Clone)]
 struct Piece {
     text: String,
     font: Font,
     size: f64,
-    /// Above or below the base line (pt).
+    /// The offset above the baseline (pt), negative below.
     rise: f64,
 }
 
-/// Pieces that stay together.
+/// A word: pieces without a line break between them.
 type Word = Vec<Piece>;
 
-/// Sets a paragraph, over pages where it must.
+/// Sets a paragraph, over several pages if necessary.
 pub(super) fn set(sheets: &mut Sheets, text: &[Span], style: Style) {
     set_hanging(sheets, text, style, 0.0);
 }
 
-/// The same, the first line beginning this much to the left.
+/// Sets a paragraph whose first line begins `hanging` (pt) to the left.
 pub(super) fn set_hanging(sheets: &mut Sheets, text: &[Span], style: Style, hanging: f64) {
     let lines = broken(words(text, style), style, hanging);
     let last = lines.len().saturating_sub(1);
@@ -60,12 +60,12 @@ pub(super) fn set_hanging(sheets: &mut Sheets, text: &[Span], style: Style, hang
     }
 }
 
-/// How many lines a paragraph takes.
+/// The number of lines of a paragraph.
 pub(super) fn lines(text: &[Span], style: Style) -> usize {
     broken(words(text, style), style, 0.0).len()
 }
 
-/// Draws the lines of a cell from `top` downwards.
+/// Draws the lines of a table cell from `top` downwards.
 pub(super) fn set_at(sheets: &mut Sheets, text: &[Span], style: Style, top: f64) {
     for (index, line) in broken(words(text, style), style, 0.0).iter().enumerate() {
         let y = top - style.size * LEADING * (index + 1) as f64 + 0.28 * style.size;
@@ -73,7 +73,7 @@ pub(super) fn set_at(sheets: &mut Sheets, text: &[Span], style: Style, top: f64)
     }
 }
 
-/// The width of the text in one line.
+/// The width of a text on a single line (pt).
 pub(super) fn natural(text: &[Span], style: Style) -> f64 {
     let words = words(text, style);
     words.iter().map(width).sum::<f64>() + blank(style) * words.len().saturating_sub(1) as f64
@@ -131,7 +131,7 @@ fn broken(words: Vec<Word>, style: Style, hanging: f64) -> Vec<Vec<Word>> {
     lines
 }
 
-/// A word too long for a line, in parts that fit.
+/// A word cut into parts of at most `max` (pt).
 fn fitting(word: Word, max: f64) -> Vec<Word> {
     if width(&word) <= max {
         return vec![word];

@@ -1,4 +1,4 @@
-//! Pages and what is drawn on them, from the top down.
+//! Pages, filled from the top downwards.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,22 +7,22 @@ use pdf_writer::{Content, Name, Str};
 use super::super::{fonts::Font, unicode::harmless};
 use crate::figure::{Anchor, DASHES, Drawing, Ink, Shape, Stroke};
 
-/// A4 (pt).
+/// The size of A4 (pt).
 pub(super) const PAGE: [f64; 2] = [595.28, 841.89];
 pub(super) const LEFT: f64 = (PAGE[0] - WIDTH) / 2.0;
 pub(super) const WIDTH: f64 = 481.89;
 const TOP: f64 = PAGE[1] - 56.0;
 pub(super) const BOTTOM: f64 = 56.0;
 
-/// The pages so far, the last one being filled.
+/// The pages so far; the last one is being filled.
 pub(super) struct Sheets {
     size: [f64; 2],
     pub(super) pages: Vec<Content>,
-    /// Which signs of which font are used, glyph by glyph.
+    /// The used glyphs of each font with their characters.
     pub(super) glyphs: BTreeMap<Font, BTreeMap<u16, char>>,
-    /// JPEG files and their sizes.
+    /// The JPEG files with their sizes (px).
     pub(super) pictures: Vec<(Vec<u8>, [u32; 2])>,
-    /// Which pictures are on which page.
+    /// The indices of the pictures on each page.
     pub(super) shown: Vec<BTreeSet<usize>>,
     y: f64,
 }
@@ -32,7 +32,7 @@ impl Sheets {
         Self { y: TOP, ..Self::of(PAGE) }
     }
 
-    /// One sheet of this size.
+    /// A single empty page of this size (pt).
     pub(super) fn of(size: [f64; 2]) -> Self {
         Self {
             size,
@@ -44,24 +44,26 @@ impl Sheets {
         }
     }
 
-    /// How far down the page is filled (pt from the bottom).
+    /// The lower end of the content of the page (pt from the bottom).
     pub(super) fn y(&self) -> f64 {
         self.y
     }
 
-    /// Room, but none at the head of a page.
+    /// Adds vertical space, except at the top of a page.
     pub(super) fn space(&mut self, height: f64) {
         if self.y < TOP {
             self.y -= height;
         }
     }
 
-    /// Takes `height` for a line.
+    /// Advances by the height of a line.
     pub(super) fn advance(&mut self, height: f64) {
         self.y -= height;
     }
 
-    /// Turns the page where `height` does not fit on this one, but would on the next.
+    /// Begins a new page if `height` does not fit on this one.
+    ///
+    /// An empty page is kept. The result is whether a new page was begun.
     pub(super) fn need(&mut self, height: f64) -> bool {
         let turns = self.y - height < BOTTOM && self.y < TOP;
         if turns {
@@ -76,7 +78,7 @@ impl Sheets {
         self.pages.last_mut().expect("there is always a page")
     }
 
-    /// Words on the base line at a place of the page.
+    /// Draws a text with its baseline at a position of the page.
     pub(super) fn words(&mut self, font: Font, size: f64, [x, y]: [f64; 2], text: &str) {
         self.write(font, size, [1.0, 0.0, 0.0, 1.0, x, y], Ink::Text, text);
     }
@@ -101,14 +103,14 @@ impl Sheets {
         page.set_text_matrix(matrix.map(rounded)).show(Str(&bytes)).end_text();
     }
 
-    /// A horizontal rule.
+    /// Draws a horizontal rule.
     pub(super) fn rule(&mut self, [from, to]: [f64; 2], y: f64, width: f64) {
         let page = self.page();
         page.set_stroke_rgb(0.0, 0.0, 0.0).set_line_width(width as f32).set_dash_pattern([], 0.0);
         page.move_to(rounded(from), rounded(y)).line_to(rounded(to), rounded(y)).stroke();
     }
 
-    /// A drawing with its left edge at `left`, below what is there.
+    /// Draws a drawing below the content, with its left edge at `left`.
     pub(super) fn draw(&mut self, drawing: &Drawing, left: f64) {
         let top = self.y;
         for shape in &drawing.shapes {
@@ -137,7 +139,7 @@ impl Sheets {
             }
             Shape::Circle { centre, radius, fill, stroke } => {
                 let ([x, y], r) = (at(*centre), *radius);
-                // Four Bézier arcs; the constant makes them a circle to 0.03 %.
+                // Four Bézier arcs approximate a circle to 0.03 % with this constant.
                 let k = 0.552_284_75 * r;
                 let p = |a: f64, b: f64| [rounded(x + a), rounded(y + b)];
                 let page = self.page();
@@ -170,7 +172,7 @@ impl Sheets {
         }
     }
 
-    /// A JPEG: its left edge, width and height.
+    /// Draws a JPEG with its left edge, width and height (pt).
     pub(super) fn picture(&mut self, jpeg: &[u8], size: [u32; 2], [left, width, height]: [f64; 3]) {
         self.pictures.push((jpeg.to_vec(), size));
         let index = self.pictures.len() - 1;
@@ -182,7 +184,7 @@ impl Sheets {
         page.x_object(Name(format!("P{index}").as_bytes())).restore_state();
     }
 
-    /// Writes the numbers of the pages below them.
+    /// Draws the page numbers.
     pub(super) fn number(&mut self) {
         let pages = std::mem::take(&mut self.pages);
         for (index, page) in pages.into_iter().enumerate() {
@@ -216,7 +218,7 @@ fn colour(ink: Ink) -> [f32; 3] {
     ink.on_white().map(|part| (f64::from(part) / 255.0 * 1000.0).round() as f32 / 1000.0)
 }
 
-/// Hundredths of a point: the same bytes on every machine, and few of them.
+/// A length rounded to hundredths of a point, for small files that are equal on every machine.
 fn rounded(value: f64) -> f32 {
     ((value * 100.0).round() / 100.0) as f32
 }

@@ -1,4 +1,4 @@
-//! Tables: columns as wide as what stands in them, long ones over several pages.
+//! Tables with columns as wide as their content, split over several pages if long.
 
 use super::{
     SMALL,
@@ -10,22 +10,22 @@ use crate::{
     print::fonts::Font,
 };
 
-/// Between columns, by the size of type.
+/// The gap between columns, in units of the font size.
 const GAP: f64 = 1.1;
 
-/// Where the columns are.
+/// The layout of the columns.
 struct Grid {
     size: f64,
-    /// Left edge and width of each.
+    /// The left edge and the width of each column (pt).
     columns: Vec<[f64; 2]>,
     left: f64,
     right: f64,
 }
 
-/// How captions are set.
+/// The style of captions.
 const CAPTION: Style = Style { size: SMALL, align: Align::Both, width: WIDTH, left: LEFT, font: Font::Regular };
 
-/// What a table needs on the page it begins on: caption, heads, the first line.
+/// The minimum height of a table on its first page (pt): caption, heads and first line.
 pub(super) fn beginning(table: &Table) -> f64 {
     needs(&Grid::of(table), table, &caption(table, 0))
 }
@@ -68,7 +68,9 @@ pub(super) fn set(sheets: &mut Sheets, table: &Table, number: usize) {
 }
 
 impl Grid {
-    /// As wide as needed; smaller type, then prose in narrower columns where that is too wide.
+    /// The layout with natural widths.
+    ///
+    /// A table that is too wide gets a smaller font, then narrower columns of prose.
     fn of(table: &Table) -> Self {
         let mut size = SMALL;
         loop {
@@ -87,7 +89,7 @@ impl Grid {
         let over = all - WIDTH;
         if over > 0.0 {
             let long: f64 = widths.iter().zip(prose).filter(|(_, prose)| **prose).map(|(width, _)| width).sum();
-            // Prose gives way first; a table of numbers that is still too wide is set narrower throughout.
+            // Columns of prose shrink first; if the table is still too wide, all columns shrink.
             let (of_prose, of_all) = if long > over + 60.0 { (1.0 - over / long, 1.0) } else { (1.0, WIDTH / all) };
             for (width, prose) in widths.iter_mut().zip(prose) {
                 *width *= if *prose { of_prose * of_all } else { of_all };
@@ -107,7 +109,7 @@ impl Grid {
         Self { size, columns, left, right: left + total }
     }
 
-    /// Left edge and width of `count` columns from `place` on.
+    /// The left edge and the width of `count` columns from column `place`.
     fn span(&self, place: usize, count: usize) -> [f64; 2] {
         let (Some(first), Some(last)) = (self.columns.get(place), self.columns.get(place + count.max(1) - 1)) else {
             return [self.left, 0.0];
@@ -119,7 +121,7 @@ impl Grid {
         Style { size: self.size, align, left, width, font }
     }
 
-    /// Where a cell stands and how.
+    /// The style of a cell with its position.
     fn of_cell(&self, table: &Table, place: usize, cell: &Cell) -> Style {
         let align = match cell.width() {
             1 if table.numbers(place) => Align::Right,
@@ -145,7 +147,7 @@ impl Grid {
         let mut place = 0;
         for cell in &line.cells {
             let style = self.of_cell(table, place, cell);
-            // What is no prose stays on its line, also where rounding has it too wide by a hair.
+            // Cells other than prose stay on one line, even if rounding makes them slightly too wide.
             let style = match (cell.prose, style.align) {
                 (true, _) => style,
                 (_, Align::Right) => Style { left: style.left - 40.0, width: style.width + 40.0, ..style },
@@ -215,7 +217,7 @@ fn prose(table: &Table, place: usize) -> bool {
     })
 }
 
-/// The widest single cell or head of a column.
+/// The width of the widest cell or head of one column (pt).
 fn needed(table: &Table, place: usize, size: f64) -> f64 {
     let style = Style { size, align: Align::Left, left: 0.0, width: f64::INFINITY, font: Font::Regular };
     let head = table.heads.last().and_then(|heads| heads.get(place)).map_or("", |head| &head.text[..]);

@@ -1,9 +1,9 @@
-//! Light in numbers: what comes back is never more than what went there, and daylight fades by c.
+//! Energy conservation: reflected light never exceeds the incident light, and daylight decreases with c.
 
 use super::*;
 use crate::scene::{MaterialPlan, ObjectGeometry, PanelBody, Texture};
 
-/// The plain bed covered by a panel of one material.
+/// The plain seabed covered by a panel of one material.
 fn covered(texture: Texture, albedo: f64) -> SitePlan {
     let mut plan = plain_plan();
     plan.geometry.materials.push(MaterialPlan { name: "it".into(), albedo, texture });
@@ -18,7 +18,8 @@ fn covered(texture: Texture, albedo: f64) -> SitePlan {
 
 #[test]
 fn no_surface_returns_more_light_than_it_gets() {
-    // Daylight of 1 on a level surface: radiance ≤ 1/π. Seen to fail before textures were cut there: sand 1.49.
+    // Daylight of 1 on a horizontal surface gives a radiance of at most 1/π. Regression: textures without an upper
+    // limit fail this test (sand 1.49).
     let water = Water { attenuation: 0.0, snow: 0.0, ambient: 1.0, ..Water::default() };
     let pose = above(Vector3::new(0.1, 0.2, 40.0), 1.5, 0.0);
     for texture in [
@@ -39,7 +40,7 @@ fn no_surface_returns_more_light_than_it_gets() {
             let max = f64::from(image.iter().copied().fold(0.0, f32::max)) * std::f64::consts::PI;
             let mean = image.iter().map(|x| f64::from(*x)).sum::<f64>() / image.len() as f64 * std::f64::consts::PI;
             assert!(max <= 1.0 + 1e-6, "{texture:?} of albedo {albedo} returns {max}");
-            // And a texture changes the mean little, where it is not cut.
+            // A texture hardly changes the mean unless it is limited.
             assert!(
                 albedo == 1.0 || (mean / albedo - 1.0).abs() < 0.1,
                 "{texture:?} of albedo {albedo} returns {mean} in the mean"
@@ -50,7 +51,7 @@ fn no_surface_returns_more_light_than_it_gets() {
 
 #[test]
 fn daylight_fades_by_the_attenuation_of_the_path_to_the_camera() {
-    // Even light, a grey plate at 1 to 6 m, nothing scattered: ln I falls by c a metre within half a percent.
+    // Uniform light, a grey plate at 1 to 6 m, no scattering: ln I decreases by c per metre, within half a percent.
     let scene = plain();
     let dark = Lamp { power: 0.0, ..Lamp::default() };
     for c in [0.1, 0.4, 1.0] {
@@ -65,7 +66,7 @@ fn daylight_fades_by_the_attenuation_of_the_path_to_the_camera() {
 
 #[test]
 fn a_trace_of_turbidity_is_a_trace_of_change() {
-    // The image goes to that of clear water as c goes to nothing, not only at nothing.
+    // The image converges to that of clear water as c decreases to 0, without a jump at 0.
     let scene = scene(&built_in("drill-centre").unwrap());
     let pose = above(scene.objects[3].centroid(), 3.0, 0.0);
     let image = |attenuation| {

@@ -1,11 +1,11 @@
-//! Points are drawn where the equation of the camera has them.
+//! Rendered points lie where the camera model projects them.
 
 use seafix_vision::{Keypoint, Locator, XCorner};
 
 use super::{coverage::area, visibility::places, *};
 use crate::scene::ChequerBody;
 
-/// The plain bed with a chequered board on it: 8 × 8 squares of 12 cm, bright and dark.
+/// The plain seabed with a chequered board of 8 × 8 squares of 12 cm, bright and dark.
 fn board() -> (SitePlan, Vec<Vector3<f64>>) {
     let mut plan = plain_plan();
     plan.geometry.seabed.albedo = 0.05;
@@ -14,7 +14,7 @@ fn board() -> (SitePlan, Vec<Vector3<f64>>) {
         albedo: 0.9,
         texture: crate::scene::Texture::Plain,
     });
-    // Right above the bed; north and east of the object's origin, its z points down.
+    // The board lies just above the seabed; the object's frame has north, east and z down.
     let corner = [-0.5, -0.46, -0.002];
     plan.geometry.objects.push(crate::scene::ObjectGeometry {
         id: "a".into(),
@@ -35,8 +35,9 @@ fn board() -> (SitePlan, Vec<Vector3<f64>>) {
 
 #[test]
 fn chequer_corners_lie_where_the_equation_has_them() {
-    // Seen to fail with everything drawn 0.02 px to the right.
-    // SIMULATION.md §10.1: mean below 0.01 px, RMS below 0.03 px; without noise or water, through the usual lens.
+    // Regression: a shift of 0.02 px to the right fails this test.
+    // Limits without noise or water, through the usual lens: mean below 0.01 px, RMS below 0.03 px (SIMULATION.md
+    // §10.1).
     let (plan, places) = board();
     let scene = scene(&plan);
     let clear = Water { attenuation: 0.0, snow: 0.0, ..Water::default() };
@@ -54,7 +55,7 @@ fn chequer_corners_lie_where_the_equation_has_them() {
             .map(|at| studio.left.lens.project(&at).unwrap())
             .filter(|p| p.u > 20.0 && p.v > 20.0 && p.u < 1003.0 && p.v < 747.0)
             .collect();
-        // Begun on whole pixels: the locator knows nothing of the truth's fractions.
+        // The locator starts on whole pixels, so it receives no fraction of the truth.
         let starts: Vec<_> = pixels
             .iter()
             .map(|p| Keypoint {
@@ -80,8 +81,8 @@ fn chequer_corners_lie_where_the_equation_has_them() {
 
 #[test]
 fn what_lies_on_the_axis_lies_between_the_four_pixels_of_the_middle() {
-    // The principal point of an even size, (511.5, 383.5), is the corner of four pixels: a square centred on the axis
-    // lights them alike.
+    // The principal point of an even size, (511.5, 383.5), is the common corner of four pixels. A square centred on the
+    // axis illuminates them equally.
     let mut plan = plain_plan();
     let square = |half: f64| crate::scene::PanelBody {
         outline: vec![[-half, -half, -0.002], [-half, half, -0.002], [half, half, -0.002], [half, -half, -0.002]],
@@ -93,7 +94,7 @@ fn what_lies_on_the_axis_lies_between_the_four_pixels_of_the_middle() {
         albedo: 1.0,
         texture: crate::scene::Texture::Plain,
     });
-    // Half a pixel at 2 m from the board: the square covers a quarter of each of the four.
+    // The square covers a quarter of each of the four pixels: half a pixel at 2 m from the board.
     let half = 0.5 * 1.998 / 500.0;
     plan.geometry.objects.push(crate::scene::ObjectGeometry {
         id: "a".into(),
@@ -116,8 +117,8 @@ fn what_lies_on_the_axis_lies_between_the_four_pixels_of_the_middle() {
 
 #[test]
 fn pixels_show_as_much_of_a_panel_as_lies_in_them() {
-    // A white square on black, turned against the pixels by steps: the light of every pixel is the area that the square
-    // covers of it, here by polygon clipping in a few lines of its own. Seen to fail, by 0.027, with counts of samples.
+    // A white square on black, rotated in steps: the light of every pixel is its area inside the square, computed here
+    // by independent polygon clipping. Regression: counting samples fails this test, by 0.027.
     for degrees in [0.0, 3.0, 11.3, 18.4, 26.6, 45.0, 71.0] {
         let turn = f64::to_radians(degrees);
         let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]].map(|[x, y]: [f64; 2]| {
@@ -138,7 +139,7 @@ fn pixels_show_as_much_of_a_panel_as_lies_in_them() {
             ..Default::default()
         });
         let scene = scene(&plan);
-        // Daylight alone: it is the same everywhere.
+        // Daylight alone, which is uniform.
         let water = Water { attenuation: 0.0, snow: 0.0, ambient: 0.1, ..Water::default() };
         let mut studio = studio(1.0, water, Imager::default(), Port::default(), &[]);
         studio.left.lamps.clear();
@@ -150,7 +151,7 @@ fn pixels_show_as_much_of_a_panel_as_lies_in_them() {
             let p = (into * (world * seafix_geometry::Point::from(Vector3::from(p)))).coords;
             studio.left.lens.project(&p).unwrap()
         });
-        // Which way round its corners go in the image.
+        // The orientation of the corners in the image.
         let orientation =
             (seen[1].u - seen[0].u) * (seen[2].v - seen[0].v) - (seen[1].v - seen[0].v) * (seen[2].u - seen[0].u);
         let covered = |u: usize, v: usize| {
@@ -187,12 +188,12 @@ fn pixels_show_as_much_of_a_panel_as_lies_in_them() {
             let fraction = covered(u, v);
             edges += u32::from(fraction > 0.0 && fraction < 1.0);
             let grey = f64::from(image[v * 1024 + u]) / full;
-            // A pixel with a corner is cut by two sides.
+            // Two sides cut a pixel with a corner.
             if seen.iter().all(|p| (p.u - u as f64).hypot(p.v - v as f64) > 1.5) {
                 worst = worst.max((grey - fraction).abs());
             }
         }
-        // All that may be missed is what no sample sees: a piece that a side cuts off beyond the last of them.
+        // Only a piece that no sample sees may be missed: a side cuts it off beyond the last sample.
         let unseen = (0..4)
             .flat_map(|k| {
                 let (p, q) = (&seen[k], &seen[(k + 1) % 4]);
@@ -207,7 +208,7 @@ fn pixels_show_as_much_of_a_panel_as_lies_in_them() {
                 area(&[[a, b, -last]])
             })
             .fold(0.0, f64::max);
-        // At 26.6° a pixel misses 0.0025 more than that; why is not known.
+        // At 26.6° a pixel misses 0.0025 more than that; the cause is unknown.
         assert!(edges > 100 && worst < unseen + 5e-3, "{degrees}: {worst} for {unseen}, {edges} edges");
     }
 }

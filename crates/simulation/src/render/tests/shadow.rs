@@ -1,12 +1,12 @@
-//! Shadows lie where straight lines from the lamps put them.
+//! Shadows lie where straight rays from the lamps put them.
 
 use super::*;
 use crate::scene::{BoxBody, ObjectGeometry, Texture};
 
-/// Whether a lamp is seen from a place, the place, and the normal of its surface.
+/// Whether a lamp is visible from a place, the place, and the normal of its surface.
 type Met = (bool, Vector3<f64>, Vector3<f64>);
 
-/// The share of one lamp's light that reaches what each pixel of the left image shows; NaN where none would arrive.
+/// The unoccluded fraction of one lamp's light at each pixel of the left image; NaN without incident light.
 fn fractions(scene: &Scene, lamp: &Lamp, scale: f64, shot: &Shot) -> Vec<f32> {
     let water = Water { attenuation: 0.0, snow: 0.0, ..Water::default() };
     let image = |shadows| {
@@ -21,7 +21,7 @@ fn fractions(scene: &Scene, lamp: &Lamp, scale: f64, shot: &Shot) -> Vec<f32> {
 
 #[test]
 fn a_lamp_reaches_what_nothing_hides_from_it() {
-    // Every pixel against a ray to the lamp, away from where shadows and bodies end.
+    // Every pixel is compared with a ray to the lamp, away from the borders of shadows and bodies.
     let mut plan = built_in("drill-centre").unwrap();
     plan.geometry.seabed.texture = Texture::Plain;
     plan.geometry.materials.iter_mut().for_each(|material| material.texture = Texture::Plain);
@@ -49,7 +49,7 @@ fn a_lamp_reaches_what_nothing_hides_from_it() {
                 let level = -Vector3::z();
                 let normal = body.filter(|h| h.t <= t).map_or(level, |h| scene.mesh.triangles[h.triangle].normal());
                 let place = camera_model + along * (t - 1e-4);
-                // The bed throws no shadow.
+                // The seabed casts no shadow.
                 let free = scene.bvh.hit(&scene.mesh.triangles, &place, &(from - place), 1.0).is_none();
                 Some((free, place, normal))
             })
@@ -59,7 +59,8 @@ fn a_lamp_reaches_what_nothing_hides_from_it() {
             let k = (v * width + u) as usize;
             let Some((free, place, normal)) = met[k] else { continue };
             let around = (-4..=4).flat_map(|dv: i32| (-4..=4).map(move |du: i32| (dv, du)));
-            // Where another surface meets this one, pixels of the map that show it count as nearer: a seam of two pixels.
+            // Map pixels of an adjacent surface count as nearer along the seam of two surfaces, which is two pixels
+            // wide.
             let even = around
                 .map(|(dv, du)| met[((v + dv) * width + u + du) as usize])
                 .all(|near| near.is_some_and(|(other, at, _)| other == free && (at - place).dot(&normal).abs() < 0.02));
@@ -84,8 +85,9 @@ fn a_lamp_reaches_what_nothing_hides_from_it() {
 
 #[test]
 fn a_shadow_ends_where_the_line_over_the_edge_meets_the_seabed() {
-    // Seen to fail, with a mean of 2.2 mm, where places were lifted by 6 mm along their normal.
-    // A plate over a flat bed, turned against the map's rows, lit from the side. A pixel of the map is 7 mm wide on the bed.
+    // A plate over a flat seabed, rotated against the map's rows and lit from the side; a map pixel is 7 mm wide on the
+    // seabed.
+    // Regression: lifting places by 6 mm along their normal fails this test, with a mean of 2.2 mm.
     let mut errors = Vec::new();
     for degrees in [0.0, 4.0, 11.0, 23.0, 37.0, 58.0] {
         let mut plan = plain_plan();
@@ -111,7 +113,7 @@ fn a_shadow_ends_where_the_line_over_the_edge_meets_the_seabed() {
         let into = shot.world_from_left.inverse();
         let lens = studio(1.0, Water::default(), Imager::default(), Port::default(), &[]).left.lens;
         let from = (shot.world_from_left * seafix_geometry::Point::from(Vector3::from(lamp.at))).coords;
-        // The edges of the shadow of the upper and of the lower face; those that the lamp sees past are the outline's.
+        // The shadow edges of the upper and of the lower face; those that the lamp sees past belong to the outline.
         let corner = |x: f64, y: f64, z: f64| {
             let (sine, cosine) = libm::sincos(f64::to_radians(degrees));
             let (x, y) = (0.25 * x, 0.2 * y);
@@ -159,7 +161,7 @@ fn a_shadow_ends_where_the_line_over_the_edge_meets_the_seabed() {
                         })
                         .sum::<f64>()
                         / f64::from(n);
-                    // What the plate itself hides from the camera says nothing.
+                    // Places that the plate itself hides from the camera are skipped.
                     if inner && lit.is_finite() && (0.2..0.8).contains(&lit) {
                         errors.push(reach * (1.0 - 2.0 * lit));
                     }

@@ -1,12 +1,12 @@
-//! The two images of a pair show one world, and each pixel the body that its ray meets.
+//! Both images of a pair show the same scene, and each pixel shows the body that its ray meets.
 
 use super::{view::View, *};
 use crate::scene::Bvh;
 
 #[test]
 fn depths_of_the_two_images_agree() {
-    // Every place of the left image that the right one can see lies at the right one's depth there. A place that
-    // something hides from the right camera is behind what it shows, never before.
+    // Every point of the left image that is visible in the right one has the right camera's depth there. A point
+    // occluded for the right camera lies behind the visible surface, never before it.
     let scene = scene(&built_in("drill-centre").unwrap());
     let studio = studio(0.5, Water::default(), Imager::default(), Port::default(), &[]);
     for (object, tilt) in [(2, 0.3), (0, 0.0), (4, -0.2)] {
@@ -48,10 +48,10 @@ fn depths_of_the_two_images_agree() {
 
 #[test]
 fn pixels_show_the_body_that_their_ray_meets() {
-    // SIMULATION.md §10.2: away from edges the bodies of the rasteriser and of the ray caster are the same at every pixel.
-    // Seen to fail when paint was given the layer of its plate.
+    // Away from edges, rasteriser and ray caster agree on the body at every pixel (SIMULATION.md §10.2). Regression:
+    // giving paint the layer of its plate fails this test.
     let scene = scene(&built_in("drill-centre").unwrap());
-    // Paint lies in the plane of its plate, where a ray meets both: it is sought by itself.
+    // Paint lies in the plane of its plate, where a ray meets both, so it is searched for separately.
     let (paint, bodies): (Vec<_>, Vec<_>) = scene.mesh.triangles.iter().cloned().partition(|t| t.layer > 0);
     let trees = [Bvh::new(&bodies), Bvh::new(&paint)];
     let flat = Port { kind: PortKind::Flat, ..Port::default() };

@@ -5,14 +5,15 @@ use multiversion::multiversion;
 use super::keys::{COLUMNS, Keys, Three, count_of_key, key_of_count, key_of_number, number_of_key};
 use crate::Table;
 
-/// Left descriptors compared at once: so many sums stay in registers and none waits for the one before.
+/// The number of left descriptors that are compared at once: their sums fit in registers and do not wait for each
+/// other.
 const ROWS: usize = 6;
-/// Left descriptors in a block: what a key's place can say, whole groups of [`ROWS`].
+/// The number of left descriptors in a block: the range of a key's position, in groups of [`ROWS`].
 const BLOCK: usize = 252;
-/// Right descriptors in one piece of work, at most: as many panels as a key's place can say.
+/// The maximum number of right descriptors in a piece: the range of a key's position in panels.
 pub(super) const MAX: usize = COLUMNS * super::keys::PLACES;
 
-/// What one piece of the right descriptors makes of all left ones.
+/// The result of one piece of the right descriptors against all left ones.
 #[derive(Debug, Default)]
 pub(super) struct Piece {
     pub(super) left: Vec<Three>,
@@ -27,8 +28,9 @@ pub(super) fn squared_length(row: &[f32]) -> f32 {
 }
 
 impl Piece {
-    /// Compares all left descriptors, whose squared lengths are `lengths`, with a piece of the right ones, from
-    /// `first` on, by |a|² + |b|² − 2 a·b.
+    /// Compares all left descriptors, of squared lengths `lengths`, with the right ones from `first` on.
+    ///
+    /// The squared distance is |a|² + |b|² − 2 a·b.
     pub(super) fn euclid(
         &mut self,
         [left, right]: [&Table<f32>; 2],
@@ -38,7 +40,7 @@ impl Piece {
     ) {
         let Self { left: of_left, numbers, lengths: right_lengths, rows, .. } = self;
         let length = right.length();
-        // Panels of sixteen, number by number; one that is not full is filled up with what is infinitely far.
+        // Panels of sixteen, number by number, padded with infinitely distant descriptors.
         numbers.clear();
         numbers.resize(of_right.len().div_ceil(COLUMNS) * length, [0.0; COLUMNS]);
         right_lengths.clear();
@@ -57,7 +59,7 @@ impl Piece {
         blocks(lengths.len(), first, of_right, of_left, rows, number_of_key, work);
     }
 
-    /// The same by the bits that differ.
+    /// Compares binary descriptors in the same way by their Hamming distance.
     pub(super) fn hamming(&mut self, [left, right]: [&Table<u64>; 2], first: usize, of_right: &mut [Three]) {
         let Self { left: of_left, words, rows, .. } = self;
         let length = right.length();
@@ -77,7 +79,7 @@ impl Piece {
     }
 }
 
-/// Each block of left descriptors with each panel of the right ones.
+/// Compares each block of left descriptors with each panel of right ones.
 fn blocks(
     n: usize,
     first: usize,

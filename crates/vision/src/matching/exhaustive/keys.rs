@@ -1,24 +1,24 @@
-//! The three least of many, in lanes, without a branch.
+//! The three smallest keys of many, in lanes and without branches.
 
-/// Lanes: right descriptors compared at once.
+/// The number of lanes: right descriptors that are compared at once.
 pub(super) const COLUMNS: usize = 16;
 
-/// Places that a key can tell apart.
+/// The number of positions that a key distinguishes.
 pub(super) const PLACES: usize = 1 << PLACE_BITS;
 const PLACE_BITS: u32 = 8;
 const PLACE: i32 = (1 << PLACE_BITS) - 1;
 
-/// The three least keys that each lane was offered, least first.
+/// The three smallest keys of each lane, smallest first.
 ///
-/// A key is one whole number: how far in its upper bits, where in its lower eight. Keys compare as distances do, and
-/// of equally far ones by their place.
+/// A key is one integer with the distance in its upper bits and the position in its lower eight. Keys compare by
+/// distance, then by position.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Keys([[i32; COLUMNS]; 3]);
 
 impl Keys {
     pub(super) const NONE: Self = Self([[i32::MAX; COLUMNS]; 3]);
 
-    /// One key a lane.
+    /// Considers one key for each lane.
     #[inline(always)]
     pub(super) fn offer(&mut self, keys: &[i32; COLUMNS]) {
         let [first, second, third] = &mut self.0;
@@ -32,7 +32,7 @@ impl Keys {
         }
     }
 
-    /// Adds what `lane` holds to `three`; `read` says what a distance's bits mean, `index` what a place means.
+    /// Merges the keys of `lane` into `three`; `read` decodes the distance, `index` the position.
     pub(super) fn merge_into(
         &self,
         three: &mut Three,
@@ -53,8 +53,9 @@ impl Keys {
     }
 }
 
-/// The key of a number that is not negative but for rounding. Its eight last bits make room: what is read back is
-/// less by at most 2⁻¹⁵ of itself.
+/// The key of a number that is non-negative up to rounding.
+///
+/// Its last eight bits make room for the position, which lowers the decoded number by at most 2⁻¹⁵ of itself.
 #[inline(always)]
 pub(super) fn key_of_number(value: f32, place: i32) -> i32 {
     value.to_bits() as i32 & (i32::MAX & !PLACE) | place
@@ -64,7 +65,7 @@ pub(super) fn number_of_key(key: i32) -> f32 {
     f32::from_bits(key as u32)
 }
 
-/// The key of a count below 2²³; it is read back as it was.
+/// The key of a count below 2²³, which is decoded exactly.
 #[inline(always)]
 pub(super) fn key_of_count(count: u64, place: i32) -> i32 {
     (count as i32) << PLACE_BITS | place
@@ -74,7 +75,7 @@ pub(super) fn count_of_key(key: i32) -> f32 {
     (key >> PLACE_BITS) as f32
 }
 
-/// The nearest two of those seen so far and the distances of the nearest three.
+/// The nearest two elements so far and the distances of the nearest three.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Three {
     pub(super) index: [u32; 2],
@@ -84,7 +85,7 @@ pub(super) struct Three {
 impl Three {
     pub(super) const NONE: Self = Self { index: [u32::MAX; 2], value: [f32::INFINITY; 3] };
 
-    /// Of equals the one of the lowest index is nearest, in whatever order they come.
+    /// Considers an element; of equal distances the lowest index is nearest, in whatever order they come.
     pub(super) fn offer(&mut self, index: u32, value: f32) {
         let [first, second, third] = self.value;
         let before = |other: f32, its: u32| value < other || value == other && index < its;
@@ -97,7 +98,7 @@ impl Three {
         }
     }
 
-    /// As if all that the other saw had been offered: its third can be no more than third.
+    /// Merges the elements of `other`, whose third is at best the third of both.
     pub(super) fn merge(&mut self, other: &Self) {
         (0..2).filter(|&k| other.index[k] != u32::MAX).for_each(|k| self.offer(other.index[k], other.value[k]));
         self.value[2] = self.value[2].min(other.value[2]);
@@ -117,7 +118,7 @@ mod tests {
         let mut three = Three::NONE;
         keys.merge_into(&mut three, 1, number_of_key, |place| 10 * place);
         assert_eq!((three.index, three.value), ([10, 30], [3.0, 3.0, 4.0]));
-        // What another lane holds comes to it, equals in the order of their index.
+        // Another lane's elements are merged, equal ones in the order of their indices.
         keys.merge_into(&mut three, 1, number_of_key, |place| 10 * place + 1);
         assert_eq!((three.index, three.value), ([10, 11], [3.0, 3.0, 3.0]));
         let mut none = Three::NONE;

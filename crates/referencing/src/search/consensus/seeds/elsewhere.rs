@@ -1,4 +1,4 @@
-//! Poses beside one that is known.
+//! Poses that contradict a known pose.
 
 use super::{
     super::{
@@ -9,19 +9,21 @@ use super::{
     MIN, Seeds,
 };
 
-/// Beginnings of a pose that is sought whatever it is worth, and vertices compared for each.
+/// Number of starts of a pose sought regardless of its evidence, and of vertices compared for each.
 const BEGINNINGS: usize = 8;
 const COMPARED_BEGINNINGS: usize = 512;
 
 impl Seeds<'_> {
-    /// Only pairs that contradict a pose begin another.
+    /// Restricts the search to pairs that contradict a pose.
     pub(in crate::search) fn contradicting(mut self, pose: &Mode) -> Self {
         self.free = contradicting(self.climb.terms, self.climb.graph, pose, false);
         self
     }
 
-    /// A pose of three pairs that contradict this one, and what joins them: begun at the pairs that most others agree with,
-    /// whatever it is worth. `None` where no three of them agree.
+    /// A pose that contradicts a known one, regardless of its evidence.
+    ///
+    /// Three pairs that contradict the known pose begin it, and further pairs that fit join. The search starts from the
+    /// best connected pairs. `None` if no three of them agree.
     pub(in crate::search) fn elsewhere(mut self, than: &Mode) -> Option<Mode> {
         let graph = self.climb.graph;
         self.free = contradicting(self.climb.terms, graph, than, true);
@@ -44,7 +46,7 @@ impl Seeds<'_> {
         self.modes.into_iter().next()
     }
 
-    /// Of some vertices, taken evenly where they are many, those with the most later neighbours among others.
+    /// The vertices with most later neighbours in `among`; a large set is decimated evenly.
     fn best_connected(&self, of: &[u64], among: &[u64], max: usize) -> Vec<usize> {
         let graph = self.climb.graph;
         let all: Vec<usize> = ones(of, 0).collect();
@@ -57,7 +59,7 @@ impl Seeds<'_> {
     }
 }
 
-/// The pairs that a pose does not explain, one bit each; `free` ones only, if their cloud point is in none of its pairs either.
+/// The pairs that a pose does not explain, one bit each; with `free`, without the cloud points of its own pairs.
 fn contradicting(terms: &Terms, graph: &ConsistencyGraph, pose: &Mode, free: bool) -> Vec<u64> {
     let mut taken: Vec<usize> = pose.members.iter().map(|&v| graph.vertices[v].cloud).collect();
     taken.sort_unstable();

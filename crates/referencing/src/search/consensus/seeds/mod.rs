@@ -1,4 +1,4 @@
-//! Every coherent three that could lead to a pose worth knowing.
+//! Best-first enumeration of the coherent triples that may lead to a pose of interest.
 
 mod elsewhere;
 mod queue;
@@ -23,46 +23,45 @@ use crate::{ModelPoint, lanes::ones_of};
 pub(in crate::search) use queue::Pair;
 use queue::{Queue, order};
 
-/// Poses less likely than the best by this much (nats) are not looked for.
+/// Evidence (nats) below the best at which a pose is not searched for.
 const MARGIN: f64 = 10.0;
-/// A pair may be so many of its own standard deviations from a pose that three noisy points give.
+/// Gate (standard deviations of a pair) about the pose of three noisy points.
 const LOOSE: f64 = 3.5;
-/// Modes that a new three is compared with before it is followed.
+/// Number of modes that a new triple is compared with before it is followed.
 const COMPARED: usize = 16;
-/// Pairs are counted at so many vertices or a few more.
+/// Approximate number of vertices at which pairs are counted.
 const COUNTED: usize = 256;
-/// The least set that a pose can come from.
+/// Minimum number of pairs that determine a pose.
 const MIN: usize = 3;
-/// Modes kept.
+/// Maximum number of modes kept.
 const KEPT: usize = 256;
-/// Pairs kept to be followed, and parts of sets besides: 12 bytes each.
+/// Maximum numbers of pairs to follow, and of pairs that lead to parts of sets (12 bytes each).
 const MAX_PAIRS: usize = 8_000_000;
 const MAX_PARTS: usize = 2_000_000;
-/// What a pose from three points, the climb to its mode and each pair compared with a motion on the way cost, in
-/// words read.
+/// Costs, in words read: a pose from three points, the ascent to its mode, each pair compared during the ascent.
 const COST_OF_A_POSE: u64 = 16;
 const COST_OF_A_MODE: u64 = 64;
 const COST_OF_A_PAIR: u64 = 4;
 
-/// What came of the search for modes.
+/// The result of a search for modes.
 #[derive(Default)]
 pub(in crate::search) struct Swept {
-    /// The likeliest first.
+    /// The modes, the best first.
     pub(in crate::search) modes: Vec<Mode>,
-    /// Whether every three that could lead to a pose of interest was followed.
+    /// Whether every triple that could lead to a pose of interest was followed.
     pub(in crate::search) complete: bool,
-    /// The pairs that were left to be followed when all were known, each with the bound of what it begins.
+    /// The pairs that remained to be followed when all were known, each with the bound of its sets.
     pub(in crate::search) pairs: Vec<Pair>,
-    /// What bounds (nats) they had to reach.
+    /// The threshold (nats) of these bounds.
     pub(in crate::search) looked_for: f64,
-    /// Whether every three was looked at and followed that could lead to a set of fewer pairs than the whole.
+    /// Whether every triple was examined and followed that could lead to a part of a set.
     pub(in crate::search) parts: bool,
     /// Work done.
     pub(in crate::search) pair_tests: u64,
 }
 
 impl Swept {
-    /// Modes that were met later, and fitted better where they were known.
+    /// Adds modes found later; they replace known modes of the same members.
     pub(in crate::search) fn insert(&mut self, modes: Vec<Mode>) {
         for mode in modes {
             self.modes.retain(|known| known.members != mode.members);
@@ -71,7 +70,7 @@ impl Swept {
     }
 }
 
-/// Keeps a mode in its place, unless it is known.
+/// Inserts a mode in order, unless it is known.
 fn insert(modes: &mut Vec<Mode>, mode: Mode) {
     if modes.iter().any(|known| known.members == mode.members) {
         return;
@@ -84,63 +83,64 @@ fn insert(modes: &mut Vec<Mode>, mode: Mode) {
     modes.truncate(KEPT);
 }
 
-/// Sets of fewer pairs than the whole, and how far they are looked for.
+/// The limits of the search for parts: sets of fewer pairs than the complete object.
 struct Parts {
-    /// Sets of so many pairs are no parts.
+    /// Number of pairs from which a set is no part.
     full: usize,
-    /// Of so many pairs that lead to no more than parts one is looked at.
+    /// Decimation factor of the pairs that lead only to parts.
     every: usize,
-    /// What parts may cost once all pairs are known, and what is spent in all when that is spent.
+    /// Maximum work on parts once all pairs are known, and the total work at which it ends.
     follow: u64,
     until: u64,
-    /// Whether there were too many pairs to be kept.
+    /// Whether pairs were dropped for lack of memory.
     dropped: bool,
 }
 
 impl Parts {
-    /// No limits: there are none.
+    /// No parts, and no limits.
     fn none(min: usize) -> Self {
         Self { full: min, every: 1, follow: u64::MAX, until: u64::MAX, dropped: false }
     }
 }
 
-/// Best-first branch and bound over the coherent threes (a, b, c).
+/// Best-first branch and bound over the coherent triples (a, b, c).
 ///
-/// Any set is met at its first three members in the order of the graph. All others of it are common neighbours
-/// of these, so that the model points among the later common neighbours bound its evidence ([`Bounds`]). Pairs
-/// (a, b) are followed in the order of their bound, until it is below what is of interest.
+/// Every set is visited at its first three members in the order of the graph. Its other members are later common
+/// neighbours of these, so that the model points among the later common neighbours bound its evidence ([`Bounds`]).
+/// Pairs (a, b) are followed in descending order of their bound, down to the threshold of interest.
 pub(in crate::search) struct Seeds<'a> {
     climb: Climb<'a>,
     bounds: Bounds<'a>,
     budget: u64,
     parts: Parts,
-    /// Words read, and as much other work.
+    /// Work done: words read, or equivalent.
     spent: u64,
-    /// The likeliest first.
+    /// The modes, the best first.
     modes: Vec<Mode>,
-    /// Poses whose evidence is less (nats) are not looked for.
+    /// Minimum evidence (nats) of a pose.
     floor: f64,
     /// Greatest bound of a pair followed early.
     scouted: f64,
-    /// The vertices to look at, one bit each.
+    /// The vertices of the search, one bit each.
     free: Vec<u64>,
     /// The free neighbours of one vertex, and of two.
     row: Vec<u64>,
     common: Vec<u64>,
-    /// The members of the likeliest modes that hold two.
+    /// The members of the best modes that hold both vertices of a pair.
     again: Vec<u64>,
-    /// The free neighbours of one vertex, or of two, by words, what comes after each of their model points, and what three have in common.
+    /// Memory: free neighbours of one or two vertices, choices after each model point, neighbours of three.
     held: Vec<Held>,
     after: Vec<After>,
     of_three: Vec<usize>,
-    /// The set that is begun, and the sets that were climbed from: they lead to the same mode again.
+    /// The current set, and the sets from which an ascent started: they would lead to the same mode again.
     members: Vec<usize>,
     climbed: BTreeSet<Vec<usize>>,
 }
 
 impl<'a> Seeds<'a> {
-    /// Over the vertices whose cloud point is not `taken`, for sets of so many pairs with so much evidence (nats) at
-    /// least.
+    /// A search over the vertices whose cloud point is not `taken`.
+    ///
+    /// Sets have at least `min` pairs and the evidence `floor` (nats).
     pub(in crate::search) fn new(
         model: &'a [ModelPoint],
         (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
@@ -173,7 +173,7 @@ impl<'a> Seeds<'a> {
         }
     }
 
-    /// The evidence that is of interest.
+    /// Minimum evidence of interest.
     fn threshold(&self) -> f64 {
         let best = self.modes.first().map_or(f64::NEG_INFINITY, |mode| mode.ln_evidence);
         (best - MARGIN).max(self.floor)
@@ -191,7 +191,8 @@ impl<'a> Seeds<'a> {
         Swept { modes: self.modes, complete, pairs, looked_for, parts, pair_tests: self.spent }
     }
 
-    /// Follows the pairs whose bound is of interest, the greatest first, until so much is spent; these pairs, and whether that was enough.
+    /// Follows the pairs in descending order of their bound until the work exceeds `max`. Returns the pairs, and
+    /// whether all were followed.
     fn follow_all(&mut self, mut pairs: Vec<Pair>, max: u64) -> (Vec<Pair>, bool) {
         pairs.retain(|(bound, ..)| f64::from(*bound) >= self.threshold());
         let mut queue = Queue::of(pairs);
@@ -210,14 +211,16 @@ impl<'a> Seeds<'a> {
         (queue.into_pairs(), true)
     }
 
-    /// Sets of fewer than so many pairs are parts. Of the pairs that lead to no more than parts as many are looked at, evenly, as can
-    /// be with so much work, so that what many of them lead to is found all the same; and once all are known they are followed
-    /// with no more than so much, what leads to the others first. Both come on top of the budget.
+    /// Adds the search for parts: sets of fewer than `full` pairs.
+    ///
+    /// The pairs that lead only to parts are decimated evenly to fit into the work `limit`, so that a part to which
+    /// many of them lead is found all the same. Once all are known they are followed with at most the work `follow`,
+    /// after the pairs that lead to complete sets. Both come on top of the budget.
     pub(in crate::search) fn with_parts(mut self, full: usize, limit: u64, follow: u64) -> Self {
         let graph = self.climb.graph;
         let some = (graph.vertices.len() / COUNTED).max(1);
         let edges: usize = ones(&self.free, 0).step_by(some).map(|a| some * shared(graph.row(a), &self.free, a)).sum();
-        // Rows are read from the second of a pair on: a third of them on average.
+        // Rows are read from the second vertex of a pair on: a third of them on average.
         let cost = edges as u64 * self.row.len() as u64 / 3;
         let every = cost.div_ceil(limit.max(1)).max(1) as usize;
         self.budget = self.budget.saturating_add(cost / every as u64).saturating_add(follow);
@@ -225,8 +228,9 @@ impl<'a> Seeds<'a> {
         self
     }
 
-    /// The compatible pairs (a, b) that may begin a set of interest, those that may begin no more than a part of one, and
-    /// whether these are all.
+    /// The pairs (a, b) that may begin a set of interest.
+    ///
+    /// Returns the pairs, the pairs that may only begin a part, and whether they are complete.
     fn pairs(&mut self) -> (Vec<Pair>, Vec<Pair>, bool) {
         let graph = self.climb.graph;
         let ranks = graph.starts.len() - 1;
@@ -271,13 +275,13 @@ impl<'a> Seeds<'a> {
                 let count = intersect(&self.row, graph.row(b), &graph.lasts, graph.starts[next], &mut self.common);
                 let (max, bound) = self.bounds.with_common((2, gains), (&self.common, count), next, asked);
                 if bound >= threshold {
-                    // Rounded up, so that it stays a bound.
+                    // Rounded up, so that it remains an upper bound.
                     let pair = ((bound as f32).next_up(), a as u32, b as u32);
                     if max >= self.parts.full { pairs.push(pair) } else { parts.push(pair) }
                 }
             }
             if parts.len() > MAX_PARTS {
-                // Those that lead to the least would hardly be followed.
+                // The pairs with the smallest bounds would hardly be followed.
                 parts.select_nth_unstable_by_key(MAX_PARTS / 2, order);
                 parts.truncate(MAX_PARTS / 2);
                 self.parts.dropped = true;
@@ -290,7 +294,7 @@ impl<'a> Seeds<'a> {
         (pairs, parts, complete)
     }
 
-    /// Follows the most promising pair of one model point at once: a good pose known early spares the rest.
+    /// Follows the most promising pair of one model point at once: a good pose known early prunes the rest.
     fn scout(&mut self, pairs: &[Pair]) {
         let Some(&(bound, a, b)) = pairs.iter().min_by_key(|pair| order(pair)) else { return };
         if f64::from(bound) > self.scouted {
@@ -327,7 +331,7 @@ impl<'a> Seeds<'a> {
                 if self.bounds.falls_short((3, gains), later[rank], (self.bounds.min, threshold)) {
                     continue;
                 }
-                // Its own model point's pairs may go on in words to come.
+                // The pairs of one model point may continue in the next words.
                 let (row, from) = (graph.row(c), graph.starts[rank + 1]);
                 let after = &common[place..];
                 let enough = |gains| self.bounds.is_enough((3, gains), (&self.common, after), (row, from), threshold);
@@ -347,12 +351,12 @@ impl<'a> Seeds<'a> {
         (self.held, self.after) = (common, later);
     }
 
-    /// Whether a likely mode holds all three.
+    /// Whether one of the best modes holds all three.
     fn known(&self, three: [usize; 3]) -> bool {
         self.modes.iter().take(COMPARED).any(|mode| three.iter().all(|&v| mode.holds(v)))
     }
 
-    /// The pose of a three that loses so much (nats) to its strain, what else fits it roughly, and the mode that this leads to.
+    /// Follows a triple with the distance residual `lost` (nats): its pose, the pairs within the gate, their mode.
     fn follow(&mut self, three: [usize; 3], lost: f64) {
         self.spent += COST_OF_A_POSE;
         let Climb { terms, graph, .. } = self.climb;
@@ -367,7 +371,7 @@ impl<'a> Seeds<'a> {
         // Rank and distance of the last member.
         let mut last = (usize::MAX, 0.0);
         for &v in &self.of_three {
-            // The three points' errors grow with the lever.
+            // The errors of the three points grow with the lever.
             let pair = &terms.pairs[v];
             let lever = 1.0 + (pair.model - centre).norm() / altitude;
             let d2 = pair.distance(&(pair.cloud - motion.apply(&pair.model))) / (lever * lever);
@@ -409,7 +413,7 @@ fn words_from(graph: &ConsistencyGraph, rank: usize) -> u64 {
     (graph.lasts.len().saturating_sub(graph.starts[rank] / 64) + 1) as u64
 }
 
-/// The least altitude of a triangle (m).
+/// The minimum altitude of a triangle (m).
 fn altitude([a, b, c]: [&Vector3<f64>; 3]) -> f64 {
     let area = (b - a).cross(&(c - a)).norm();
     let longest = (b - a).norm().max((c - a).norm()).max((c - b).norm());

@@ -1,20 +1,21 @@
-//! Pairs in the order in which they are followed.
+//! The priority queue of pairs.
 
-/// So many are sorted first.
+/// Number of pairs sorted first.
 const SORTED: usize = 1024;
 
-/// Bound and vertices of two pairs.
+/// Bound and vertices of a pair.
 pub(in crate::search) type Pair = (f32, u32, u32);
 
-/// What sorts pairs so that the greatest bound comes first, of equals the first in the order of the graph.
+/// Sort key: descending bound, equal bounds in the order of the graph.
 pub(super) fn order(&(bound, a, b): &Pair) -> u128 {
-    // As `total_cmp` has it: of negative numbers the greater has the smaller bits.
+    // The order of `total_cmp`: the greater of two negative numbers has the smaller bits.
     let bits = bound.to_bits();
     let ascending = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
     u128::from(!ascending) << 64 | u128::from(a) << 32 | u128::from(b)
 }
 
-/// The pairs, the greatest bound first. Seldom all are taken: no more are sorted at a time than were taken before.
+/// The pairs in descending order of their bound. Incremental sort, since seldom all are taken: each step sorts as many
+/// as were taken before.
 pub(super) struct Queue {
     pairs: Vec<Pair>,
     taken: usize,
@@ -26,7 +27,7 @@ impl Queue {
         Self { pairs, taken: 0, sorted: 0 }
     }
 
-    /// All of them, taken or not, in no order.
+    /// All pairs, taken or not, in no order.
     pub(super) fn into_pairs(self) -> Vec<Pair> {
         self.pairs
     }

@@ -9,7 +9,7 @@ use crate::{Candidates, Problem, Tolerance};
 const POINTS: usize = 9;
 const SEEN: usize = 6;
 
-/// A whole copy of the object, the first points of another, and clutter.
+/// A complete copy of the object, the first points of another, and clutter.
 fn scene(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
     let mut place = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
     let model: Vec<ModelPoint> = (0..POINTS).map(|_| ModelPoint::exact("", place(1.0).into())).collect();
@@ -26,10 +26,10 @@ fn scene(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
     (model, cloud)
 }
 
-/// What the points beside the whole copy show: to a sweep of all, to one in which the rest of the copy is a part of a whole without
-/// limits, and to one that may not follow parts.
+/// The modes beside the complete copy from three searches: without parts, with the rest of the copy as a part without
+/// limits, and with no work allowed for parts.
 ///
-/// Seen to fail where the pairs of parts are not followed, and where it is not told that they were not.
+/// Fails if the pairs of parts are not followed, and if skipping them is not reported.
 #[test]
 fn a_part_is_found_where_there_are_no_limits_and_a_full_in_any_case() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
