@@ -174,7 +174,7 @@ fn key_points_that_come_to_nothing_are_reported() {
         name
     });
     let reported = run(&few);
-    let parts = ["warning: key points, but no triangulated point in ", "with left and right exchanged ", "; exchange the images if"];
+    let parts = ["warning: key points, but no triangulated point in ", "with left and right exchanged ", "; exchange the left and right images if"];
     assert!(parts.iter().all(|part| reported.contains(part)), "{reported}");
 }
 

@@ -405,7 +405,7 @@ fn a_part_of_the_vehicle_is_no_ground() {
         sequence.overlay(|pair| (if pair < 5 { fraction } else { 0.97 }, STEP * pair as f64, 1.0));
         let said = sequence.refusal(&[], 3);
         assert!(
-            said.contains("stand still in the image") && said.contains("parts of the vehicle"),
+            said.contains("are static in the image") && said.contains("parts of the vehicle"),
             "{fraction}: {said}"
         );
     }

@@ -157,7 +157,7 @@ fn a_log_that_was_cut_off_is_saved() {
     let (code, _, error) = seafix(folder, &["recover", "cut.mcap.partial"]);
     assert!(code == 4 && error.contains("name another file with --out"), "{error}");
     let (code, _, error) = seafix(folder, &["report", "cut.mcap.partial"]);
-    assert!(code == 3 && error.contains("not the folder of a run"), "{error}");
+    assert!(code == 3 && error.contains("give the folder of a run"), "{error}");
     let (code, _, error) = seafix(folder, &["recover", "e.toml"]);
     assert!(code == 3 && error.contains("not an MCAP file"), "{error}");
 }
