@@ -1,9 +1,10 @@
 //! The number of instructions of each search on the problems of `searches`, by the registry. Load of the machine does
 //! not affect it.
 //!
-//! `valgrind --tool=callgrind` counts them and must be installed: `cargo bench -p seafix-proptests --bench
-//! instructions`, some minutes; one family: `… -- a`. A search of more than 150 ms is not counted, since it would take
-//! many seconds. The last row is a complete fix by the defaults: search, solver, and the complete answer.
+//! `valgrind --tool=callgrind` counts them and must be installed. The command takes some minutes:
+//! `cargo bench -p seafix-proptests --bench instructions`, or `… -- paper-scale` for one family. A search of more than
+//! 150 ms is not counted, since it would take many seconds. The last row is a complete fix by the defaults: search,
+//! solver, and the complete answer.
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 

@@ -1,9 +1,9 @@
 //! The time of each search on a medium problem of each family, by the registry; a new search is included when it is
 //! listed.
 //!
-//! One thread, candidates listed beforehand, default settings: `cargo bench -p seafix-proptests --bench searches`; one
-//! family: `… --bench searches -- search/a`; quickly `… -- --quick`. A search of more than half a second runs once, and
-//! its time is printed.
+//! One thread, candidates listed beforehand, default settings:
+//! `cargo bench -p seafix-proptests --bench searches`, or `… --bench searches -- search/paper-scale` for one family, or
+//! `… -- --quick`. A search of more than half a second runs once, and its time is printed.
 
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 

@@ -89,8 +89,8 @@ fn clutter_alone_is_never_fixed() {
 /// The posterior probability of absence is the frequency of absence, over equally many frames with and without the
 /// object, in bins of the probability. The posterior probability of the best pose is the frequency of its being right.
 ///
-/// `cargo test --release -p seafix-proptests consensus::posteriors_are -- --ignored --nocapture`; `CONSENSUS_FAMILIES` (a),
-/// `CONSENSUS_FRAMES` (6000) of each kind.
+/// `cargo test --release -p seafix-proptests consensus::posteriors_are -- --ignored --nocapture`;
+/// `CONSENSUS_FAMILIES` (a), `CONSENSUS_FRAMES` (6000) of each kind.
 #[test]
 #[ignore = "long: 12 000 frames"]
 fn posteriors_are_calibrated() {

@@ -146,11 +146,8 @@ fn rows_that_do_not_correspond_are_reported() {
     let upright =
         |rig: String| rig.replace("-0.25]", "0.0]").replacen("0.0, 1.0, 0.0, 0.0]", "0.0, 1.0, 0.0, -0.25]", 1);
     let reported = said(images, upright, 0);
-    let parts = [
-        "the images contradict the rig in ",
-        "are within 3 px of the same columns, RMS ",
-        " px; give the calibration",
-    ];
+    let parts =
+        ["the images contradict the rig in ", "are within 3 px of the same columns, RMS ", " px; give the calibration"];
     assert!(parts.iter().all(|part| reported.contains(part)), "{reported}");
 }
 
@@ -174,7 +171,11 @@ fn key_points_that_come_to_nothing_are_reported() {
         name
     });
     let reported = run(&few);
-    let parts = ["warning: key points, but no triangulated point in ", "with left and right exchanged ", "; exchange the left and right images if"];
+    let parts = [
+        "warning: key points, but no triangulated point in ",
+        "with left and right exchanged ",
+        "; exchange the left and right images if",
+    ];
     assert!(parts.iter().all(|part| reported.contains(part)), "{reported}");
 }
 
