@@ -20,8 +20,7 @@ fn main() -> Result<(), seafix::Error> {
     for target in localizer.localize(&images, &prior)? {
         match target.outcome {
             Outcome::Fix(fix) => {
-                let position = fix.object_from_camera.translation();
-                println!("{}: camera at {position:.3?} m, ± {:.1} mm", target.name, 1e3 * fix.position_sigma());
+                println!("{}: {}, ± {:.1} mm", target.name, fix.object_from_camera, 1e3 * fix.position_sigma());
             }
             rejected => println!("{}: {rejected}", target.name),
         }

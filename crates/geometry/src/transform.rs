@@ -214,6 +214,14 @@ impl<A: Frame, B: Frame> Mul<Point<B>> for Transform<A, B> {
     }
 }
 
+impl<A, B> fmt::Display for Transform<A, B> {
+    /// Translation (m) and rotation vector (degrees), for people.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (t, r) = (self.isometry.translation.vector, self.isometry.rotation.scaled_axis().map(f64::to_degrees));
+        write!(f, "[{:.4}, {:.4}, {:.4}] m, rotation [{:.3}, {:.3}, {:.3}]°", t.x, t.y, t.z, r.x, r.y, r.z)
+    }
+}
+
 impl<A, B> fmt::Debug for Transform<A, B> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = |full: &'static str| full.rsplit("::").next().unwrap_or("?");
@@ -238,6 +246,13 @@ impl<A, B> fmt::Debug for Transform<A, B> {
 mod tests {
     use super::*;
     use crate::{Camera, Object};
+
+    #[test]
+    fn a_transform_prints_its_translation_and_its_rotation_vector() {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+        let pose = Transform::<Object, Camera>::new(turn, Vector3::new(1.0, -2.5, 0.0));
+        assert_eq!(pose.to_string(), "[1.0000, -2.5000, 0.0000] m, rotation [0.000, 0.000, 90.000]°");
+    }
 
     #[test]
     fn a_quarter_turn_and_a_step() {
