@@ -93,6 +93,6 @@ fn instructions(row: &str, family: usize, calls: usize) -> Option<f64> {
         .args(["--calls", row, &family.to_string(), &calls.to_string()])
         .output()
         .ok()?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    said.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    message.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
 }

@@ -61,8 +61,8 @@ fn values_of<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, default: 
         // The error of an invalid word lists all valid ones.
         Value::String(_) => match registry.build(&Choice::named(name).with(key, "\u{1}")) {
             Ok(_) => vec![default.clone()],
-            Err(refusal) => {
-                let message = refusal.to_string();
+            Err(rejection) => {
+                let message = rejection.to_string();
                 let quoted = message.split('`').skip(1).step_by(2).map(Value::from);
                 quoted.filter(|word| registry.build(&Choice::named(name).with(key, word.clone())).is_ok()).collect()
             }

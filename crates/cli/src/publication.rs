@@ -121,10 +121,12 @@ mod tests {
         assert_eq!(sections.iter().map(|(name, _)| *name).collect::<Vec<_>>(), listed);
         for (name, section) in sections {
             let page = plain(&std::fs::read_to_string(reports.join(name).join("report.html")).unwrap());
-            let said = section.lines().filter_map(|line| line.strip_prefix("- ")).map(|said| said.replace('\\', ""));
-            let said: Vec<String> = said.map(|said| said.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
-            assert!(!said.is_empty(), "{name}");
-            for sentence in said {
+            let message =
+                section.lines().filter_map(|line| line.strip_prefix("- ")).map(|message| message.replace('\\', ""));
+            let message: Vec<String> =
+                message.map(|message| message.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
+            assert!(!message.is_empty(), "{name}");
+            for sentence in message {
                 assert!(page.contains(&sentence), "reports/{name}/report.html lacks: {sentence}");
             }
             for link in section.split("](").skip(1).map(|rest| rest.split_once(')').unwrap().0) {

@@ -521,13 +521,13 @@ mod tests {
         )
         .unwrap();
         let faults = SHAPES.faults(&Choice { name: "square".to_owned(), settings });
-        let said: Vec<String> = faults.iter().map(ToString::to_string).collect();
-        assert_eq!(said.len(), 5, "{said:?}");
+        let text: Vec<String> = faults.iter().map(ToString::to_string).collect();
+        assert_eq!(text.len(), 5, "{text:?}");
         let keys: Vec<&str> = faults.iter().filter_map(BuildError::key).collect();
         for key in ["frame.widht", "frame.width", "frame.holes.1.width", "side", "side-length"] {
-            assert!(keys.contains(&key), "no {key} in {said:?}");
+            assert!(keys.contains(&key), "no {key} in {text:?}");
         }
-        let all = said.join("\n");
+        let all = text.join("\n");
         for part in [
             "no setting `frame.widht`, did you mean `width`?",
             "`frame.width`: not a number: string \"wide\"",

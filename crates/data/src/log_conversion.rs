@@ -95,11 +95,11 @@ fn reading(reading: &Reading) -> SensorReading {
 /// # Errors
 /// The name of an unknown device.
 pub fn readings(inputs: &Inputs) -> Result<Vec<Reading>, String> {
-    let reading = |said: &SensorReading| {
-        let device =
-            Device::named(&said.device).ok_or_else(|| format!("a reading of an unknown device, `{}`", said.device))?;
-        let covariance = Matrix3::from_fn(|r, c| said.covariance[r][c]);
-        Ok(Reading { device, stamp_ns: said.stamp_ns, value: said.value.into(), covariance })
+    let reading = |message: &SensorReading| {
+        let device = Device::named(&message.device)
+            .ok_or_else(|| format!("a reading of an unknown device, `{}`", message.device))?;
+        let covariance = Matrix3::from_fn(|r, c| message.covariance[r][c]);
+        Ok(Reading { device, stamp_ns: message.stamp_ns, value: message.value.into(), covariance })
     };
     inputs.readings.iter().map(reading).collect()
 }

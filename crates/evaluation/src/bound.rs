@@ -111,7 +111,7 @@ mod tests {
     /// Many points on a distant ring about the axis: with known attitude the lateral position has σ_px/√(2n) in pixels;
     /// with unknown attitude it is less accurate.
     #[test]
-    fn depth_is_known_as_disparity_and_scale_state() {
+    fn depth_has_the_covariance_of_disparity_and_scale() {
         let camera = Pinhole::new([1000, 1000], [500.0, 500.0], [499.5, 499.5], &[]).unwrap();
         let right_from_left = Transform::exp(&Vector6::new(0.0, 0.0, 0.0, -0.25, 0.0, 0.0));
         let rig = StereoRig::new(camera, camera, right_from_left).unwrap();

@@ -248,7 +248,7 @@ impl RunInputs {
             "running" | "interrupted" => Some("an unfinished run; resume it with --resume"),
             _ => None,
         };
-        if let Some((what, remedy)) = unfinished.and_then(|said| said.split_once("; ")) {
+        if let Some((what, remedy)) = unfinished.and_then(|message| message.split_once("; ")) {
             return Err(Fault::new(what, &file).remedy(remedy));
         }
         let mut trials = Vec::new();
@@ -425,7 +425,7 @@ mod tests {
         assert_eq!(pairs(&a, &b), [(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))]);
         assert_eq!(pairs(&b, &a), [(Some(0), Some(1)), (Some(1), Some(0)), (Some(2), None)]);
         let run_inputs = |trials| RunInputs { inputs: BTreeMap::new(), trials };
-        let said: Vec<String> = configuration(
+        let message: Vec<String> = configuration(
             &run_inputs(a.into()),
             &run_inputs(b.into()),
             &[(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))],
@@ -433,7 +433,10 @@ mod tests {
         .into_iter()
         .map(|change| format!("{} {:?} {:?}", change.what, change.first, change.second))
         .collect();
-        assert_eq!(said, ["seed None Some(\"3\")", "trials Some(\"2\") Some(\"3\")", "trial 3 None Some(\"there\")"]);
+        assert_eq!(
+            message,
+            ["seed None Some(\"3\")", "trials Some(\"2\") Some(\"3\")", "trial 3 None Some(\"there\")"]
+        );
         // The first of several identical trials is paired with the first.
         let same = [trial("1", &[]), trial("2", &[])];
         assert_eq!(pairs(&same, &same), [(Some(0), Some(0)), (Some(1), Some(1))]);

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn odometry_fails_as_reported_and_only_then() {
+    fn odometry_fails_as_configured_and_only_then() {
         let sound: Vec<Option<f64>> = (0..60).map(|k| Some(f64::from(k))).collect();
         for kind in [
             FaultKind::Off,

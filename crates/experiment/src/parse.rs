@@ -294,7 +294,7 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn said(file: &Path, text: &str) -> Vec<String> {
+    fn message(file: &Path, text: &str) -> Vec<String> {
         experiment(file, text).faults.iter().map(ToString::to_string).collect()
     }
 
@@ -302,19 +302,19 @@ mod tests {
     fn all_faults_are_reported_at_once() {
         let text =
             "question = 'why'\nsorce = 'dive'\nsource = 'dive'\n[pipeline]\nsolvr = 'kabsch'\n  window = 'two'\n";
-        let said = said(Path::new("e.toml"), text);
-        assert_eq!(said.len(), 3, "{said:?}");
-        assert!(said[0].contains("e.toml:2:1: `sorce`; did you mean `source`?"));
-        assert!(said[1].contains("e.toml:5:1: `solvr`; did you mean `solver`?"));
-        assert!(said[2].contains("e.toml:6:12"));
-        assert!(said[2].starts_with("not a whole number of at least 0: string \"two\""), "{said:?}");
+        let message = message(Path::new("e.toml"), text);
+        assert_eq!(message.len(), 3, "{message:?}");
+        assert!(message[0].contains("e.toml:2:1: `sorce`; did you mean `source`?"));
+        assert!(message[1].contains("e.toml:5:1: `solvr`; did you mean `solver`?"));
+        assert!(message[2].contains("e.toml:6:12"));
+        assert!(message[2].starts_with("not a whole number of at least 0: string \"two\""), "{message:?}");
     }
 
     #[test]
     fn several_faults_may_stand_on_one_line_and_in_one_list() {
         let text = "source = { nam = 'dive' }\nseed = -1\nseed = 2\nrepetitions = 'x\n[[vary]]\nvalues = [1]\n\
                     [[vary]]\nkey = 'seed'\nvalus = 3\nvalues = [1]\n[log]\nimages = 'al'\nx = 1\n";
-        let said = said(Path::new("e.toml"), text);
+        let message = message(Path::new("e.toml"), text);
         let parts = [
             "no `question`",
             "e.toml:1:10",
@@ -328,7 +328,7 @@ mod tests {
             "e.toml:13:1",
         ];
         for part in parts {
-            assert!(said.iter().any(|line| line.contains(part)), "no {part} in {said:#?}");
+            assert!(message.iter().any(|line| line.contains(part)), "no {part} in {message:#?}");
         }
     }
 
@@ -347,18 +347,18 @@ mod tests {
         let other = other.experiment.unwrap();
         assert!(other.source.settings.is_empty());
 
-        let missing = said(&at("e.toml"), "base = 'bse.toml'\n[source]\nframes = 2\n");
+        let missing = message(&at("e.toml"), "base = 'bse.toml'\n[source]\nframes = 2\n");
         assert!(missing.len() == 1 && missing[0].contains("e.toml:1:8: \"bse.toml\""), "{missing:?}");
-        assert!(said(&at("e.toml"), "base = 'base.toml'\nseeds = 4\n")[0].contains("e.toml:2"));
+        assert!(message(&at("e.toml"), "base = 'base.toml'\nseeds = 4\n")[0].contains("e.toml:2"));
         fs::write(at("base.toml"), "base = 'more.toml'\n").unwrap();
         let own = "base = 'base.toml'\nsource.frames = 2\n";
         fs::write(at("more.toml"), base).unwrap();
         for lowest in ["more.toml", "base.toml", "none.toml"] {
             fs::write(at("base.toml"), format!("base = '{lowest}'\nsource = {{ rate = 2.0 }}\nsede = 2\n")).unwrap();
-            let said = said(&at("e.toml"), own);
-            assert!(said.len() == 2, "{said:?}");
-            assert!(said[0].contains("a base of its own in") && said[0].contains("base.toml:1:8"), "{said:?}");
-            assert!(said[1].contains("base.toml:3:1: `sede`; did you mean `seed`?"), "{said:?}");
+            let message = message(&at("e.toml"), own);
+            assert!(message.len() == 2, "{message:?}");
+            assert!(message[0].contains("a base of its own in") && message[0].contains("base.toml:1:8"), "{message:?}");
+            assert!(message[1].contains("base.toml:3:1: `sede`; did you mean `seed`?"), "{message:?}");
         }
     }
 }

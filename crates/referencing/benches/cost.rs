@@ -95,8 +95,8 @@ fn instructions(which: usize, more: usize) -> Option<f64> {
             .args(["--calls", &which.to_string(), &calls.to_string()])
             .output()
             .ok()?;
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        said.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        message.lines().find_map(|line| line.split("Collected :").nth(1)?.trim().parse().ok())
     };
     Some((count(10 + more)? - count(10)?) / more as f64)
 }
@@ -115,6 +115,6 @@ fn umeyama() -> Option<PathBuf> {
 
 fn nanoseconds(program: &Path) -> f64 {
     let output = Command::new(program).output().expect("it was just compiled");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    said.split_whitespace().next().and_then(|word| word.parse().ok()).expect("it prints a number first")
+    let message = String::from_utf8_lossy(&output.stdout).into_owned();
+    message.split_whitespace().next().and_then(|word| word.parse().ok()).expect("it prints a number first")
 }

@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cloud_of_more_points_than_a_word_has_bits_is_examined_full() {
+    fn a_cloud_of_more_points_than_a_word_has_bits_is_searched_completely() {
         let model = one_point([0.0, 0.0, 2.0]);
         let places: Vec<[f64; 3]> = (0..150).map(|j| [0.01 * f64::from(j % 65) - 0.6, 0.0, 2.0]).collect();
         let found = candidates(&model, &cloud(&places, 0.0), Some(&boxed(0.0301)), &Gate::default(), None);

@@ -78,9 +78,10 @@ pub fn compare(
     Ok(Compared {
         table: {
             let results = width.map_or_else(|| summary.to_string(), |width| format!("{summary:width$}"));
-            let said = [same(&run, &names), forced, lengths(&run, &names, &comparisons), lines(&comparisons)].concat();
-            let said: Vec<String> = said.lines().map(|line| wrapped(line, width, 2)).collect();
-            format!("{results}\n\n{}\n", said.join("\n"))
+            let message =
+                [same(&run, &names), forced, lengths(&run, &names, &comparisons), lines(&comparisons)].concat();
+            let message: Vec<String> = message.lines().map(|line| wrapped(line, width, 2)).collect();
+            format!("{results}\n\n{}\n", message.join("\n"))
         },
         page: page.transpose()?,
         differ: comparisons.iter().any(|comparison| comparison.better().is_some()),

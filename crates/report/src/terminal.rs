@@ -72,8 +72,8 @@ impl fmt::Display for RunSummary {
         );
         results.write(f)?;
         let max = f.width();
-        let said = |text: &str| wrapped(text, max, 0);
-        let note = said(
+        let message = |text: &str| wrapped(text, max, 0);
+        let note = message(
             "frames: with a fix/all; n: attempts; medians over the fixes of fit RMS (the paper’s measure), target registration error (TRE), camera position error and attitude error.",
         );
         writeln!(f, "{note}")?;
@@ -81,14 +81,14 @@ impl fmt::Display for RunSummary {
         if self.rows.iter().any(|row| row.limits.is_some()) {
             writeln!(f)?;
             self.limits(&heads, &names).write(f)?;
-            let note = said(
+            let note = message(
                 "RMS errors over all n fixes and their ratio to the Cramér–Rao bound. A consistent covariance has a mean NEES of 6 and 0.95 of the fixes below the 95 % quantile.",
             );
             writeln!(f, "{note}")?;
         }
 
         for lacking in &self.lacking {
-            writeln!(f, "{}", said(&format!("warning: {lacking}")))?;
+            writeln!(f, "{}", message(&format!("warning: {lacking}")))?;
         }
         if !timed {
             return Ok(());

@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_within_an_object_report_its_points_apart() {
+    fn distances_within_an_object_distinguish_its_points() {
         for object in &Blueprint::drill_centre().objects {
             let all = distances(object);
             let min = all.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);

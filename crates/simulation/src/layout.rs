@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_are_seen_where_the_layout_states() {
+    fn points_are_seen_where_the_layout_has_them() {
         for shape in [Shape::Spread, Shape::Compact] {
             for number in 0..20 {
                 let layout = Layout { shape, number, points: 8, distance: 2.0, ..Layout::default() };

@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn facets_that_pass_through_each_other_fraction_the_pixels_between() {
+    fn facets_that_pass_through_each_other_divide_the_pixels() {
         // Two planes that intersect at u = 20.3.
         let x = |u: f64| (u - 31.5) / 50.0;
         let flat = facet(&[[-3.0, -3.0, 2.0], [3.0, -3.0, 2.0], [3.0, 3.0, 2.0], [-3.0, 3.0, 2.0]], 1, 0);

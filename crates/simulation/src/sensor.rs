@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_the_stated_deviation_and_only_full_levels() {
+    fn noise_has_the_stated_deviation_and_integer_levels() {
         let sensor = Sensor { noise: 2.0, ..Sensor::default() };
         let grey = sensor.expose(vec![0.5; 40_000], 200, Stream::new(1, 0, 0, Purpose::LeftImage));
         let mean = grey.iter().sum::<f32>() / 40_000.0;

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_site_file_states_the_same_and_passes_its_own_check() {
+    fn the_site_file_holds_the_same_and_passes_its_own_check() {
         for seed in 0..10 {
             let (site, _, _) = sampled(SurveyErrors { model: 0.001, survey: 0.01 }, seed);
             let text = site.to_toml();

@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn strips_show_what_the_full_does() {
+    fn strips_show_what_the_complete_image_does() {
         let value = |i: usize| ((i * 7919 + i / 90 * 31) % 251) as f32;
         let image = Image::new(90, 700, (0..90 * 700).map(value).collect()).unwrap();
         let (mut full, mut strips) = (ScaleSpace::default(), ScaleSpace::keeping(2000));

@@ -119,7 +119,7 @@ fn consistency(dives: u32, steps: usize) -> (f64, f64) {
 ///
 /// Seen to fail when a change of object ignores the survey.
 #[test]
-fn the_navigated_pose_has_an_error_as_much_as_it_states() {
+fn the_navigated_pose_has_a_consistent_covariance() {
     let dives = cases(100);
     let (mean, error) = consistency(dives, 300);
     println!("NEES over {dives} dives of 300 s: {mean:.3} ± {error:.3}");
@@ -312,7 +312,7 @@ fn dead_reckoning_grows_as_predicted() {
         ..NavigationScenario::default()
     };
     let spread = |steps: usize| {
-        let (mut real, mut said) = ([0.0; 2], [0.0; 2]);
+        let (mut real, mut message) = ([0.0; 2], [0.0; 2]);
         for number in 0..300 {
             let mut sailing = scenario.set_out(number);
             let mut known = sailing.fix(0);
@@ -322,10 +322,13 @@ fn dead_reckoning_grows_as_predicted() {
             let error = known.object_pose.object_from_camera.error_to(&sailing.truth(0));
             real[0] += error.fixed_rows::<3>(0).norm_squared();
             real[1] += error.fixed_rows::<3>(3).norm_squared();
-            said[0] += known.object_pose.covariance.attitude_sigma().powi(2);
-            said[1] += known.object_pose.covariance.position_sigma().powi(2);
+            message[0] += known.object_pose.covariance.attitude_sigma().powi(2);
+            message[1] += known.object_pose.covariance.position_sigma().powi(2);
         }
-        ([(real[0] / 300.0).sqrt(), (real[1] / 300.0).sqrt()], [(said[0] / 300.0).sqrt(), (said[1] / 300.0).sqrt()])
+        (
+            [(real[0] / 300.0).sqrt(), (real[1] / 300.0).sqrt()],
+            [(message[0] / 300.0).sqrt(), (message[1] / 300.0).sqrt()],
+        )
     };
     let ((short, short_said), (long, long_said)) = (spread(400), spread(800));
     for i in 0..2 {
@@ -510,7 +513,7 @@ fn a_break_is_no_motion() {
 ///
 /// Seen to fail when only a prior pose can search.
 #[test]
-fn the_state_is_what_it_is_stated_to_be() {
+fn the_state_is_the_configured_one() {
     use State::{DeadReckoning, Fixed, Searching};
     let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 1.5 }, Fuse::default());
     let mut sailing = scenario.set_out(0);

@@ -113,7 +113,7 @@ impl Shown {
 ///
 /// Seen to fail when the NFA is not tested for searches by evidence.
 #[test]
-fn a_set_that_random_gives_is_no_answer() {
+fn a_random_set_is_no_answer() {
     let acceptance = Acceptance::default();
     // These reach their budget, which takes seconds.
     let enumerates = |name: &&str| ["complete-enumeration", "structural-coherence"].contains(name);

@@ -78,37 +78,42 @@ fn hold_problem<'a>(searches: impl Iterator<Item = &'a (Tried, Measure)>, proble
     let rigid = cliques.iter().find(|set| set.len() >= NEEDED && is_rigid(problem, set)).map_or(0, Vec::len);
     cliques.retain(|set| set.len() >= max.min(rigid));
     for (search, measure) in searches {
-        let said = || format!("{} of {graph:?}", search.name);
+        let message = || format!("{} of {graph:?}", search.name);
         let size = if *measure == Measure::Rigidly { rigid } else { max };
         match search.answer_to(problem) {
             Ok(found) => {
-                assert!(found.pairs.len() == size && cliques.contains(&found.pairs), "{}: {:?}", said(), found.pairs);
+                assert!(
+                    found.pairs.len() == size && cliques.contains(&found.pairs),
+                    "{}: {:?}",
+                    message(),
+                    found.pairs
+                );
                 assert!(
                     *measure != Measure::Rigidly || is_rigid(problem, &found.pairs),
                     "{}: {:?}",
-                    said(),
+                    message(),
                     found.pairs
                 );
-                assert!(found.undecided.is_none(), "{}: {:?}", said(), found.undecided);
+                assert!(found.undecided.is_none(), "{}: {:?}", message(), found.undecided);
                 let bound = if search.claims.exact { max } else { graph.model_points() };
-                assert!((max..=bound).contains(&found.consensus_bound), "{}: {}", said(), found.consensus_bound);
-                assert_eq!(found.optimal, search.claims.exact, "{}", said());
+                assert!((max..=bound).contains(&found.consensus_bound), "{}: {}", message(), found.consensus_bound);
+                assert_eq!(found.optimal, search.claims.exact, "{}", message());
                 if search.claims.ties {
                     let mut sets = found.alternatives;
                     sets.push(found.pairs);
                     sets.sort_unstable();
                     let all = cliques.iter().take_while(|set| set.len() == max);
-                    assert!(found.alternatives_complete && all.eq(&sets), "{}: {sets:?}", said());
+                    assert!(found.alternatives_complete && all.eq(&sets), "{}: {sets:?}", message());
                 }
             }
             Err(Rejected::TooFew { with_candidates, .. }) => {
-                assert!(with_candidates == graph.model_points() && with_candidates < NEEDED, "{}", said());
+                assert!(with_candidates == graph.model_points() && with_candidates < NEEDED, "{}", message());
             }
-            Err(Rejected::NoConsensus { best, .. }) => assert!(best == size && size < NEEDED, "{}: {best}", said()),
+            Err(Rejected::NoConsensus { best, .. }) => assert!(best == size && size < NEEDED, "{}: {best}", message()),
             Err(Rejected::NotFound { bound, .. }) => {
-                assert!(!search.claims.exact && size < NEEDED && bound >= max, "{}: {bound}", said());
+                assert!(!search.claims.exact && size < NEEDED && bound >= max, "{}: {bound}", message());
             }
-            Err(other) => panic!("{}: {other}", said()),
+            Err(other) => panic!("{}: {other}", message()),
         }
     }
 }

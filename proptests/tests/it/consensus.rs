@@ -118,19 +118,19 @@ fn posteriors_are_calibrated() {
             // Expected number of wrong claims of a probability of at most a hundredth: the model of the cloud is not
             // exact, and the default acceptance asks for much less.
             let (sure, max) = (1e-2, 0.1);
-            let said: Vec<bool> =
+            let message: Vec<bool> =
                 posteriors.iter().filter(|(posterior, _)| *posterior <= sure).map(|(_, wrong)| *wrong).collect();
-            let missed = said.iter().filter(|&&missed| missed).count();
-            let fraction = missed as f64 / said.len().max(1) as f64;
-            println!("{name}, {what}: of {} with a probability of at most {sure}, {missed} were wrong", said.len());
+            let missed = message.iter().filter(|&&missed| missed).count();
+            let fraction = missed as f64 / message.len().max(1) as f64;
+            println!("{name}, {what}: of {} with a probability of at most {sure}, {missed} were wrong", message.len());
             if family == Family::A {
-                assert!(said.len() >= 100, "{what}: {} probabilities are too few", said.len());
-                assert!(fraction <= max, "{name}, {what}: {missed} of {} were wrong", said.len());
+                assert!(message.len() >= 100, "{what}: {} probabilities are too few", message.len());
+                assert!(fraction <= max, "{name}, {what}: {missed} of {} were wrong", message.len());
             } else {
                 // At the scale of a site some minutes give only tens of such probabilities, and in f their true
                 // frequency is near a tenth, so that a single claim would decide. The test only shows an excess.
-                let (low, _) = clopper_pearson(missed, said.len().max(1), 0.95);
-                assert!(low <= max, "{name}, {what}: {missed} of {} were wrong", said.len());
+                let (low, _) = clopper_pearson(missed, message.len().max(1), 0.95);
+                assert!(low <= max, "{name}, {what}: {missed} of {} were wrong", message.len());
             }
         }
     }
@@ -145,7 +145,7 @@ fn decade(p: f64) -> i32 {
 /// The posterior is right over few generated frames: the true pose is the most probable in nine of ten with five or
 /// more visible points, and the answers of the default acceptance are right.
 #[test]
-fn the_true_pose_is_the_largest_probable() {
+fn the_true_pose_is_the_best() {
     let (mut defined, mut right) = (0, 0);
     for number in 0..252 {
         let visible = Generated::new(Family::A, 9, number, Presence::Present).truth.pairs.len();

@@ -76,8 +76,8 @@ fn true_path(seconds: f64) -> Transform<Body, Body> {
 
 /// The readings of both devices at a time after the start (ns), with the log at `at`.
 fn exact(after: u64, at: &Vector3<f64>) -> [Reading; 2] {
-    let said = twist(after as f64 * 1e-9);
-    let (rate, velocity) = (said.fixed_rows::<3>(0).into_owned(), said.fixed_rows::<3>(3).into_owned());
+    let message = twist(after as f64 * 1e-9);
+    let (rate, velocity) = (message.fixed_rows::<3>(0).into_owned(), message.fixed_rows::<3>(3).into_owned());
     [
         reading(Device::Doppler, START + after, velocity + rate.cross(at), 0.0),
         reading(Device::Gyro, START + after, rate, 0.0),
@@ -168,9 +168,10 @@ fn no_odometry_by_readings_invents_a_motion() {
                     let sane = Vector3::new(0.3 + noise, noise, 0.0);
                     trajectory.deliver(&[reading(other, stamp, sane * 0.1, 1e-3)]);
                     // For five seconds the device is silent, or its readings are invalid: too large, or frozen.
-                    let said = if (20..70).contains(&step) { value } else { Some(sane) };
-                    trajectory
-                        .deliver(&said.map(|said| reading(silent, stamp, said, 1e-3)).into_iter().collect::<Vec<_>>());
+                    let message = if (20..70).contains(&step) { value } else { Some(sane) };
+                    trajectory.deliver(
+                        &message.map(|message| reading(silent, stamp, message, 1e-3)).into_iter().collect::<Vec<_>>(),
+                    );
                     outcomes.push(trajectory.pair(stamp));
                 }
                 let lost = |outcome: &OdometryOutcome| matches!(outcome, OdometryOutcome::Skipped(Lost::Silent { device, .. }) if *device == silent);
@@ -233,14 +234,14 @@ static DIVES: LazyLock<Vec<Dives>> = LazyLock::new(|| {
 
 fn dived(odometry: &dyn Odometry, mission: &Mission, dive: u64) -> Dived {
     let planned = mission.plan(7, dive, Path::new("")).unwrap();
-    let said = planned.readings();
+    let message = planned.readings();
     let sensors = &mission.sensors;
     let stamped = |arrival: f64, device, time: f64, value, sigma| {
         (planned.stamp(arrival), reading(device, planned.stamp(time), value, sigma))
     };
-    let doppler = said.doppler.iter();
+    let doppler = message.doppler.iter();
     let doppler = doppler.map(|r| stamped(r.arrival, Device::Doppler, r.time, r.value, sensors.doppler.sigma));
-    let gyro = said.attitude.iter();
+    let gyro = message.attitude.iter();
     let gyro = gyro.map(|r| stamped(r.arrival, Device::Gyro, r.time, r.value.rate, sensors.attitude.rate_sigma()));
     let mut readings: Vec<(u64, Reading)> = doppler.chain(gyro).collect();
     readings.sort_by_key(|(arrival, reading)| (*arrival, reading.stamp_ns));

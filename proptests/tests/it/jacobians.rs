@@ -87,8 +87,8 @@ fn points_under_a_pose() {
             j.set_column(i, &((by(STEP) - by(-STEP)) / (2.0 * STEP)));
         }
         let expected = j * covariance.matrix * j.transpose();
-        let said = covariance.of_point(&(at.inverse() * Point::<Object>::from(point)));
-        within("J Σ Jᵀ", (said - expected).amax(), 1e-8 * expected.amax())
+        let message = covariance.of_point(&(at.inverse() * Point::<Object>::from(point)));
+        within("J Σ Jᵀ", (message - expected).amax(), 1e-8 * expected.amax())
     });
 }
 

@@ -101,7 +101,7 @@ impl Slope {
         for (time, &pair) in order.iter().enumerate() {
             let [left, right] = &self.pairs[pair];
             let stamp_ns = 1_000_000_000 + 100_000_000 * time as u64;
-            said(stamp_ns).iter().for_each(|reading| session.sense(reading));
+            message(stamp_ns).iter().for_each(|reading| session.sense(reading));
             session.advance(&StereoPair { stamp_ns, left, right }).unwrap();
         }
         session.trajectory()
@@ -109,7 +109,7 @@ impl Slope {
 }
 
 /// The readings of a vehicle that moves along x.
-fn said(stamp_ns: u64) -> [Reading; 2] {
+fn message(stamp_ns: u64) -> [Reading; 2] {
     let reading =
         |device, x| Reading { device, stamp_ns, value: Vector3::new(x, 0.0, 0.0), covariance: Matrix3::zeros() };
     [reading(Device::Doppler, STEP / 0.1), reading(Device::Gyro, 0.0)]

@@ -193,7 +193,7 @@ fn a_spent_budget_is_reported() {
         let answer = search.answer(&problem);
         let ended = match &answer {
             Ok(found) => found.undecided.as_ref(),
-            Err(refusal) => Some(refusal),
+            Err(rejection) => Some(rejection),
         };
         assert!(matches!(ended, Some(Rejected::Budget { .. })), "{}: {answer:?}", search.name);
     }
@@ -214,9 +214,9 @@ fn a_blow_up_ends_at_the_budget() {
                 assert_eq!(objection, None, "{}", search.name);
                 assert!(size >= 3 && !found.optimal, "{}: {size}", search.name);
             }
-            Err(refusal) => {
-                let nothing = matches!(refusal, Rejected::TooFew { .. } | Rejected::Budget { .. });
-                assert!(!nothing, "{}: {refusal}", search.name);
+            Err(rejection) => {
+                let nothing = matches!(rejection, Rejected::TooFew { .. } | Rejected::Budget { .. });
+                assert!(!nothing, "{}: {rejection}", search.name);
             }
         }
     }

@@ -25,18 +25,18 @@ fn agree(searches: &[Tried], planted: &Planted) -> Result<u32, TestCaseError> {
             let answer = search.answer(planted);
             let ended = match &answer {
                 Ok(found) => found.optimal,
-                Err(refusal) => refusal.is_proved(),
+                Err(rejection) => rejection.is_proved(),
             };
             if !ended {
                 continue;
             }
-            let Some((known, said)) = &first else {
+            let Some((known, message)) = &first else {
                 first = Some((search, answer));
                 continue;
             };
             compared += 1;
             let names = format!("{} and {}", known.name, search.name);
-            match (said, &answer) {
+            match (message, &answer) {
                 (Ok(a), Ok(b)) => {
                     prop_assert_eq!(a.pairs.len(), b.pairs.len(), "{}", names);
                     if a.alternatives_complete && b.alternatives_complete {

@@ -190,7 +190,7 @@ fn more_never_finds_less() {
                         prop_assert!(after.pairs.len() >= before.pairs.len(), "{}", search.name);
                     }
                     Ok(_) | Err(Rejected::Budget { .. }) => {}
-                    Err(refusal) => prop_assert!(false, "{}: {refusal}", search.name),
+                    Err(rejection) => prop_assert!(false, "{}: {rejection}", search.name),
                 }
             }
         }

@@ -265,7 +265,7 @@ fn a_planted_set_is_not_missed() {
                 }
                 // Points that are a mirror image for others need not be the complete set.
                 Err(Rejected::Mirrored { .. }) if !search.claims.exact => {}
-                Err(refusal) => prop_assert!(size <= 3, "{}: {refusal}", search.name),
+                Err(rejection) => prop_assert!(size <= 3, "{}: {rejection}", search.name),
             }
         }
         Ok(())

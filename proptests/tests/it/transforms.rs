@@ -101,7 +101,7 @@ fn a_million_compositions_stay_a_rotation() {
 ///
 /// Seen to fail when H is the column matrix itself, not its transpose.
 #[test]
-fn rows_and_columns_state_the_same() {
+fn rows_and_columns_agree() {
     law(512, (pose::<Object, Camera>(REACH), point::<Camera>(REACH)), |(object_from_camera, p)| {
         let rows = H::<Camera, Object>::from(object_from_camera);
         within("p H − T p", (rows.apply(&p) - object_from_camera * p).amax(), 1e-12)?;

@@ -17,8 +17,8 @@ const REPLACED: &[&str] = &[
     "hear", "heard", "hears", "helm", "imitate", "imitates", "imitation", "imitations", "journey", "journeys", "laid",
     "lasting", "lay", "lays", "least", "leg", "legs", "likelier", "likeliest", "look", "looked", "looks", "misfit", "misfits",
     "misnamed", "most", "passage", "passages", "realigned", "reckon", "reckoned", "reckoning", "recognise", "recogniser",
-    "recognises", "referenced", "refound", "rival", "rivals", "rough", "roughs", "sailed", "says", "share", "shares", "shell",
-    "shells", "sight", "sighting", "sightings", "sights", "standing", "standings", "station", "stations", "strain", "teeth",
+    "recognises", "referenced", "refound", "refusal", "rival", "rivals", "rough", "roughs", "sailed", "says", "share", "shares", "shell",
+    "shells", "sight", "sighting", "sightings", "sights", "standing", "standings", "station", "stations", "strain", "stretch", "teeth",
     "tell", "tells", "told", "tooth", "twin", "twins", "underway", "unfit", "unidentified", "unreferenced", "unrecognised",
     "voyage", "voyages", "way", "ways", "weighed", "whole", "wholes", "widen", "widened",
 ];
@@ -36,6 +36,7 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("pose_graphs_over_dead_reckoning_are_consistent", "the method"),
     ("FishEye", "a name that OpenCV's users write"),
     ("eye", "the identity matrix of a camera message"),
+    ("shell", "of a command line"),
     ("Shell", "of a command line"),
     ("ShellName", "of a command line"),
     ("PowerShell", "of a command line"),
@@ -53,14 +54,6 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     // Fields of `coherence-problem/1` and of the log's schema.
     ("shell_half_m", "coherence-problem/1"),
     ("shell_half", "the log's schema"),
-    ("RoughPose", "the log's schema"),
-    ("Referenced", "the log's schema"),
-    ("Unidentified", "the log's schema"),
-    ("fix_frames", "the log's schema"),
-    ("unreferenced", "the log's schema"),
-    ("odometry_only_position_error", "the log's schema"),
-    ("odometry_only_attitude_error", "the log's schema"),
-    ("nfa", "the log's schema"),
 ];
 
 /// Keys of unchanged file formats, and file names.

@@ -19,7 +19,7 @@ const PROGRAM: &str = "seafix";
 pub(crate) struct Completions {
     /// The shell.
     #[arg(value_enum)]
-    bounding_box: ShellName,
+    shell: ShellName,
 }
 
 /// The supported shells.
@@ -39,7 +39,7 @@ enum ShellName {
 
 impl Completions {
     pub(crate) fn execute(&self, mut program: Command) -> Ended {
-        let bounding_box = match self.bounding_box {
+        let shell = match self.shell {
             ShellName::Bash => Shell::Bash,
             ShellName::Elvish => Shell::Elvish,
             ShellName::Fish => Shell::Fish,
@@ -47,7 +47,7 @@ impl Completions {
             ShellName::Zsh => Shell::Zsh,
         };
         let mut script = Vec::new();
-        clap_complete::generate(bounding_box, &mut program, PROGRAM, &mut script);
+        clap_complete::generate(shell, &mut program, PROGRAM, &mut script);
         print(&String::from_utf8_lossy(&script))?;
         Ok(DONE)
     }

@@ -127,7 +127,7 @@ impl Odometer {
         let progress = Progress::new();
         progress.expect(dataset.frames.len());
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
-        let mut said = HashSet::new();
+        let mut message = HashSet::new();
         let mut before = None;
         for frame in &dataset.frames {
             let readings = dataset.readings(before.replace(frame.stamp_ns), frame.stamp_ns);
@@ -135,9 +135,9 @@ impl Odometer {
             match stereo_images(dataset, frame) {
                 Err(fault) => {
                     let warning = format!("warning: {fault}");
-                    if !said.contains(&warning) {
+                    if !message.contains(&warning) {
                         notify(&warning);
-                        said.insert(warning);
+                        message.insert(warning);
                     }
                     unread.push((frame.stamp_ns, fault));
                 }
@@ -244,14 +244,14 @@ impl Trip {
     /// Warnings about the complete trajectory.
     fn warnings(&self) -> Vec<String> {
         let agreement = self.trajectory.agreement().filter(|fraction| *fraction < LITTLE_AGREEMENT);
-        let said = |fraction: f64| {
+        let message = |fraction: f64| {
             format!(
                 "only {:.0} % of the landmarks agree with the motion (median over the pairs): a part of the vehicle may be in \
                  view, or the cameras may not be synchronised",
                 100.0 * fraction
             )
         };
-        agreement.map(said).into_iter().collect()
+        agreement.map(message).into_iter().collect()
     }
 
     /// The minimum and mean number of landmarks tracked in a pair, and the mean number searched for; `None` without

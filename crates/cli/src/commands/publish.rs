@@ -107,8 +107,8 @@ impl Publish {
             let Remade { frames, differing } =
                 watched(|progress| remake(&one.plan, &folder, CHECKED, &options, progress))?;
             same += usize::from(differing.is_empty());
-            let said = if differing.is_empty() { "the same" } else { "not the same" };
-            print(&format!("{}: {} repeated, {said}\n", one.name, counted(frames, "frame")))?;
+            let message = if differing.is_empty() { "the same" } else { "not the same" };
+            print(&format!("{}: {} repeated, {message}\n", one.name, counted(frames, "frame")))?;
             for what in differing {
                 print(&format!("{}: {what} differ; raise the VERSION of the changed component\n", one.name))?;
             }

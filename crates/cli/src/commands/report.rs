@@ -101,12 +101,12 @@ pub(crate) fn verified(run: &Path, folder: &Path) -> Result<(bool, String), Fail
     if !run.join("manifest.json").exists() {
         changed += &format!("note: {} has no manifest; its logs were verified, its tables were not\n", run.display());
     }
-    print(&format!("{changed}{}", said(&verified, &folder.display().to_string())))?;
+    print(&format!("{changed}{}", message(&verified, &folder.display().to_string())))?;
     Ok((verified.holds() && full, verified.findings))
 }
 
 /// The result of a verification as text.
-fn said(verified: &Verified, folder: &str) -> String {
+fn message(verified: &Verified, folder: &str) -> String {
     let mut text = String::new();
     for wrong in &verified.mismatches {
         text += &format!("{}: printed {}, logged {}: {}\n", wrong.file, wrong.printed, wrong.logged, wrong.key);

@@ -28,7 +28,7 @@ pub(crate) fn execute(of: Format) -> Ended {
 
 /// The schema of an experiment file, with the registered components, their settings and defaults.
 fn experiment() -> Value {
-    let said = |what: &str, kind: &str| json!({ "type": kind, "description": what });
+    let message = |what: &str, kind: &str| json!({ "type": kind, "description": what });
     let mut pipeline = properties(&toml::Table::try_from(Pipeline::default()).expect("settings are a table"));
     for stage in ["detector", "locator", "descriptor", "matcher", "search", "solver"] {
         pipeline.insert(stage.to_owned(), component(stage));
@@ -42,7 +42,7 @@ fn experiment() -> Value {
     for part in ["odometry", "policy", "fusion"] {
         navigation.insert(part.to_owned(), component(part));
     }
-    navigation.insert("faults".to_owned(), said("failures of the odometry: kind, from, to, amount", "array"));
+    navigation.insert("faults".to_owned(), message("failures of the odometry: kind, from, to, amount", "array"));
     let pose_graph = properties(&toml::Table::try_from(Keyframes::default()).expect("settings are a table"));
     navigation.insert(
         "pose-graph".to_owned(),
@@ -67,11 +67,11 @@ fn experiment() -> Value {
         "type": "object",
         "description": "an axis of the grid of trials",
         "properties": {
-            "key": said("the dotted path of the setting; with cases and zip, the name of the axis", "string"),
-            "values": said("the values of the setting", "array"),
+            "key": message("the dotted path of the setting; with cases and zip, the name of the axis", "string"),
+            "values": message("the values of the setting", "array"),
             "range": range, "log-range": range,
             "cases": { "type": "array", "items": case, "description": "labelled sets of settings that vary together" },
-            "zip": said("lists of equal length by the paths of settings that vary together", "object"),
+            "zip": message("lists of equal length by the paths of settings that vary together", "object"),
         },
         "required": ["key"],
         "additionalProperties": false,
@@ -81,10 +81,10 @@ fn experiment() -> Value {
         "title": "seafix experiment",
         "type": "object",
         "properties": {
-            "question": said("the question of the experiment, one English sentence", "string"),
+            "question": message("the question of the experiment, one English sentence", "string"),
             "seed": { "type": "integer", "minimum": 0, "default": 0 },
             "repetitions": { "type": "integer", "minimum": 1, "default": 1 },
-            "base": said("a file with the settings that this file omits", "string"),
+            "base": message("a file with the settings that this file omits", "string"),
             "source": component("source"),
             "pipeline": { "type": "object", "properties": pipeline, "additionalProperties": false },
             "navigation": { "type": "object", "properties": navigation, "additionalProperties": false },

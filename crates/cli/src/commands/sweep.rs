@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_harmless_in_the_gate() {
+    fn words_are_harmless_in_a_terminal() {
         assert_eq!(quoted("a b$(c)'d"), r"'a b$(c)'\''d'");
     }
 }

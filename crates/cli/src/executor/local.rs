@@ -45,10 +45,10 @@ impl Local {
         let path = array.logs.join(format!("{task}.log"));
         let refuse = |error: std::io::Error| Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()));
         let log = File::create(&path).map_err(refuse)?;
-        let said = log.try_clone().map_err(refuse)?;
+        let message = log.try_clone().map_err(refuse)?;
         let mut command = Command::new("sh");
         command.arg(&array.script).env(self.variable(), task.to_string());
-        let child = command.stdin(Stdio::null()).stdout(log).stderr(said).spawn();
+        let child = command.stdin(Stdio::null()).stdout(log).stderr(message).spawn();
         child.map_err(|error| Failure::new(OUTPUT, format!("cannot start task {task}: {error}")))
     }
 }

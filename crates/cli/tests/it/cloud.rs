@@ -30,7 +30,7 @@ fn json(more: &[&str]) -> Value {
 }
 
 /// The error of a command that ends with this code and prints nothing.
-fn refusal(more: &[&str], code: i32) -> String {
+fn rejection(more: &[&str], code: i32) -> String {
     let ended = cloud(more, code);
     assert!(ended.out.is_empty() && ended.error.lines().count() == 1, "{}", ended.error);
     ended.error
@@ -85,21 +85,22 @@ fn refinement_and_triangulation_are_chosen_by_name() {
         (&15.into(), &9.into())
     );
     assert!(
-        refusal(&["--set", "refinement=dirct"], 2).contains("no refinement is called `dirct`, did you mean `direct`?")
+        rejection(&["--set", "refinement=dirct"], 2)
+            .contains("no refinement is called `dirct`, did you mean `direct`?")
     );
 }
 
 #[test]
-fn the_cloud_is_written_full() {
+fn the_complete_cloud_is_written() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("cloud.ply");
-    let said = cloud(&["--out", file.to_str().unwrap()], 0).out;
+    let message = cloud(&["--out", file.to_str().unwrap()], 0).out;
     let bytes = fs::read(&file).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     let header = String::from_utf8(bytes[..end].to_vec()).unwrap();
     let count: usize = header.split("element vertex ").nth(1).unwrap().lines().next().unwrap().parse().unwrap();
     assert_eq!(bytes.len() - end, count * (3 * 8 + 3 + 4));
-    assert!(said.contains(&format!("{count} points")), "{said}");
+    assert!(message.contains(&format!("{count} points")), "{message}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file stays");
 }
 
@@ -109,12 +110,12 @@ fn images_that_changed_places_are_refused() {
     let table = fs::read_to_string(sample("frames.csv")).unwrap();
     let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
     command.arg("cloud").args([sample(pair[1]), sample(pair[0])]).arg("--rig").arg(sample("dataset.toml"));
-    let said = ended_with(3, &mut command).error;
-    assert!(said.contains("exchanged left and right images") && said.lines().count() == 1, "{said}");
+    let message = ended_with(3, &mut command).error;
+    assert!(message.contains("exchanged left and right images") && message.lines().count() == 1, "{message}");
 }
 
 /// The standard error of `cloud` for two of the sample's images with a changed rig.
-fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String {
+fn message(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("dataset.toml");
     fs::write(&file, rig(fs::read_to_string(sample("dataset.toml")).unwrap())).unwrap();
@@ -125,8 +126,8 @@ fn said(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> String 
 /// Seen to fail when the two images are not compared: there were 17 points.
 #[test]
 fn one_image_twice_is_refused() {
-    let said = said(["left000.png", "left000.png"], |rig| rig, 3);
-    assert!(said.contains("identical left and right images") && said.lines().count() == 1, "{said}");
+    let message = message(["left000.png", "left000.png"], |rig| rig, 3);
+    assert!(message.contains("identical left and right images") && message.lines().count() == 1, "{message}");
 }
 
 /// A wrong rig is detected by the epipolar distances of its images, a rig falsely marked as rectified by its
@@ -134,18 +135,18 @@ fn one_image_twice_is_refused() {
 #[test]
 fn rows_that_do_not_correspond_are_reported() {
     let images = ["left000.png", "right000.png"];
-    assert_eq!(said(images, |rig| rig, 0), "");
+    assert_eq!(message(images, |rig| rig, 0), "");
     // The right camera points 20 rows lower than its calibration.
     let lower = |rig: String| {
         let (left, right) = rig.split_once("[rig.right]").unwrap();
         format!("{left}[rig.right]{}", right.replace("cy = 383.5", "cy = 403.5"))
     };
-    let reported = said(images, lower, 0);
+    let reported = message(images, lower, 0);
     assert!(reported.contains("warning: a rig marked as rectified that is not in "), "{reported}");
     // The same, with a calibration of equal rows.
     let upright =
         |rig: String| rig.replace("-0.25]", "0.0]").replacen("0.0, 1.0, 0.0, 0.0]", "0.0, 1.0, 0.0, -0.25]", 1);
-    let reported = said(images, upright, 0);
+    let reported = message(images, upright, 0);
     let parts =
         ["the images contradict the rig in ", "are within 3 px of the same columns, RMS ", " px; give the calibration"];
     assert!(parts.iter().all(|part| reported.contains(part)), "{reported}");
@@ -181,10 +182,10 @@ fn key_points_that_come_to_nothing_are_reported() {
 
 #[test]
 fn what_cannot_be_is_refused_in_one_line() {
-    assert!(refusal(&["--detector", "haris"], 2).contains("did you mean `harris`?"));
-    assert!(refusal(&["--features", "0"], 2).contains("features"));
-    assert!(refusal(&["--set", "detector.sigmma=2"], 2).contains("did you mean `sigma`?"));
-    assert!(refusal(&["--out", "/nowhere/cloud.ply"], 4).contains("/nowhere/cloud.ply"));
+    assert!(rejection(&["--detector", "haris"], 2).contains("did you mean `harris`?"));
+    assert!(rejection(&["--features", "0"], 2).contains("features"));
+    assert!(rejection(&["--set", "detector.sigmma=2"], 2).contains("did you mean `sigma`?"));
+    assert!(rejection(&["--out", "/nowhere/cloud.ply"], 4).contains("/nowhere/cloud.ply"));
     let folder = TempDir::new().unwrap();
     let rig = folder.path().join("dataset.toml");
     let text = fs::read_to_string(sample("dataset.toml")).unwrap();

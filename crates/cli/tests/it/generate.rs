@@ -25,16 +25,16 @@ fn problems_and_truth_are_written_and_sound() {
     for (family, letter) in families.into_iter().zip(["a", "b", "c", "d", "e", "f", "g"]) {
         let out = folder.path().join(letter);
         let out_name = out.to_str().unwrap();
-        let (code, said, error) =
+        let (code, message, error) =
             seafix(&["generate", family, "--seed", "3", "--count", "2", "--first", "1", "--out", out_name]);
         assert_eq!(code, Some(0), "{error}");
-        assert!(said.starts_with("2 problems and their truth in "), "{said}");
+        assert!(message.starts_with("2 problems and their truth in "), "{message}");
         let expected: Vec<String> =
             (1..3).flat_map(|k| [".json", ".truth.json"].map(|end| format!("{letter}00{k}{end}"))).collect();
         assert_eq!(names(&out), expected);
         let problem = out.join(format!("{letter}001.json"));
-        let (code, said, _) = seafix(&["check", problem.to_str().unwrap()]);
-        assert_eq!(code, Some(0), "{said}");
+        let (code, message, _) = seafix(&["check", problem.to_str().unwrap()]);
+        assert_eq!(code, Some(0), "{message}");
     }
     let solved = seafix(&["solve", "--json", folder.path().join("a/a002.json").to_str().unwrap()]);
     assert_eq!(solved.0, Some(0), "{}", solved.2);

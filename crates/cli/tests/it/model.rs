@@ -45,8 +45,8 @@ fn model(folder: &Path, marks: &str, more: &[&str], code: i32) -> Ended {
 fn a_model_is_a_site_that_check_takes() {
     let folder = TempDir::new().unwrap();
     let marks = clicks();
-    let said = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D", "--out", "valve.toml"], 0).out;
-    assert!(said.ends_with("4 points; the object frame is that of B, C, D\n"), "{said}");
+    let message = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D", "--out", "valve.toml"], 0).out;
+    assert!(message.ends_with("4 points; the object frame is that of B, C, D\n"), "{message}");
     ended_with(0, program().arg("check").arg(folder.path().join("valve.toml")));
     // Without --out the site alone is printed.
     let printed = model(folder.path(), &marks, &["--id", "valve", "--base", "B,C,D"], 0).out;

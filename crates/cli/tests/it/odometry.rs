@@ -100,7 +100,7 @@ impl Sequence {
     }
 
     /// The standard error of a command that ends with `code`.
-    fn refusal(&self, more: &[&str], code: i32) -> String {
+    fn rejection(&self, more: &[&str], code: i32) -> String {
         let ended = self.odometry(more, code);
         assert!(ended.out.is_empty());
         ended.error
@@ -145,8 +145,8 @@ fn a_camera_that_is_turned_is_reported_and_turned_back() {
     let paths = Sequence::paths(&all);
     assert_eq!(paths.len(), PAIRS);
     assert!((paths[PAIRS - 1] - STEP * (PAIRS - 1) as f64).abs() < 0.005, "{paths:?}");
-    let said = sequence.refusal(&["--keep-rig"], 3);
-    assert!(said.contains("no motion can be computed"), "{said}");
+    let message = sequence.rejection(&["--keep-rig"], 3);
+    assert!(message.contains("no motion can be computed"), "{message}");
 }
 
 #[test]
@@ -161,8 +161,8 @@ fn the_path_is_found_written_and_reported() {
     // The number of threads changes nothing, and the file has the same poses.
     assert_eq!(sequence.json(&["--threads", "3"])["segments"], all["segments"]);
     let file = sequence.path("way.tum");
-    let said = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
-    assert!(said.starts_with(&format!("{PAIRS} poses of {PAIRS} stereo pairs over 0.28 m")), "{said}");
+    let message = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
+    assert!(message.starts_with(&format!("{PAIRS} poses of {PAIRS} stereo pairs over 0.28 m")), "{message}");
     let text = fs::read_to_string(&file).unwrap();
     let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
     assert_eq!(lines.len(), PAIRS);
@@ -191,7 +191,7 @@ fn what_cannot_be_used_is_left_out_and_reported() {
 }
 
 #[test]
-fn a_gap_and_a_leap_break_the_path() {
+fn a_gap_and_a_leap_break_the_trajectory() {
     let sequence = Sequence::new();
     sequence.frames(&[(0, 0), (1, 1), (80, 2), (81, 3)]);
     let all = sequence.json(&[]);
@@ -201,8 +201,8 @@ fn a_gap_and_a_leap_break_the_path() {
     let paths = Sequence::paths(&all);
     assert_eq!(paths[1], paths[2], "an unknown motion is not guessed");
     // Every motion exceeds the maximum speed: no motion is accepted.
-    let said = sequence.refusal(&["--set", "max-speed=0.1"], 3);
-    assert!(said.contains("0.1 m/s"), "{said}");
+    let message = sequence.rejection(&["--set", "max-speed=0.1"], 3);
+    assert!(message.contains("0.1 m/s"), "{message}");
     sequence.frames(&[(0, 0), (1, 1), (1_000_000_000, 2), (1_000_000_001, 3)]);
     let why = sequence.json(&[])["segments"][1]["broken"].to_string();
     assert!(why.contains("seconds and nanoseconds mixed?"), "{why}");
@@ -211,15 +211,15 @@ fn a_gap_and_a_leap_break_the_path() {
 #[test]
 fn what_cannot_be_is_refused_in_one_line() {
     let sequence = Sequence::new();
-    let refusal = |more: &[&str], code: i32| sequence.refusal(more, code);
-    assert!(refusal(&["--set", "window=0"], 2).contains("1 to 100"));
-    assert!(refusal(&["--odometry", "sterio"], 2).contains("did you mean `stereo`?"));
-    assert!(refusal(&["--set", "windou=3"], 2).contains("did you mean `window`?"));
-    assert!(refusal(&["--set", "follow.window=4"], 2).contains("odd number"));
-    assert!(refusal(&["--out", "/nowhere/way.tum"], 4).contains("/nowhere/way.tum"));
+    let rejection = |more: &[&str], code: i32| sequence.rejection(more, code);
+    assert!(rejection(&["--set", "window=0"], 2).contains("1 to 100"));
+    assert!(rejection(&["--odometry", "sterio"], 2).contains("did you mean `stereo`?"));
+    assert!(rejection(&["--set", "windou=3"], 2).contains("did you mean `window`?"));
+    assert!(rejection(&["--set", "follow.window=4"], 2).contains("odd number"));
+    assert!(rejection(&["--out", "/nowhere/way.tum"], 4).contains("/nowhere/way.tum"));
     sequence.frames(&[(0, 0), (1, 1), (1, 2)]);
-    let said = refusal(&[], 3);
-    assert!(said.contains("frames.csv:4") && said.contains("not later than the previous one"), "{said}");
+    let message = rejection(&[], 3);
+    assert!(message.contains("frames.csv:4") && message.contains("not later than the previous one"), "{message}");
 }
 
 /// Two pairs with too few points are followed by a new segment with the reason of the break.
@@ -232,8 +232,8 @@ fn no_break_goes_unannounced() {
     assert_eq!((segments.len(), all["left_out"].as_array().unwrap().len()), (2, 2), "{all}");
     assert!(segments[0]["broken"].is_null() && segments[1]["broken"].is_string(), "{all}");
     let file = sequence.path("way.tum");
-    let said = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
-    assert!(said.contains("broken before 1.500000000 s"), "{said}");
+    let message = sequence.odometry(&["--out", file.to_str().unwrap()], 0).out;
+    assert!(message.contains("broken before 1.500000000 s"), "{message}");
     assert!(fs::read_to_string(&file).unwrap().contains("# broken"));
 }
 
@@ -244,19 +244,22 @@ fn no_motion_is_no_result() {
     let out = ["--out", file.to_str().unwrap()];
     let nothing = || !file.exists() && !sequence.path("way.tum.partial").exists();
     sequence.frames(&[(0, 0)]);
-    let said = sequence.refusal(&out, 3);
-    assert!(said.contains("1 pose from 1 stereo pair; a motion needs at least two") && nothing(), "{said}");
+    let message = sequence.rejection(&out, 3);
+    assert!(message.contains("1 pose from 1 stereo pair; a motion needs at least two") && nothing(), "{message}");
     let black = [format!("P5\n{} {}\n255\n", SIZE[0], SIZE[1]).into_bytes(), vec![0; SIZE[0] * SIZE[1]]].concat();
     (0..3).for_each(|pair| sequence.put(&format!("l{pair}.pgm"), &black));
     sequence.frames(&[(0, 0), (1, 1), (2, 2)]);
-    let said = sequence.refusal(&out, 3);
-    assert!(said.contains("0 poses from 3 stereo pairs; 3 skipped: the left image is blank"), "{said}");
+    let message = sequence.rejection(&out, 3);
+    assert!(message.contains("0 poses from 3 stereo pairs; 3 skipped: the left image is blank"), "{message}");
     assert!(nothing());
     // More than half of the images are missing: each is named once, then the rule.
     sequence.frames(&[(0, 20), (1, 21), (2, 5)]);
-    let said = sequence.refusal(&out, 3);
-    assert!(said.contains("fewer than half of the stereo pairs can be read") && said.contains("1 of 3"), "{said}");
-    assert_eq!(said.matches("l20.pgm").count(), 1, "{said}");
+    let message = sequence.rejection(&out, 3);
+    assert!(
+        message.contains("fewer than half of the stereo pairs can be read") && message.contains("1 of 3"),
+        "{message}"
+    );
+    assert_eq!(message.matches("l20.pgm").count(), 1, "{message}");
     assert!(nothing());
 }
 
@@ -268,8 +271,8 @@ fn exchanged_images_are_refused() {
         sequence.put(&format!("r{pair}.pgm"), view(x));
         sequence.put(&format!("l{pair}.pgm"), view(x + BASELINE));
     }
-    let said = sequence.refusal(&[], 3);
-    assert!(said.contains("exchanged left and right"), "{said}");
+    let message = sequence.rejection(&[], 3);
+    assert!(message.contains("exchanged left and right"), "{message}");
 }
 
 /// Seen to fail when the two images are not compared: a pair without depth was reported as one that cannot be tracked.
@@ -282,8 +285,8 @@ fn one_image_twice_is_left_out_or_refused() {
     assert!(why.len() == 1 && why[0].contains("identical left and right images"), "{why:?}");
     assert_eq!(Sequence::paths(&all).len(), PAIRS - 1);
     (0..PAIRS).for_each(|pair| sequence.put(&format!("r{pair}.pgm"), view(STEP * pair as f64)));
-    let said = sequence.refusal(&[], 3);
-    assert!(said.contains("identical left and right images") && said.contains("l0.pgm"), "{said}");
+    let message = sequence.rejection(&[], 3);
+    assert!(message.contains("identical left and right images") && message.contains("l0.pgm"), "{message}");
 }
 
 /// Dead reckoning uses the tables of Doppler log and gyro, not the images; a data set without the tables is rejected.
@@ -291,8 +294,8 @@ fn one_image_twice_is_left_out_or_refused() {
 fn readings_lead_the_path() {
     let sequence = Sequence::new();
     let by_readings = ["--odometry", "dvl-gyro"];
-    let said = sequence.refusal(&by_readings, 3);
-    assert!(said.contains("no readings for odometry `dvl-gyro`") && said.contains("doppler"), "{said}");
+    let message = sequence.rejection(&by_readings, 3);
+    assert!(message.contains("no readings for odometry `dvl-gyro`") && message.contains("doppler"), "{message}");
     let text = fs::read_to_string(sequence.path("dataset.toml")).unwrap();
     let named =
         text.replace("dataset/1\"", "dataset/1.2\"").replace("[rig]", "doppler = \"d.csv\"\ngyro = \"g.csv\"\n[rig]");
@@ -313,7 +316,7 @@ fn readings_lead_the_path() {
     assert!(paths.iter().enumerate().all(|(pair, x)| (x - STEP * pair as f64).abs() < 1e-9), "{paths:?}");
     assert!(all["landmarks"].is_null() && all["warnings"].as_array().unwrap().is_empty(), "{all}");
     fs::remove_file(sequence.path("g.csv")).unwrap();
-    assert!(sequence.refusal(&by_readings, 3).contains("g.csv"));
+    assert!(sequence.rejection(&by_readings, 3).contains("g.csv"));
 }
 
 #[test]
@@ -328,7 +331,7 @@ fn pairs_out_of_order_are_sorted_on_request() {
     let sequence = Sequence::new();
     let sorted = Sequence::paths(&sequence.json(&[]));
     sequence.frames(&[(0, 0), (2, 2), (1, 1), (3, 3), (3, 5), (4, 4), (5, 5), (6, 6), (7, 7)]);
-    assert!(sequence.refusal(&[], 3).contains("frames.csv:4"));
+    assert!(sequence.rejection(&[], 3).contains("frames.csv:4"));
     assert_eq!(Sequence::paths(&sequence.json(&["--sort-stamps"])), sorted);
 }
 
@@ -347,10 +350,10 @@ fn impossible_times_are_reported() {
     assert!(leap.contains("warning: stamps with a gap of more than a year in") && leap.contains("mixed?"), "{leap}");
     let near = stamped(&|k| 1_000_000_000 + 100 * k);
     assert!(near.contains("warning: pairs too close in time in") && near.contains("one of 7"), "{near}");
-    let said = sequence.refusal(&[], 3);
+    let message = sequence.rejection(&[], 3);
     assert!(
-        said.contains("because 0.000100 ms passed: are the stamps right?") && said.contains("check the stamps"),
-        "{said}"
+        message.contains("because 0.000100 ms passed: are the stamps right?") && message.contains("check the stamps"),
+        "{message}"
     );
     assert!(!stamped(&|k| 1_000_000_000 + k * 100_000_000).contains("warning"), "sound stamps");
 }
@@ -403,10 +406,10 @@ fn a_part_of_the_vehicle_is_no_ground() {
     for fraction in [0.5, 0.65, 0.8] {
         // Finally the ground is out of view.
         sequence.overlay(|pair| (if pair < 5 { fraction } else { 0.97 }, STEP * pair as f64, 1.0));
-        let said = sequence.refusal(&[], 3);
+        let message = sequence.rejection(&[], 3);
         assert!(
-            said.contains("are static in the image") && said.contains("parts of the vehicle"),
-            "{fraction}: {said}"
+            message.contains("are static in the image") && message.contains("parts of the vehicle"),
+            "{fraction}: {message}"
         );
     }
 }
@@ -418,10 +421,10 @@ fn a_part_of_the_vehicle_is_no_ground() {
 fn much_that_disagrees_is_reported() {
     let sequence = Sequence::new();
     sequence.overlay(|pair| (0.5, STEP * pair as f64, 1.0 - STEP * pair as f64));
-    let said = sequence.odometry(&[], 0).error;
+    let message = sequence.odometry(&[], 0).error;
     assert!(
-        said.contains("of the landmarks agree with the motion") && said.contains("a part of the vehicle"),
-        "{said}"
+        message.contains("of the landmarks agree with the motion") && message.contains("a part of the vehicle"),
+        "{message}"
     );
 }
 

@@ -203,7 +203,7 @@ fn two_runs_in_one_folder() {
 
 /// Seen to fail when the contents of the folder are not checked.
 #[test]
-fn a_run_that_is_there_stays_unless_reported_otherwise() {
+fn a_run_that_exists_stays_unless_it_is_to_be_replaced() {
     let folder = experiment(4);
     let folder = folder.path();
     let run = |more: &[&str]| ended(&run(folder, "out", more).output().unwrap());
@@ -255,40 +255,40 @@ fn a_recovered_log_counts_as_what_it_is() {
     let log = "whole/001-solver-kabsch.mcap";
     let bytes = fs::read(folder.join(log)).unwrap();
     fs::create_dir(folder.join("saved")).unwrap();
-    let said = |arguments: &[&str]| {
+    let message = |arguments: &[&str]| {
         let output = seafix(folder, arguments).stdout(Stdio::piped()).output().unwrap();
-        let said = [output.stdout, output.stderr].concat();
-        (output.status.code(), String::from_utf8(said).unwrap())
+        let message = [output.stdout, output.stderr].concat();
+        (output.status.code(), String::from_utf8(message).unwrap())
     };
     // Recovery of a complete log changes nothing.
-    assert_eq!(said(&["recover", log, "--out", "saved/a.mcap"]).0, Some(0));
-    let (code, text) = said(&["check", "saved/a.mcap"]);
+    assert_eq!(message(&["recover", log, "--out", "saved/a.mcap"]).0, Some(0));
+    let (code, text) = message(&["check", "saved/a.mcap"]);
     assert!(code == Some(0) && !text.contains("warning"), "{text}");
     fs::remove_file(folder.join("saved/a.mcap")).unwrap();
     fs::write(folder.join("cut.mcap"), &bytes[..bytes.len() * 3 / 4]).unwrap();
-    let (code, text) = said(&["recover", "cut.mcap", "--out", "saved/a.mcap"]);
+    let (code, text) = message(&["recover", "cut.mcap", "--out", "saved/a.mcap"]);
     assert!(
         code == Some(0) && text.contains("claims more than the") && !text.contains("18446744073709551615"),
         "{text}"
     );
-    let (code, text) = said(&["check", "saved/a.mcap"]);
+    let (code, text) = message(&["check", "saved/a.mcap"]);
     assert!(code == Some(0) && text.contains("warning: a log recovered from an incomplete one"), "{text}");
-    let (code, text) = said(&["report", "saved"]);
+    let (code, text) = message(&["report", "saved"]);
     assert!(code == Some(0) && text.contains("warning: a.mcap: recovered from an incomplete log"), "{text}");
     let page = fs::read_to_string(folder.join("saved/report/report.html")).unwrap();
     assert!(page.contains("No number here includes the lost part"));
     for command in [&["diff", "whole", "saved"][..], &["merge", "saved", "--out", "merged"]] {
-        let (code, text) = said(command);
+        let (code, text) = message(command);
         assert!(code == Some(3) && text.contains("logs recovered from an incomplete run"), "{text}");
     }
-    let (code, text) = said(&["replay", "saved/a.mcap", "--untimed", "--out", "again"]);
+    let (code, text) = message(&["replay", "saved/a.mcap", "--untimed", "--out", "again"]);
     assert!(code == Some(0) && text.contains("a log recovered from an incomplete one"), "{text}");
     // A record with a damaged head may declare any length.
     let mut broken = bytes.clone();
     let middle = bytes.len() / 2;
     broken[middle..].fill(0xff);
     fs::write(folder.join("broken.mcap"), &broken).unwrap();
-    let (_, text) = said(&["recover", "broken.mcap"]);
+    let (_, text) = message(&["recover", "broken.mcap"]);
     assert!(!text.contains("18446744073709551615"), "{text}");
 }
 
@@ -482,7 +482,7 @@ fn fail(takes: impl Fn(u64) -> bool) {
 }
 
 #[test]
-fn a_full_disk_is_stated_and_nothing_is_lost() {
+fn a_full_disk_is_reported_and_nothing_is_lost() {
     fail(|every| every % 61 == 1);
 }
 

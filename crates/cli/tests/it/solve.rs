@@ -47,9 +47,12 @@ fn a_fix_states_what_supports_it() {
     for (fraction, is) in [(1.01, "within"), (0.99, "beyond")] {
         let limit = fraction * level;
         let output = solve(&[&problem(&folder), "--set", &format!("acceptance.alert-limit={limit}")]);
-        let said = String::from_utf8(output.stdout).unwrap();
+        let message = String::from_utf8(output.stdout).unwrap();
         let expected = format!("; {is} the alert limit of {limit:.3} m");
-        assert!(said.contains(&format!("protection level {level:.3} m, ")) && said.contains(&expected), "{said}");
+        assert!(
+            message.contains(&format!("protection level {level:.3} m, ")) && message.contains(&expected),
+            "{message}"
+        );
     }
 }
 
@@ -73,10 +76,10 @@ fn nearly_symmetric(folder: &tempfile::TempDir, off: f64) -> String {
 ///
 /// Seen to fail when levels ignore alternative poses.
 #[test]
-fn a_level_that_is_missing_states_why() {
+fn a_missing_level_has_a_reason() {
     let folder = tempfile::tempdir().unwrap();
-    let said = |off| String::from_utf8(solve(&[&nearly_symmetric(&folder, off)]).stdout).unwrap();
-    assert!(said(4.0).contains("ambiguous"), "{}", said(4.0));
+    let message = |off| String::from_utf8(solve(&[&nearly_symmetric(&folder, off)]).stdout).unwrap();
+    assert!(message(4.0).contains("ambiguous"), "{}", message(4.0));
     let file = nearly_symmetric(&folder, 7.0);
     let answer: Value = serde_json::from_slice(&solve(&[&file, "--json"]).stdout).unwrap();
     let integrity = &answer["integrity"];
@@ -87,8 +90,8 @@ fn a_level_that_is_missing_states_why() {
          not protected within the alert limit of {:.3} m",
         integrity["alert_limit"].as_f64().unwrap()
     );
-    assert!(said(7.0).contains(&expected), "{}", said(7.0));
-    assert!(said(8.0).contains("  protection level 0.0"), "{}", said(8.0));
+    assert!(message(7.0).contains(&expected), "{}", message(7.0));
+    assert!(message(8.0).contains("  protection level 0.0"), "{}", message(8.0));
 }
 
 #[test]
@@ -97,9 +100,9 @@ fn a_solver_of_pixels_is_refused_on_points_alone() {
     let file = problem(&folder);
     for name in ["l-bfgs", "nelder-mead", "p3p-stereo", "stereo-reprojection"] {
         let output = solve(&[&file, "--solver", name]);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{name}: {said}");
-        assert!(said.contains(name) && said.contains("`mahalanobis`") && output.stdout.is_empty(), "{said}");
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{name}: {message}");
+        assert!(message.contains(name) && message.contains("`mahalanobis`") && output.stdout.is_empty(), "{message}");
     }
 }
 
@@ -108,14 +111,14 @@ fn a_solver_of_pixels_is_refused_on_points_alone() {
 fn settings_are_used_and_wrong_ones_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = problem(&folder);
-    let said = |settings: &[&str]| {
+    let message = |settings: &[&str]| {
         let output = solve(&[&["--json", &path], settings].concat());
         let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap()).concat();
         (output.status.code().unwrap(), text)
     };
-    let (code, text) = said(&["--search", "maximum-clique", "--set", "search.budget=1"]);
+    let (code, text) = message(&["--search", "maximum-clique", "--set", "search.budget=1"]);
     assert!(code == 0 && text.contains(r#""reason":"budget""#), "{text}");
-    let (code, text) = said(&["--set", "acceptance.min-points=100"]);
+    let (code, text) = message(&["--set", "acceptance.min-points=100"]);
     assert!(code == 0 && text.contains(r#""outcome":"rejected""#), "{text}");
     for (setting, named) in [
         ("search.budgte=1", "`budgte`, did you mean `budget`?"),
@@ -123,7 +126,7 @@ fn settings_are_used_and_wrong_ones_named() {
         ("detector.sigma=1.5", "`detector`"),
         ("acceptance.absence=2.0", "absence"),
     ] {
-        let (code, text) = said(&["--set", setting]);
+        let (code, text) = message(&["--set", setting]);
         assert!(code == 2 && text.contains(named) && text.lines().count() == 1, "{setting}: {code} {text}");
     }
 }

@@ -87,10 +87,10 @@ pub(crate) fn differs(name: &str, encoding: &str, definition: &str) -> Option<St
         (0..count).find_map(|index| {
             let found = fields.get(index).map(|(kind, field)| format!("{kind} {field}"));
             let known = known.get(index).map(|(kind, field)| format!("{kind} {field}"));
-            let said =
+            let message =
                 |field: &Option<String>| field.as_deref().map_or("nothing".to_owned(), |field| format!("`{field}`"));
             (found != known)
-                .then(|| format!("field {} of {name} is {}, expected {}", index + 1, said(&found), said(&known)))
+                .then(|| format!("field {} of {name} is {}, expected {}", index + 1, message(&found), message(&known)))
         })
     })
 }

@@ -144,7 +144,7 @@ module sensor_msgs { module msg {
     fn structures_are_compared_field_by_field() {
         let of = |text: &str| differs("sensor_msgs/msg/CameraInfo", "ros2idl", text);
         assert_eq!(of(INFO), None);
-        let said = of(&INFO.replace("sequence<double> d", "sequence<float> d")).unwrap();
-        assert_eq!(said, "field 5 of sensor_msgs/CameraInfo is `float32[] d`, expected `float64[] d`");
+        let message = of(&INFO.replace("sequence<double> d", "sequence<float> d")).unwrap();
+        assert_eq!(message, "field 5 of sensor_msgs/CameraInfo is `float32[] d`, expected `float64[] d`");
     }
 }

@@ -115,11 +115,11 @@ pub(crate) fn contradiction(
     if agrees(&rectified) || mounted.as_ref().is_some_and(agrees) {
         return Ok(None);
     }
-    let said = |t: &Vector3<f64>, turned: f64| {
+    let message = |t: &Vector3<f64>, turned: f64| {
         let turned = if turned > 1e-3 { format!(", turned by {:.1}°", turned.to_degrees()) } else { String::new() };
         format!("{:.4} m at [{:.3}, {:.3}, {:.3}]{turned}", t.norm(), t.x, t.y, t.z)
     };
     let p = mounted.unwrap_or(rectified);
-    let of = |which: &Transform<RightCamera, Camera>| said(&which.translation(), which.rotation().angle());
+    let of = |which: &Transform<RightCamera, Camera>| message(&which.translation(), which.rotation().angle());
     Ok(Some(format!("P gives {}, /tf {}", of(&p), of(stands))))
 }

@@ -85,11 +85,11 @@ impl Bag {
 
     /// The poses of the left camera at the stamps of the pairs, with covariances if there are any. `said` is a topic of
     /// odometry, or `tf:FRAME` for the pose of the camera in that frame.
-    pub(super) fn poses(&self, said: &str) -> Result<Poses, Fault> {
+    pub(super) fn poses(&self, text: &str) -> Result<Poses, Fault> {
         let (recording, settings) = (&self.recording, &self.settings);
         let reader = Messages { path: &self.path, recording, settings, warnings: Vec::new() };
         let at: Vec<u64> = self.pairs.iter().map(|(stamp, _)| *stamp).collect();
-        reader.poses(said, &self.tree, &self.frames[0], &at)
+        reader.poses(text, &self.tree, &self.frames[0], &at)
     }
 
     /// A summary in one line.
@@ -294,14 +294,14 @@ impl Messages<'_> {
         // Some drivers name one frame for both images; the transform between the cameras is then unknown.
         let of_tree = (left != right).then(|| tree.look_up(right, left, stamp, self.settings.gap_ns())).flatten();
         if let (Some(_), Some(stands)) = (&calibrated, &of_tree) {
-            let said = ros::contradiction(&infos[0], &infos[1], stands).map_err(|what| fault(1, what))?;
-            if let Some(said) = said {
+            let text = ros::contradiction(&infos[0], &infos[1], stands).map_err(|what| fault(1, what))?;
+            if let Some(text) = text {
                 let what = "P and the transforms give different poses of the cameras".to_owned();
                 let remedy = format!(
                     "correct {} or the transform `{right}` from `{left}`; without the transform, P is used alone",
                     topics.infos[1]
                 );
-                return Err(fault(1, what).value(said).remedy(remedy));
+                return Err(fault(1, what).value(text).remedy(remedy));
             }
         }
         let stands = calibrated.or(of_tree).ok_or_else(|| {
@@ -314,12 +314,12 @@ impl Messages<'_> {
 
     /// The poses of the left camera, with covariances if there are any. `said` is a topic of odometry, or `tf:FRAME`
     /// for the pose of the camera in that frame.
-    fn poses(&self, said: &str, tree: &Tree, camera: &str, stamps: &[u64]) -> Result<Poses, Fault> {
+    fn poses(&self, text: &str, tree: &Tree, camera: &str, stamps: &[u64]) -> Result<Poses, Fault> {
         let gap = self.settings.gap_ns();
-        if said.is_empty() {
+        if text.is_empty() {
             return Ok((Vec::new(), None));
         }
-        if let Some(frame) = said.strip_prefix("tf:") {
+        if let Some(frame) = text.strip_prefix("tf:") {
             let poses: Vec<_> =
                 stamps.iter().filter_map(|&stamp| Some((stamp, tree.look_up(frame, camera, stamp, gap)?))).collect();
             if poses.is_empty() {
@@ -330,7 +330,7 @@ impl Messages<'_> {
             return Ok((poses, None));
         }
         let (mut poses, mut covariances) = (Vec::new(), Vec::new());
-        for entry in self.of(said) {
+        for entry in self.of(text) {
             let message = self.read(entry, Odometry::decode)?;
             let child_from_camera: Transform<Child, Camera> = match message.child.trim_start_matches('/') {
                 "" => Transform::identity(),
@@ -345,10 +345,10 @@ impl Messages<'_> {
             covariances.push(ros::covariance(&message, &child_from_camera));
         }
         if poses.windows(2).any(|pair| pair[0].0 >= pair[1].0) {
-            return Err(Fault::new("stamps that do not increase", self.path).value(said));
+            return Err(Fault::new("stamps that do not increase", self.path).value(text));
         }
         if poses.is_empty() {
-            return Err(Fault::new("a topic without messages", self.path).value(said));
+            return Err(Fault::new("a topic without messages", self.path).value(text));
         }
         Ok((poses, covariances.into_iter().collect()))
     }

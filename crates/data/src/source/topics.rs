@@ -32,14 +32,14 @@ impl Topics {
             ["", ""] => find.by_name()?,
             [left, right] => [find.called(left, "left", &IMAGES)?, find.called(right, "right", &IMAGES)?],
         };
-        let info = |side: usize, said: &str, key: &str| match said {
+        let info = |side: usize, message: &str, key: &str| match message {
             "" => find.called(&beside(&images[side].name), key, &INFOS),
-            said => find.called(said, key, &INFOS),
+            message => find.called(message, key, &INFOS),
         };
         let infos = [info(0, &settings.left_info, "left-info")?, info(1, &settings.right_info, "right-info")?];
-        for (key, said) in [("prior", &settings.prior), ("truth", &settings.truth)] {
-            if !said.is_empty() && !said.starts_with("tf:") {
-                find.called(said, key, &ODOMETRY)?;
+        for (key, message) in [("prior", &settings.prior), ("truth", &settings.truth)] {
+            if !message.is_empty() && !message.starts_with("tf:") {
+                find.called(message, key, &ODOMETRY)?;
             }
         }
         for name in ["/tf", "/tf_static"] {

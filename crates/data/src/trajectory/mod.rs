@@ -246,8 +246,8 @@ mod tests {
             assert_eq!(read(&trajectory.print(format)).unwrap().breaks, [2], "{format:?}");
         }
         std::fs::write(&file, "2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 2\n").unwrap();
-        let said = Trajectory::read_repaired(&file).unwrap_err().to_string();
-        assert!(said.contains("unit length") && said.contains("walk:2"), "a fault keeps its line: {said}");
+        let message = Trajectory::read_repaired(&file).unwrap_err().to_string();
+        assert!(message.contains("unit length") && message.contains("walk:2"), "a fault keeps its line: {message}");
     }
 
     #[test]

@@ -126,7 +126,7 @@ fn a_right_mark_that_the_images_contradict_is_reported() {
 fn marks_that_mean_no_point_are_refused_with_their_line() {
     let sequence = sample();
     let (_, text) = marks(&*sequence, 2, 1.0, true);
-    let refusal = |text: &str, base: Option<[&str; 3]>| {
+    let rejection = |text: &str, base: Option<[&str; 3]>| {
         model(&*sequence, 2, text, base.map(|base| base.map(str::to_owned))).unwrap_err()
     };
     let lines: Vec<&str> = text.lines().collect();
@@ -135,15 +135,15 @@ fn marks_that_mean_no_point_are_refused_with_their_line() {
     let (mut third, other) = (split(lines[3]), split(lines[5]));
     third[3..].clone_from_slice(&other[3..]);
     let crossed = text.replace(lines[3], &third.join(","));
-    let said = refusal(&crossed, None);
-    assert!(said.contains("clicks.csv:4") && said.contains("px off the epipolar line"), "{said}");
+    let message = rejection(&crossed, None);
+    assert!(message.contains("clicks.csv:4") && message.contains("px off the epipolar line"), "{message}");
     // Two marks are on one corner.
     let (mut fifth, third) = (split(lines[5]), split(lines[3]));
     fifth[1..].clone_from_slice(&third[1..]);
-    let said = refusal(&text.replace(lines[5], &fifth.join(",")), None);
-    assert!(said.contains("clicks.csv:6") && said.contains("a mark of the same corner as `"), "{said}");
-    let said = refusal(&text, Some(["M1", "M2", "M33"]));
-    assert!(said.contains("`M33`; did you mean `M3`?"), "{said}");
-    let said = refusal(&text, Some(["M1", "M2", "M2"]));
-    assert!(said.starts_with("the base points are nearly on a line"), "{said}");
+    let message = rejection(&text.replace(lines[5], &fifth.join(",")), None);
+    assert!(message.contains("clicks.csv:6") && message.contains("a mark of the same corner as `"), "{message}");
+    let message = rejection(&text, Some(["M1", "M2", "M33"]));
+    assert!(message.contains("`M33`; did you mean `M3`?"), "{message}");
+    let message = rejection(&text, Some(["M1", "M2", "M2"]));
+    assert!(message.starts_with("the base points are nearly on a line"), "{message}");
 }

@@ -70,7 +70,7 @@ mod tests {
     use crate::clopper_pearson;
 
     #[test]
-    fn few_events_state_little_and_no_fraction_that_was_seen_is_left_out() {
+    fn few_events_give_wide_intervals_that_hold_the_observed_fraction() {
         // Three separate events in seven trials, blocks of two: the effective number of trials is 1.8 times smaller.
         let (low, high) = clustered(&[true, false, true, false, true, false, false], 2, 0.95);
         assert!(low > 0.02 && low < 0.1 && high > 0.8 && high < 0.95, "{low} {high}");

@@ -66,11 +66,11 @@ pub fn remake(
     for trial in &group.trials {
         let name = &trial.name;
         if !table.contains(&rows(&sealed, name).map_err(|error| RunError::unwritable(scratch.0, error))?) {
-            differing.push(format!("{name}: rows of {}", said(group, &piece)));
+            differing.push(format!("{name}: rows of {}", message(group, &piece)));
         }
         let (made, log) = (Reader::open(&sealed.log(name))?, Reader::open(&folder.join(format!("{name}.mcap")))?);
         if !in_log(made, log)? {
-            differing.push(format!("{name}: logged frames among {}", said(group, &piece)));
+            differing.push(format!("{name}: logged frames among {}", message(group, &piece)));
         }
     }
     Ok(Remade { frames: piece.frames() * group.trials.len(), differing })
@@ -92,7 +92,7 @@ impl Drop for Scratch<'_> {
     }
 }
 
-fn said(group: &group::Group<'_>, piece: &Piece) -> String {
+fn message(group: &group::Group<'_>, piece: &Piece) -> String {
     let number = |index: usize| group.sequence.number(index);
     format!("frames {} to {}", number(piece.first), number(piece.end.max(piece.first + 1) - 1))
 }

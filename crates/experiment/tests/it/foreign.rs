@@ -153,9 +153,9 @@ fn images_beyond_the_last_stamp_are_reported() {
     };
     more(count);
     let all = Dataset::open(&sequence).unwrap();
-    let said = all.warnings[0].to_string();
+    let message = all.warnings[0].to_string();
     assert_eq!(all.frames.len(), count);
-    assert!(said.contains(&format!("{count} stamps, {0} left and {0} right images", count + 1)), "{said}");
+    assert!(message.contains(&format!("{count} stamps, {0} left and {0} right images", count + 1)), "{message}");
     (count..=2 * count).for_each(more);
     assert!(Dataset::open(&sequence).unwrap_err()[0].to_string().contains("images without a stamp"));
 }
@@ -182,18 +182,18 @@ fn a_site_makes_them_sources() {
 
 #[test]
 fn faults_name_file_and_line() {
-    let said = |at: &Path, file: &str, from: &str, to: &str| {
+    let message = |at: &Path, file: &str, from: &str, to: &str| {
         let path = at.join(file);
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.contains(from), "{text}");
         fs::write(&path, text.replacen(from, to, 1)).unwrap();
-        let said = Dataset::open(at).map(|_| ()).unwrap_err()[0].to_string();
+        let message = Dataset::open(at).map(|_| ()).unwrap_err()[0].to_string();
         fs::write(&path, text).unwrap();
-        said
+        message
     };
     let folder = TempDir::new().unwrap();
     euroc(folder.path());
-    let of = |file: &str, from: &str, to: &str| said(&folder.path().join("mav0"), file, from, to);
+    let of = |file: &str, from: &str, to: &str| message(&folder.path().join("mav0"), file, from, to);
     let sheet = "cam1/sensor.yaml";
     let distortion = of(sheet, "radial-tangential", "equidistant");
     assert!(
@@ -213,7 +213,7 @@ fn faults_name_file_and_line() {
 
     let folder = TempDir::new().unwrap();
     let sequence = kitti(folder.path());
-    let of = |file: &str, from: &str, to: &str| said(&sequence, file, from, to);
+    let of = |file: &str, from: &str, to: &str| message(&sequence, file, from, to);
     assert!(of("calib.txt", "P3:", "P9:").contains("no line `P3:`"));
     assert!(of("calib.txt", "P3: ", "P3: 7.0 ").contains("calib.txt:4"));
     assert!(of("times.txt", "\n", "\nx\n").contains("times.txt:2: x"));

@@ -67,7 +67,7 @@ fn a_pose_graph_goes_from_run_to_run() {
 fn a_pose_graph_that_is_not_meant_is_refused() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("none.pose-graph"), "{\"format\": 3}\n").unwrap();
-    let said = |pose_graph: &str| {
+    let message = |pose_graph: &str| {
         let plan = planned(folder.path(), "e.toml", pose_graph);
         let done = run(&plan, &Options::into(folder.path().join("run")), &Silent);
         let Err(RunError::Input(faults)) = done else { panic!("{pose_graph}: {done:?}") };
@@ -79,7 +79,7 @@ fn a_pose_graph_that_is_not_meant_is_refused() {
         ("read = 'none.pose-graph'", "none.pose-graph"),
         ("read = 'none.pose-graph', sha256 = '00'", "a pose graph with another SHA-256 than expected"),
     ] {
-        let line = said(pose_graph);
+        let line = message(pose_graph);
         assert!(line.contains(what) && line.lines().count() == 1, "{line}");
     }
 }

@@ -111,8 +111,8 @@ fn every_frame_has_an_object_of_its_own() {
     }
     // A coherence problem needs a single object as target.
     for kind in ["site", "joint"] {
-        let said = run(&write(&format!("target = '{kind}'")), &Options::into(folder.path().join(kind)), &Silent);
-        assert!(said.unwrap_err().to_string().contains("use target = \"object\""));
+        let message = run(&write(&format!("target = '{kind}'")), &Options::into(folder.path().join(kind)), &Silent);
+        assert!(message.unwrap_err().to_string().contains("use target = \"object\""));
     }
 }
 
@@ -148,7 +148,7 @@ fn faults_name_the_file() {
     let all = folder.path().join("all");
     draw(&all, Family::A, 2);
     let file = folder.path().join("e.toml");
-    let said = |pipeline: &str| {
+    let message = |pipeline: &str| {
         fs::write(&file, format!("question = 'Which?'\n{FILES}\n[pipeline]\n{pipeline}\n")).unwrap();
         match Plan::read(&file, &[]) {
             Err(faults) => faults[0].to_string(),
@@ -157,24 +157,24 @@ fn faults_name_the_file() {
                 .to_string(),
         }
     };
-    let pixels = said("solver = 'stereo-reprojection'");
+    let pixels = message("solver = 'stereo-reprojection'");
     assert!(
         pixels.contains("needs pixels") && pixels.contains("use `mahalanobis` in ") && pixels.contains("e.toml:4"),
         "{pixels}"
     );
-    assert!(said("").contains("needs pixels"));
+    assert!(message("").contains("needs pixels"));
     let sound = "solver = 'mahalanobis'";
     fs::copy(all.join("paper-scale/a000.json"), all.join("paper-scale/a009.json")).unwrap();
-    assert!(said(sound).contains("two problems with the same `id`"));
+    assert!(message(sound).contains("two problems with the same `id`"));
     fs::write(all.join("paper-scale/a009.json"), "{").unwrap();
-    assert!(said(sound).contains("a009.json:1"));
+    assert!(message(sound).contains("a009.json:1"));
     fs::remove_file(all.join("paper-scale/a009.json")).unwrap();
     fs::write(all.join("paper-scale/a001.truth.json"), r#"{"T_cam_obj": [], "pairs": [], "pose_defined": false}"#)
         .unwrap();
-    assert!(said(sound).contains("a001.truth.json"));
+    assert!(message(sound).contains("a001.truth.json"));
     fs::remove_dir_all(&all).unwrap();
-    assert!(said(sound).contains("no such file or folder"));
+    assert!(message(sound).contains("no such file or folder"));
     fs::create_dir(&all).unwrap();
-    assert!(said(sound).contains("no coherence problem in"));
+    assert!(message(sound).contains("no coherence problem in"));
     assert!(!folder.path().join("out").exists(), "nothing is written before inputs are checked");
 }

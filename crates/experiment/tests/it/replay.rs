@@ -144,17 +144,17 @@ fn a_damaged_log_is_not_replayed() {
     let (_, log) = logged(folder.path(), EXPERIMENTS[0].1, &[]);
     let bytes = fs::read(&log).unwrap();
     let plan = Replay::default().plan(&log).unwrap();
-    let said = |bytes: &[u8]| {
+    let message = |bytes: &[u8]| {
         fs::write(&log, bytes).unwrap();
         run(&plan, &Options { threads: 1, ..Options::into(folder.path().join("out")) }, &Silent)
             .unwrap_err()
             .to_string()
     };
-    assert!(said(&bytes[..bytes.len() - 30]).contains("no footer"));
+    assert!(message(&bytes[..bytes.len() - 30]).contains("no footer"));
     let mut flipped = bytes.clone();
     flipped[bytes.len() / 2] ^= 1;
-    let refused = said(&flipped);
+    let refused = message(&flipped);
     assert!(refused.contains("damaged") && refused.contains("byte"), "{refused}");
-    assert!(said(b"SQLite format 3\0").contains("ROS 2 bag in SQLite"));
+    assert!(message(b"SQLite format 3\0").contains("ROS 2 bag in SQLite"));
     assert!(!folder.path().join("out").exists());
 }

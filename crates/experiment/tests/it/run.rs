@@ -112,7 +112,7 @@ fn a_pose_is_carried_between_fixes() {
 ///
 /// Seen to fail when a frame without motion is in state `prior` and no fix is due.
 #[test]
-fn images_that_report_nothing_leave_the_pose_known() {
+fn images_without_content_leave_the_pose_known() {
     let folder = TempDir::new().unwrap();
     let dark = "source.faults=[{ device = 'images', kind = 'off', from = 30.9, to = 31.1, amount = 0.0 }]";
     let log = logs(folder.path(), SESSION, &[dark], 2).remove(0);
@@ -128,7 +128,7 @@ fn images_that_report_nothing_leave_the_pose_known() {
 #[test]
 fn settings_of_navigation_are_checked() {
     let folder = TempDir::new().unwrap();
-    let said = |experiment: &str| {
+    let message = |experiment: &str| {
         let file = folder.path().join("e.toml");
         fs::write(&file, experiment).unwrap();
         match Plan::read(&file, &[]) {
@@ -137,16 +137,16 @@ fn settings_of_navigation_are_checked() {
         }
     };
     let dive = "question = 'why'\nsource = 'dive'\n";
-    assert!(said(&format!("{dive}[navigation]\npolicy = 'intervals'\n")).contains("interval"));
-    assert!(said(&format!("{dive}[pipeline]\ntarget = 'joint'\n[navigation]\n")).contains("target = \"object\""));
+    assert!(message(&format!("{dive}[navigation]\npolicy = 'intervals'\n")).contains("interval"));
+    assert!(message(&format!("{dive}[pipeline]\ntarget = 'joint'\n[navigation]\n")).contains("target = \"object\""));
     let points = "question = 'why'\nsource = 'virtual-points'\n[navigation]\n";
-    assert!(said(points).contains("navigation needs images"), "{}", said(points));
+    assert!(message(points).contains("navigation needs images"), "{}", message(points));
     // An odometry that requires readings is rejected without them, by the plan or when the source is opened.
     let by_readings = "[navigation]\nodometry = 'dvl-gyro'\n";
-    let none = said(&format!("question = 'why'\nsource = 'virtual-images'\n{by_readings}"));
+    let none = message(&format!("question = 'why'\nsource = 'virtual-images'\n{by_readings}"));
     assert!(none.contains("e.toml:4") && none.contains("which source `virtual-images` does not have"), "{none}");
     let off = "faults = [{ device = 'doppler', kind = 'off', from = 0.0, to = 1e4, amount = 0.0 }]";
-    let deaf = said(&format!("question = 'why'\n[source]\nname = 'dive'\nframes = 2\n{off}\n{by_readings}"));
+    let deaf = message(&format!("question = 'why'\n[source]\nname = 'dive'\nframes = 2\n{off}\n{by_readings}"));
     assert!(deaf.contains("which this source does not have") && deaf.lines().count() == 1, "{deaf}");
 }
 

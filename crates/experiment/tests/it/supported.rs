@@ -96,7 +96,7 @@ fn what_supports_a_fix_stands_in_log_and_table() {
 ///
 /// Seen to fail when the position's protection level is logged as the attitude's.
 #[test]
-fn the_log_and_the_table_state_what_the_fix_states() {
+fn the_log_and_the_table_hold_the_numbers_of_the_fix() {
     let (log, rows) = run_of(
         "[source]\nname = 'virtual-layouts'\nlayouts = 4\nframes = 24\npoints = 9\n[pipeline]\nacceptance = { two-wrong-rate = 0.01 }\n",
     );
@@ -131,19 +131,19 @@ fn the_log_and_the_table_state_what_the_fix_states() {
         let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
         let attempt = judge_labelled(&problem, pairs, &StereoReprojection::default(), &acceptance, Some(&rig));
         let Answer::Fix(fix) = attempt.outcome else { panic!("{:?}", attempt.outcome) };
-        let (said, it) = (&fix.integrity, target.integrity.as_ref().unwrap());
+        let (message, it) = (&fix.integrity, target.integrity.as_ref().unwrap());
         assert_eq!(target.object_from_camera, Some(fix.object_from_camera.rows()));
-        assert_eq!((it.redundancy.as_str(), it.dof), (said.redundancy.name(), said.dof as u64));
+        assert_eq!((it.redundancy.as_str(), it.dof), (message.redundancy.name(), message.dof as u64));
         let fix_text = [
             Some(fix.residual_rms),
-            Some(said.chi2),
-            Some(said.chi2_limit),
-            said.solution_separation,
-            said.solution_separation_two,
-            said.protection.map(|level| level.position),
-            said.protection.map(|level| level.attitude),
-            said.scale_error.map(|it| it.value),
-            said.scale_error.map(|it| it.sigma),
+            Some(message.chi2),
+            Some(message.chi2_limit),
+            message.solution_separation,
+            message.solution_separation_two,
+            message.protection.map(|level| level.position),
+            message.protection.map(|level| level.attitude),
+            message.scale_error.map(|it| it.value),
+            message.scale_error.map(|it| it.sigma),
         ];
         let log_value = [
             target.residual_rms,
@@ -223,9 +223,9 @@ fn a_joint_fix_states_what_took_part() {
                 }
             }
         }
-        let said = |part: &str| frame.targets.iter().any(|target| target.explanation.contains(part));
-        assert_eq!(said("used in the joint fix"), said("(4 points, without a fix of its own)"));
-        assert_eq!(said("not in the joint fix"), said("; excluded: "));
+        let message = |part: &str| frame.targets.iter().any(|target| target.explanation.contains(part));
+        assert_eq!(message("used in the joint fix"), message("(4 points, without a fix of its own)"));
+        assert_eq!(message("not in the joint fix"), message("; excluded: "));
     }
     assert!(took_part > 15, "{took_part} of 30 used, {left_out} excluded");
 }

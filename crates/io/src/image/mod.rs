@@ -193,11 +193,11 @@ mod tests {
     }
 
     fn refused(name: &str, bytes: &[u8], parts: &[&str]) {
-        let said = read(name, bytes, [8, 6], 16).unwrap_err();
+        let message = read(name, bytes, [8, 6], 16).unwrap_err();
         for part in [&[name], parts].concat() {
-            assert!(said.contains(part), "no `{part}` in {said}");
+            assert!(message.contains(part), "no `{part}` in {message}");
         }
-        assert_eq!(said.lines().count(), 1);
+        assert_eq!(message.lines().count(), 1);
     }
 
     /// A PNG of 8×6 pixels.
@@ -243,8 +243,8 @@ mod tests {
         let found = read("a", &twelve, [8, 6], 12).unwrap();
         assert_eq!(found.pixels()[0], 255.0);
         assert_eq!(found.pixels()[47], (4048.0 * 255.0 / 4095.0_f64) as f32);
-        let said = read("a", &twelve, [8, 6], 8).unwrap_err();
-        assert!(said.contains("4095 at (0, 0), white is 255; ") && said.contains("set bits = 12"), "{said}");
+        let message = read("a", &twelve, [8, 6], 8).unwrap_err();
+        assert!(message.contains("4095 at (0, 0), white is 255; ") && message.contains("set bits = 12"), "{message}");
     }
 
     #[test]
@@ -309,15 +309,15 @@ mod tests {
         let limited = |pixels, bytes| within(ImageLimits { pixels, bytes }, "a.png", &complete, [8, 6], 16);
         let enough = complete.len() as u64 + 48;
         assert!(limited(48, enough).is_ok());
-        let said = limited(47, enough).unwrap_err();
+        let message = limited(47, enough).unwrap_err();
         assert!(
-            said.contains(
+            message.contains(
                 "8×6; the limit is 47 pixels; `--max-pixels`, in an experiment `source.max-pixels`, raises it"
             ),
-            "{said}"
+            "{message}"
         );
-        let said = limited(48, complete.len() as u64 - 1).unwrap_err();
-        assert!(said.contains("bytes; `--max-bytes`, in an experiment `source.max-bytes`, raises it"), "{said}");
+        let message = limited(48, complete.len() as u64 - 1).unwrap_err();
+        assert!(message.contains("bytes; `--max-bytes`, in an experiment `source.max-bytes`, raises it"), "{message}");
         // A small file that decodes to much more memory.
         let flat = png(&[0; 48], GREY);
         assert!(within(ImageLimits { pixels: 48, bytes: 40 }, "a.png", &flat, [8, 6], 16).is_err());

@@ -15,7 +15,7 @@ fn log() -> (tempfile::TempDir, PathBuf, Vec<u8>) {
 }
 
 #[test]
-fn cut_at_any_byte_it_states_so() {
+fn a_log_cut_at_any_byte_is_reported_as_cut() {
     let (_folder, path, bytes) = log();
     let full = read(&path).unwrap();
     for length in (0..bytes.len()).rev().step_by(61).chain(bytes.len() - 60..bytes.len()) {

@@ -13,7 +13,7 @@ use protox::prost_reflect::prost_types::FileDescriptorSet;
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 #[test]
-fn committed_code_is_what_the_protos_state() {
+fn committed_code_is_generated_from_the_protos() {
     let root = Path::new(ROOT);
     let mut compiler = protox::Compiler::new([root.join("proto")]).unwrap();
     let protos = names(&root.join("proto/seafix")).map(|name| format!("seafix/{name}"));

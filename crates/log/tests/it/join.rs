@@ -65,7 +65,7 @@ fn a_part_that_is_damaged_ends_the_joining() {
 }
 
 #[test]
-fn joining_stops_when_it_is_reported() {
+fn joining_stops_when_it_is_interrupted() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     write(&at("a.mcap"), 0..2, true);

@@ -70,7 +70,7 @@ fn are_of(found: &TrialLog, full: &TrialLog) -> bool {
 }
 
 #[test]
-fn a_sound_log_is_saved_full() {
+fn a_sound_log_is_saved_completely() {
     let log = Log::new(FRAMES);
     assert!(log.chunks().len() > 2, "{:?}", log.chunks());
     let (found, again) = log.recover(&log.bytes).unwrap();
@@ -82,7 +82,7 @@ fn a_sound_log_is_saved_full() {
 ///
 /// Seen to fail when the frame that a chunk's end tears is written as well.
 #[test]
-fn cut_at_any_byte_full_frames_are_saved() {
+fn cut_at_any_byte_complete_frames_are_saved() {
     let log = Log::new(FRAMES);
     let chunks = log.chunks();
     let mut min = vec![0; chunks.len() + 1];

@@ -109,14 +109,14 @@ mod tests {
     use super::*;
     use crate::Device;
 
-    fn said(stamp_ns: u64, x: f64) -> Reading {
+    fn message(stamp_ns: u64, x: f64) -> Reading {
         let covariance = Matrix3::identity() * 1e-6;
         Reading { device: Device::Doppler, stamp_ns, value: Vector3::new(x, 0.0, 0.0), covariance }
     }
 
     fn signal(all: &[(u64, f64)]) -> Signal {
         let mut signal = Signal::default();
-        all.iter().for_each(|(stamp, x)| signal.insert(said(*stamp, *x)));
+        all.iter().for_each(|(stamp, x)| signal.insert(message(*stamp, *x)));
         signal
     }
 

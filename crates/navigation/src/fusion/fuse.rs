@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_knowledge_meets_half_path() {
+    fn equal_knowledge_meets_in_the_middle() {
         let (a, b) = (at([0.0; 6], 0.1), at([0.0, 0.0, 0.0, 0.1, 0.0, 0.0], 0.1));
         let both = Fuse::default().take(&a, &b).expect("it agrees");
         assert!((both.object_from_camera.translation().x - 0.05).abs() < 1e-12);

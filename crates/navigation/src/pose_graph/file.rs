@@ -229,11 +229,11 @@ impl PoseGraph {
         for (index, text) in text.lines().enumerate() {
             let at = |what: &str| Fault::new(what, file).on_line(index + 1);
             let line: Line = serde_json::from_str(text).map_err(|error| {
-                let said = error.to_string();
-                let said = said.split(" at line ").next().unwrap_or_default().to_owned();
+                let message = error.to_string();
+                let message = message.split(" at line ").next().unwrap_or_default().to_owned();
                 let cut = if index + 1 == count { "; is the file cut off?" } else { "" };
                 at("invalid line of a pose graph")
-                    .value(said)
+                    .value(message)
                     .remedy(format!("write the file again with `add-keyframes = true`{cut}"))
             })?;
             if (index == 0) != matches!(line, Line::Head(_)) {
@@ -551,19 +551,19 @@ mod tests {
         let recognition = Recognition::default();
         let text = pose_graph().text(&recognition);
         let lines: Vec<&str> = text.lines().collect();
-        let said = |text: &str| PoseGraph::read(Path::new("n.jsonl"), text, &recognition).unwrap_err().to_string();
-        assert!(said("").contains("missing end line in n.jsonl:0"), "{}", said(""));
-        assert!(said(&lines[..4].join("\n")).contains("missing end line in n.jsonl:4"));
-        assert!(said(&text[..text.len() / 2]).contains("cut off"), "{}", said(&text[..text.len() / 2]));
+        let message = |text: &str| PoseGraph::read(Path::new("n.jsonl"), text, &recognition).unwrap_err().to_string();
+        assert!(message("").contains("missing end line in n.jsonl:0"), "{}", message(""));
+        assert!(message(&lines[..4].join("\n")).contains("missing end line in n.jsonl:4"));
+        assert!(message(&text[..text.len() / 2]).contains("cut off"), "{}", message(&text[..text.len() / 2]));
         let without = |line: usize| {
             let mut rest = lines.clone();
             rest.remove(line);
-            said(&rest.join("\n"))
+            message(&rest.join("\n"))
         };
         assert!(without(0).contains("first line"), "{}", without(0));
         assert!(without(5).contains("missing lines in n.jsonl"), "{}", without(5));
         assert!(without(3).contains("missing or later line in n.jsonl:4: 1 of 1"), "{}", without(3));
-        let with = |from: &str, to: &str| said(&text.replacen(from, to, 1));
+        let with = |from: &str, to: &str| message(&text.replacen(from, to, 1));
         assert!(with("pose-graph/2", "pose-graph/9").contains("unknown format in n.jsonl:1"));
         assert!(with("\"sigma\":0.1", "\"sigma\":-0.1").contains("invalid standard deviation in n.jsonl:3: -0.1"));
         assert!(with("\"count\":2", "\"count\":3").contains("corrupt key frame in n.jsonl:3"));

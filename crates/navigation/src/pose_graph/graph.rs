@@ -673,7 +673,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_err_as_much_as_the_graph_states() {
+    fn pose_errors_are_consistent_with_the_graph() {
         let draws = 400;
         let (mut sums, mut relative) = ([0.0; 25], 0.0);
         for seed in 0..draws {

@@ -103,7 +103,7 @@ fn prior(rng: &mut ChaCha8Rng, truth: &Transform<Camera, Camera>) -> RelativeMot
 const NOTHING: fn(usize, usize) -> Option<RelativeMotion> = |_, _| None;
 
 #[test]
-fn a_key_frame_is_found_again_from_another_side_and_has_an_error_as_it_states() {
+fn a_key_frame_is_recognized_from_another_side_with_a_consistent_covariance() {
     let draws = 150;
     let (rig, settings) = (rig(), Recognition::default());
     let mut recognizer = PlaceRecognizer::new(&settings, &rig, Threads::One);
@@ -160,7 +160,7 @@ fn other_ground_is_refused() {
 }
 
 #[test]
-fn the_same_appearance_elsewhere_contradict_what_is_known() {
+fn the_same_appearance_elsewhere_contradicts_the_known_pose() {
     let (rig, settings) = (rig(), Recognition::default());
     let mut recognizer = PlaceRecognizer::new(&settings, &rig, Threads::One);
     let mut rng = ChaCha8Rng::seed_from_u64(7);

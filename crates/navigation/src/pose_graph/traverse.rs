@@ -72,7 +72,7 @@ impl PoseGraphSettings {
         not_negative("loop-interval", self.loop_interval, "a time of at least 0 (s)")?;
         not_negative("min-loop-distance", self.min_loop_distance, "a length of at least 0 (m)")?;
         not_negative("visit-gap", self.visit_gap, "a time of at least 0 (s)")?;
-        self.recognition.check().map_err(|said| format!("recognition.{said}"))
+        self.recognition.check().map_err(|message| format!("recognition.{message}"))
     }
 }
 

@@ -136,7 +136,7 @@ impl Component for Stereo {
 
     fn check(&self) -> Result<(), String> {
         self.stages()?;
-        self.follow.check().map_err(|said| format!("follow.{said}"))?;
+        self.follow.check().map_err(|message| format!("follow.{message}"))?;
         let positive = |name, x: f64, what| in_range(x > 0.0 && x.is_finite(), name, x, what);
         positive("consensus-px", self.consensus_px, "a positive number of pixels")?;
         let confident = self.confidence > 0.0 && self.confidence < 1.0;
@@ -167,7 +167,7 @@ pub(crate) struct StereoStages {
 
 impl Stereo {
     pub(crate) fn stages(&self) -> Result<StereoStages, String> {
-        let said = |error: seafix_component::BuildError| error.to_string();
+        let message = |error: seafix_component::BuildError| error.to_string();
         let choices = StageChoices {
             filters: &self.filters,
             detector: &self.detector,
@@ -179,10 +179,10 @@ impl Stereo {
         };
         Ok(StereoStages {
             front_end: FrontEnd::build(&choices).map_err(|invalid| invalid.to_string())?,
-            descriptor: DESCRIPTORS.build(&self.descriptor).map_err(said)?,
-            between: MATCHERS.build(&self.between).map_err(said)?,
-            minimal: SOLVERS.build(&self.minimal).map_err(said)?,
-            solver: SOLVERS.build(&self.solver).map_err(said)?,
+            descriptor: DESCRIPTORS.build(&self.descriptor).map_err(message)?,
+            between: MATCHERS.build(&self.between).map_err(message)?,
+            minimal: SOLVERS.build(&self.minimal).map_err(message)?,
+            solver: SOLVERS.build(&self.solver).map_err(message)?,
         })
     }
 }

@@ -34,7 +34,7 @@ impl<'a> Absence<'a> {
     /// A repeated pattern that resembles the object is no random set: its probability does not depend on the
     /// distribution of the clutter, so it has a limit of its own. Randomly permuted candidates that often yield a set
     /// as large at this pose are a kind of absence that the evidence does not model.
-    pub(super) fn refusal(&self, absent: f64) -> Option<RejectionReason> {
+    pub(super) fn rejection(&self, absent: f64) -> Option<RejectionReason> {
         let (min, max) = self.limits();
         let a_contrario = absent - self.probabilities.alike;
         let limit = if min < max && a_contrario > min && self.fills_space() { max } else { min };

@@ -38,7 +38,7 @@ pub fn search_with_expanding_gates(
 fn nothing(outcome: &Outcome) -> bool {
     match outcome {
         Outcome::Fix(_) | Outcome::Ambiguous(_) | Outcome::Degenerate(_) => false,
-        Outcome::Rejected(refusal) => match refusal {
+        Outcome::Rejected(rejection) => match rejection {
             RejectionReason::Search(why) => !matches!(why, Rejected::Budget { .. } | Rejected::TooLarge { .. }),
             RejectionReason::TooFew { .. }
             | RejectionReason::AContrario { .. }

@@ -86,8 +86,8 @@ impl Judge<'_> {
                         fell(place, fall);
                     }
                 }
-                Err(refusal) => {
-                    fell(place, Fallen::Refused(refusal));
+                Err(rejection) => {
+                    fell(place, Fallen::Refused(rejection));
                     rejected.push(hypothesis);
                 }
             }
@@ -376,8 +376,8 @@ impl Judge<'_> {
             scale_error: left_out.scale_error,
         };
         let stands = self.without_any_one(&hypothesis, left_out.hinge);
-        if let Err(refusal) = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity)) {
-            return Outcome::Rejected(refusal);
+        if let Err(rejection) = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity)) {
+            return Outcome::Rejected(rejection);
         }
         Outcome::Fix(Box::new(Fix {
             object_from_camera: hypothesis.pose,

@@ -21,7 +21,7 @@ mod judge;
 mod mislabeled;
 mod outcome;
 mod posterior_gate;
-mod refusal;
+mod rejection;
 mod self_symmetry;
 mod transfer;
 
@@ -29,7 +29,7 @@ pub use acceptance::Acceptance;
 pub use expanding_gates::{search_with_expanding_gates, wider};
 pub use integrity::{Integrity, Protection, Redundancy};
 pub use outcome::{Alternative, Attempt, Fix, Outcome};
-pub use refusal::RejectionReason;
+pub use rejection::RejectionReason;
 
 use judge::Judge;
 
@@ -79,7 +79,7 @@ pub fn judge(
     let (outcome, runner_up) = match (likely, &found.posterior) {
         (Ok(()), Some(posterior)) => judge.weighted(&found, posterior, &a_contrario),
         (Ok(()), None) => judge.poses(&found, None),
-        (Err(refusal), _) => (Outcome::Rejected(refusal), None),
+        (Err(rejection), _) => (Outcome::Rejected(rejection), None),
     };
     let outcome = judge.distinguished(outcome, found.posterior.is_some());
     let (outcome, runner_up) = match (outcome, runner_up) {
@@ -127,7 +127,7 @@ pub fn judge_labelled(
     let found = Identification::unproved(pairs, consensus_bound, 0);
     let (outcome, runner_up) = match judge.size(&found.pairs) {
         Ok(()) => judge.poses(&found, None),
-        Err(refusal) => (Outcome::Rejected(refusal), None),
+        Err(rejection) => (Outcome::Rejected(rejection), None),
     };
     Attempt {
         outcome,

@@ -90,7 +90,7 @@ impl Outcome {
         match self {
             Self::Fix(_) => None,
             Self::Ambiguous(_) => Some("alternatives"),
-            Self::Rejected(refusal) => Some(refusal.reason()),
+            Self::Rejected(rejection) => Some(rejection.reason()),
             Self::Degenerate(_) => Some("degenerate"),
         }
     }
@@ -100,7 +100,7 @@ impl Outcome {
         match self {
             Self::Fix(_) => None,
             Self::Ambiguous(alternatives) => Some(format!("{} poses fit; narrow the prior", alternatives.len())),
-            Self::Rejected(refusal) => Some(refusal.to_string()),
+            Self::Rejected(rejection) => Some(rejection.to_string()),
             Self::Degenerate(degenerate) => Some(degenerate.to_string()),
         }
     }

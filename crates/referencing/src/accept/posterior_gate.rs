@@ -20,17 +20,17 @@ impl Judge<'_> {
         let absence = Absence::of(self, found, &probabilities, a_contrario);
         // Two sets that each explain the object are copies; neither is clutter of the other.
         let even = probabilities.absent - probabilities.clutter;
-        if absence.refusal(even).is_none()
+        if absence.rejection(even).is_none()
             && let Some(best) = posterior.explanations.first()
             && let Some(copy) = posterior.copy(self.problem.model, self.alert_limit, absence.max().max(even))
         {
             return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
         }
-        if let Some(refusal) = absence.refusal(probabilities.absent) {
-            return (Outcome::Rejected(refusal), runner_up);
+        if let Some(rejection) = absence.rejection(probabilities.absent) {
+            return (Outcome::Rejected(rejection), runner_up);
         }
-        if let Err(refusal) = self.rare(found.pairs.len(), a_contrario.sets_as_good()) {
-            return (Outcome::Rejected(refusal), runner_up);
+        if let Err(rejection) = self.rare(found.pairs.len(), a_contrario.sets_as_good()) {
+            return (Outcome::Rejected(rejection), runner_up);
         }
         // A NaN is rejected as well.
         if !(probabilities.elsewhere <= self.acceptance.doubt * (1.0 - probabilities.absent)) {

@@ -50,7 +50,7 @@ mod tests {
     use crate::rms_apart;
 
     #[test]
-    fn moments_are_what_every_point_states() {
+    fn moments_are_those_of_every_point() {
         let at = [[0.3, 0.1, -0.2], [1.0, -0.4, 0.5], [-0.7, 0.6, 0.1], [0.2, 0.9, -0.8]];
         let model = at.map(|at| ModelPoint::exact("", Point::from(at)));
         let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -3.0].into());

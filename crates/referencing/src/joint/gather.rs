@@ -412,13 +412,13 @@ mod tests {
         targets[1].world_from_object = None;
         let listed = Candidates::all(5, unknown.cloud.len());
         let lists = [Some(&listed), Some(&listed), None];
-        let said = gather(&unknown.rig, &targets, &unknown.cloud, &lists, &unknown.fixed(), &Acceptance::default());
-        assert_eq!(said, Gathered { added: Vec::new(), left_out: vec![(1, Unadded::Unsurveyed)] });
+        let message = gather(&unknown.rig, &targets, &unknown.cloud, &lists, &unknown.fixed(), &Acceptance::default());
+        assert_eq!(message, Gathered { added: Vec::new(), left_out: vec![(1, Unadded::Unsurveyed)] });
         // Stage 1 ran and listed nothing.
         let none = Candidates { lists: vec![Vec::new(); 5] };
         let lists = [Some(&listed), Some(&none), None];
         let scene = scene([5, 2, 0], 5e-4, 0, &mut rng);
-        let said = gather(&scene.rig, &scene.targets, &scene.cloud, &lists, &scene.fixed(), &Acceptance::default());
-        assert_eq!(said, Gathered::default());
+        let message = gather(&scene.rig, &scene.targets, &scene.cloud, &lists, &scene.fixed(), &Acceptance::default());
+        assert_eq!(message, Gathered::default());
     }
 }

@@ -260,22 +260,22 @@ mod tests {
     fn derivatives_are_those_of_the_cost() {
         let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(11));
         for _ in 0..20 {
-            let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.3), pose_of(-0.9, 0.2)];
+            let message = [pose_of(0.0, 0.0), pose_of(0.8, 0.3), pose_of(-0.9, 0.2)];
             // The survey is as precise as the pixels and anisotropic, so that a wrong rotation of its gradient shows.
             let mut root = nalgebra::Matrix6::from_fn(|_, _| 2e-4 * normal(&mut rng));
             root.set_diagonal(&Vector6::new(1e-3, 2e-3, 4e-4, 3e-3, 6e-4, 1e-3));
             let survey = Covariance6::new(root * root.transpose());
-            let members: Vec<Member> = said
+            let members: Vec<Member> = message
                 .iter()
                 .zip([Placement::Exact, Placement::Surveyed(survey), Placement::Displaced])
                 .map(|(&site_from_object, placement)| Member { site_from_object, placement })
                 .collect();
-            let seen = [0, 1].map(|k| object_observations(&rig, &said, k, 1.0, &mut rng));
+            let seen = [0, 1].map(|k| object_observations(&rig, &message, k, 1.0, &mut rng));
             let system = System::new(&rig, &members, &seen).unwrap();
             let mut off = |size: f64| Vector6::from_fn(|_, _| normal(&mut rng) * size);
             let state = JointState {
                 poses: (0..2).map(|k| instant(k).perturbed(&off(0.02))).collect(),
-                places: said
+                places: message
                     .iter()
                     .enumerate()
                     .map(|(o, s)| if o == 0 { *s } else { s.perturbed(&off(0.05)) })

@@ -74,12 +74,12 @@ fn one_object_alone_is_the_fix_of_one_object() {
 #[test]
 fn a_displaced_object_is_found_where_it_is() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(2));
-    let (said, truly) = (pose_of(0.8, 0.0), pose_of(0.86, 0.05));
+    let (message, truly) = (pose_of(0.8, 0.0), pose_of(0.86, 0.05));
     let seen = [0, 1].map(|k| object_observations(&rig, &[pose_of(0.0, 0.0), truly], k, 0.0, &mut rng));
     let members = |of_second| {
         [
             Member { site_from_object: pose_of(0.0, 0.0), placement: Placement::Exact },
-            Member { site_from_object: said, placement: of_second },
+            Member { site_from_object: message, placement: of_second },
         ]
     };
     let fix = joint_fix(&rig, &members(Placement::Displaced), &seen).unwrap();
@@ -111,13 +111,13 @@ fn a_survey_is_one_error_an_object() {
     let draws = 400;
     let (mut nees, mut chi2, mut dof) = (0.0, 0.0, 0);
     for _ in 0..draws {
-        let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
-        let mut truly = said;
+        let message = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
+        let mut truly = message;
         for place in &mut truly[1..] {
             *place = place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 1e-2));
         }
         let seen = [0, 1].map(|k| object_observations(&rig, &truly, k, 1.0, &mut rng));
-        let members: Vec<Member> = said
+        let members: Vec<Member> = message
             .iter()
             .enumerate()
             .map(|(o, &site_from_object)| Member {
@@ -144,15 +144,15 @@ fn a_survey_is_one_error_an_object() {
 fn relative_to_each_object_the_fix_is_better_than_its_own() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(4));
     let survey = Covariance6::<Object, Object>::isotropic(5e-4, 5e-4);
-    let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
-    let members: Vec<Member> = said
+    let message = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
+    let members: Vec<Member> = message
         .iter()
         .map(|&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) })
         .collect();
     let draws = 300;
     let (mut nees, mut joint, mut alone) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for _ in 0..draws {
-        let truly = said.map(|place| place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 5e-4)));
+        let truly = message.map(|place| place.perturbed(&(Vector6::from_fn(|_, _| normal(&mut rng)) * 5e-4)));
         let seen = [0, 1].map(|k| object_observations(&rig, &truly, k, 1.0, &mut rng));
         let fixes = joint_fixes(&rig, &members, &seen, 0.9999).expect("a consistent draw");
         assert_eq!(fixes.displaced, Vec::<usize>::new());
@@ -177,10 +177,10 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
 /// Three surveyed objects and their true poses; the second is displaced.
 fn one_displaced() -> (Vec<Member>, [Transform<Object, Object>; 3]) {
     let survey = Covariance6::<Object, Object>::isotropic(1e-3, 1e-3);
-    let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
+    let message = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
     let member = |&site_from_object| Member { site_from_object, placement: Placement::Surveyed(survey) };
-    let members: Vec<Member> = said.iter().map(member).collect();
-    let mut truly = said;
+    let members: Vec<Member> = message.iter().map(member).collect();
+    let mut truly = message;
     truly[1] = pose_of(0.86, 0.05);
     (members, truly)
 }
@@ -218,17 +218,17 @@ fn a_survey_that_the_images_contradict_is_given_up() {
 #[test]
 fn no_direction_is_known_worse_than_from_the_object_alone() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(9));
-    let said = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
+    let message = [pose_of(0.0, 0.0), pose_of(0.8, 0.0), pose_of(-0.9, 0.2)];
     for round in 0..40 {
         let survey = 10f64.powf(rng.random_range(-5.0..-1.0));
-        let members: Vec<Member> = said
+        let members: Vec<Member> = message
             .iter()
             .map(|&site_from_object| Member {
                 site_from_object,
                 placement: Placement::Surveyed(Covariance6::isotropic(survey, survey)),
             })
             .collect();
-        let mut seen = object_observations(&rig, &said, 1, 0.0, &mut rng);
+        let mut seen = object_observations(&rig, &message, 1, 0.0, &mut rng);
         let few = round % 3;
         let mut shown = [0; 3];
         seen.points.retain(|(object, _)| {

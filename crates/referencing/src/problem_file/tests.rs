@@ -114,7 +114,7 @@ fn identified_points_behind_the_camera_are_named() {
 }
 
 #[test]
-fn a_refusal_has_no_pose() {
+fn a_rejection_has_no_pose() {
     let text = GOOD.replace("\"putative\": null", "\"putative\": [[0,0],[1,1]]");
     let answer = solved(&text);
     assert_eq!((answer["outcome"].as_str(), answer["reason"].as_str()), (Some("rejected"), Some("too-few")));
@@ -151,7 +151,7 @@ fn places(count: usize, of: impl Fn(f64) -> [f64; 3]) -> String {
 
 /// B4 and B7.
 #[test]
-fn points_in_one_place_are_refused_and_what_is_hardly_meant_is_reported() {
+fn coincident_points_are_refused_and_unlikely_values_are_reported() {
     assert_eq!(
         fault("[1,0,0]", "[0.25,-0.75,1e-7]"),
         "coincident model points in p.json:2:37: points 1 and 2; remove one"

@@ -82,7 +82,7 @@ fn a_site_written_and_read_is_the_same() {
 }
 
 #[test]
-fn the_full_site_is_one_target_in_its_frame() {
+fn the_complete_site_is_one_target_in_its_frame() {
     let site = parse(GOOD).unwrap();
     let [target] = &site.targets(TargetKind::Site).unwrap()[..] else { panic!("one target") };
     let ids: Vec<&str> = target.points.iter().map(|point| point.id.as_str()).collect();

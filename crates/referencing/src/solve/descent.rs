@@ -57,11 +57,11 @@ pub(super) fn linearize(
     let (mut torque, mut force, mut cost) = (Vector3::zeros(), Vector3::zeros(), 0.0);
     for (k, point) in points.iter().enumerate() {
         let at: Vector3<f64> = r.tr_mul(&(point.model.coords - t));
-        let said = term(k, &at).ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
-        normal.add(&at, &said.information);
-        torque -= at.cross(&said.pull);
-        force -= said.pull;
-        cost += said.cost;
+        let message = term(k, &at).ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
+        normal.add(&at, &message.information);
+        torque -= at.cross(&message.pull);
+        force -= message.pull;
+        cost += message.cost;
     }
     let gradient = Vector6::new(torque.x, torque.y, torque.z, force.x, force.y, force.z);
     Ok(Linearized { normal, gradient, cost })
@@ -80,8 +80,8 @@ pub(super) fn model_errors(
     let (r, t) = (pose.rotation_matrix(), pose.translation());
     let of = |(k, point): (usize, &Observation)| {
         let at: Vector3<f64> = r.tr_mul(&(point.model.coords - t));
-        let said = term(k, &at).ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
-        let pull = said.information * r.transpose() * point.model_sigma;
+        let message = term(k, &at).ok_or(Degenerate::Hidden { index: k, depth: at.z })?;
+        let pull = message.information * r.transpose() * point.model_sigma;
         let mut errors = SMatrix::<f64, 6, 3>::zeros();
         // −Jᵀ = [ [p]×; I ].
         errors.fixed_view_mut::<3, 3>(0, 0).copy_from(&(at.cross_matrix() * pull));

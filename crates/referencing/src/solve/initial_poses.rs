@@ -149,7 +149,7 @@ mod tests {
 
     /// A square tilted by 20° about the camera's x axis: its mirror image is tilted by −20° at the same position.
     #[test]
-    fn the_mirror_image_tilts_the_other_path_about_the_same_centre() {
+    fn the_mirror_image_tilts_in_the_other_direction_about_the_same_centre() {
         let corners = [(0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)];
         let point = |(x, y): (f64, f64)| {
             let model = Point::new(x, y, 0.0);

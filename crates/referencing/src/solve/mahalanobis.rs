@@ -310,7 +310,7 @@ mod tests {
     /// A plate of 0.2 m at 4 m, tilted by 20°: depths have an error of about 5 cm, so the side of the tilt is
     /// undetermined.
     #[test]
-    fn a_small_tilted_plate_may_be_tilted_the_other_path() {
+    fn a_small_tilted_plate_may_be_tilted_the_other_direction() {
         let rig = rig();
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.35);
         let at = Transform::<Object, Camera>::new(turn, -(turn * Vector3::new(0.0, 0.0, 4.0)));

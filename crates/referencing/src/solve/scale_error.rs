@@ -40,12 +40,12 @@ pub(super) fn scale_error(
     let mean = places.iter().sum::<Vector3<f64>>() / places.len().max(1) as f64;
     let (mut c, mut own, mut pull) = (Vector6::zeros(), 0.0, 0.0);
     for (k, at) in places.iter().enumerate() {
-        let (said, d) = (terms(k, at)?, at - mean);
-        let weighted = said.information * d;
+        let (message, d) = (terms(k, at)?, at - mean);
+        let weighted = message.information * d;
         let turn = -at.cross(&weighted);
         c += Vector6::new(turn.x, turn.y, turn.z, -weighted.x, -weighted.y, -weighted.z);
         own += d.dot(&weighted);
-        pull += d.dot(&said.pull);
+        pull += d.dot(&message.pull);
     }
     let by_motion = covariance * c;
     let left = own - c.dot(&by_motion);

@@ -89,13 +89,13 @@ mod tests {
         let root = Matrix4::from_fn(|i, k| (i as f64 * 2.3 - k as f64).cos());
         let full = root * root.transpose() + Matrix4::identity() * 0.1;
         for noise in [full, Matrix4::from_diagonal(&Vector4::new(0.1, 0.2, 0.05, 0.4))] {
-            let said = Whitener::of(&noise).unwrap().term(&j, &r);
+            let message = Whitener::of(&noise).unwrap().term(&j, &r);
             let weight = noise.try_inverse().unwrap();
             let expected = j.transpose() * weight * j;
-            assert!((said.information - expected).amax() < 1e-12 * expected.amax());
+            assert!((message.information - expected).amax() < 1e-12 * expected.amax());
             let pull = j.transpose() * weight * r;
-            assert!((said.pull - pull).amax() < 1e-12 * pull.amax());
-            assert!((said.cost / r.dot(&(weight * r)) - 1.0).abs() < 1e-12);
+            assert!((message.pull - pull).amax() < 1e-12 * pull.amax());
+            assert!((message.cost / r.dot(&(weight * r)) - 1.0).abs() < 1e-12);
         }
         for bad in [Matrix4::zeros(), -full, full * f64::NAN] {
             assert!(Whitener::of(&bad).is_none());

@@ -205,7 +205,7 @@ fn a_mirror_image_is_refused_by_name() {
 }
 
 #[test]
-fn clutter_alone_is_random_or_less() {
+fn clutter_alone_is_no_more_than_random() {
     let model = model_of(&MODEL);
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     for round in 0..200 {
@@ -414,8 +414,8 @@ fn a_rig_that_stretches_what_it_measures_is_reported_and_refused_where_it_matter
     let scale_error = fix.integrity.scale_error.expect("seven points");
     assert!((scale_error.value - 0.015).abs() < 4.0 * scale_error.sigma, "{scale_error:?}");
     let outcome = attempt_at(12.0, 1.015);
-    let Outcome::Rejected(refusal @ RejectionReason::Stretched { off, .. }) = outcome else { panic!("{outcome:?}") };
-    assert!((0.14..0.32).contains(&off) && refusal.reason() == "gate", "{refusal}");
+    let Outcome::Rejected(rejection @ RejectionReason::Stretched { off, .. }) = outcome else { panic!("{outcome:?}") };
+    assert!((0.14..0.32).contains(&off) && rejection.reason() == "gate", "{rejection}");
 }
 
 /// A panel of six points and one distant point, all exact: the model points have an error of 3.6 cm with the panel
@@ -431,19 +431,19 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     // The NFA is irrelevant here.
     let acceptance = Acceptance { alert_limit: 0.065, max_nfa: 1e300, ..Acceptance::default() };
     let outcome = judged(&seen(7), None, &acceptance, Vec::new()).outcome;
-    let Outcome::Rejected(refusal @ RejectionReason::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
-    assert!((rms - 0.036).abs() < 5e-4 && refusal.reason() == "imprecise", "{refusal}");
+    let Outcome::Rejected(rejection @ RejectionReason::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
+    assert!((rms - 0.036).abs() < 5e-4 && rejection.reason() == "imprecise", "{rejection}");
     let reported =
         "pose depends on one point: if model point `6` is a wrong match, the model points have an error of 0.036 m";
-    assert!(refusal.to_string().starts_with(reported), "{refusal}");
+    assert!(rejection.to_string().starts_with(reported), "{rejection}");
     let both = judged(&seen(8), None, &acceptance, Vec::new());
     assert!(matches!(both.outcome, Outcome::Fix(_)), "{:?}", both.outcome);
     let (_, _, candidates) = seen(7);
     let tolerance = Tolerance::Sigmas(4.0);
     let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
     let pairs = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
-    let said = judge_labelled(&problem, pairs, &Kabsch::default(), &acceptance, None);
-    assert!(matches!(said.outcome, Outcome::Fix(_)), "{:?}", said.outcome);
+    let message = judge_labelled(&problem, pairs, &Kabsch::default(), &acceptance, None);
+    assert!(matches!(message.outcome, Outcome::Fix(_)), "{:?}", message.outcome);
 }
 
 /// Two equal modules half a metre apart, one visible, and a box prior that excludes the other by one standard deviation
@@ -547,15 +547,15 @@ fn named_points_are_tested_for_their_residuals_alone() {
         tolerance: Tolerance::Sigmas(4.0),
         prior: None,
     };
-    let said = |names: [usize; 5]| -> Vec<Correspondence> {
+    let message = |names: [usize; 5]| -> Vec<Correspondence> {
         (0..5).map(|i| Correspondence { model: i, cloud: names[i] }).collect()
     };
-    let found = judge_labelled(&problem, said([0, 1, 2, 3, 4]), &Kabsch::default(), &strict, None);
+    let found = judge_labelled(&problem, message([0, 1, 2, 3, 4]), &Kabsch::default(), &strict, None);
     assert!(matches!(found.outcome, Outcome::Fix(_)), "{:?}", found.outcome);
     assert_eq!((found.nfa, found.pair_tests, found.optimal), (None, None, false));
-    let exchanged = judge_labelled(&problem, said([1, 0, 2, 3, 4]), &Kabsch::default(), &strict, None);
+    let exchanged = judge_labelled(&problem, message([1, 0, 2, 3, 4]), &Kabsch::default(), &strict, None);
     assert_eq!(exchanged.outcome.reason(), Some("gate"), "{:?}", exchanged.outcome);
-    let few = judge_labelled(&problem, said([0, 1, 2, 3, 4])[..2].to_vec(), &Kabsch::default(), &strict, None);
+    let few = judge_labelled(&problem, message([0, 1, 2, 3, 4])[..2].to_vec(), &Kabsch::default(), &strict, None);
     assert_eq!(few.outcome.reason(), Some("too-few"));
 }
 

@@ -70,13 +70,13 @@ fn changed(run: &Run) -> Option<Text> {
     let mut settings =
         run.header().command.split(" --set '").skip(1).filter_map(|rest| rest.split_once('\'')).peekable();
     settings.peek()?;
-    let mut said = text![bold("This run departs from its experiment file:"), " it was run with "];
+    let mut message = text![bold("This run departs from its experiment file:"), " it was run with "];
     for (index, (setting, _)) in settings.enumerate() {
         if index > 0 {
-            said.push(", ".into());
+            message.push(", ".into());
         }
-        said.push(code(setting));
+        message.push(code(setting));
     }
-    said.push(".".into());
-    Some(said)
+    message.push(".".into());
+    Some(message)
 }

@@ -22,23 +22,23 @@ const DIFFERENCES: usize = 3;
 pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let labels = Labels::of(summary);
     let name = |index: usize| labels.of_trial(&summary.rows[index]);
-    let mut said = navigation::sentences(run, &name);
-    said.extend(inspection::sentences(run, &name));
-    said.extend(objects::sentences(run, &name));
-    if !said.is_empty() {
-        said.extend(wrong(run, summary, &labels));
-        return said;
+    let mut message = navigation::sentences(run, &name);
+    message.extend(inspection::sentences(run, &name));
+    message.extend(objects::sentences(run, &name));
+    if !message.is_empty() {
+        message.extend(wrong(run, summary, &labels));
+        return message;
     }
-    said = match super::limits::known(summary) {
+    message = match super::limits::known(summary) {
         true => limits(run, summary),
         false if summary.rows.len() == 1 => errors(run, summary),
         false if labels.reported_singly(summary) => one_by_one(run, summary, &labels),
         false => by_series(run, summary, &labels),
     };
-    said.extend(objects::company(run, &name));
-    said.extend(wrong(run, summary, &labels));
-    said.extend(significance::sentences(run, comparisons, DIFFERENCES));
-    said
+    message.extend(objects::company(run, &name));
+    message.extend(wrong(run, summary, &labels));
+    message.extend(significance::sentences(run, comparisons, DIFFERENCES));
+    message
 }
 
 /// The names of trials and of series of trials.
@@ -135,7 +135,7 @@ fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
         let n = phrases::count(trial, "attempted", row.attempted);
         (fraction.value.is_some()).then(|| text![labels.of_trial(row), ": ", fraction, " % of ", n])
     });
-    let mut said = vec![list("Fix rate (fixes in % of the attempts)", found)];
+    let mut message = vec![list("Fix rate (fixes in % of the attempts)", found)];
     let fit: Metric = ("fit RMS (the paper’s measure)", Field::Fit, |row| row.fit);
     for (name, field, of) in METRICS.into_iter().chain([fit]) {
         let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
@@ -145,23 +145,23 @@ fn one_by_one(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
             let median = phrases::statistic(&run.trials[index], "median", field, "found", Some(spread.median), unit);
             Some(text![labels.of_trial(row), ": ", median, " mm"])
         });
-        said.push(list(&format!("Median {name}"), medians));
+        message.push(list(&format!("Median {name}"), medians));
     }
-    said.retain(|text| text.len() > 2);
-    said
+    message.retain(|text| text.len() > 2);
+    message
 }
 
 /// A sentence of the form `name — a: 1; b: 2.`
 fn list(name: &str, items: impl Iterator<Item = Option<Text>>) -> Text {
-    let mut said = text![format!("{name} — ")];
+    let mut message = text![format!("{name} — ")];
     for (index, item) in items.flatten().enumerate() {
         if index > 0 {
-            said.push("; ".into());
+            message.push("; ".into());
         }
-        said.extend(item);
+        message.extend(item);
     }
-    said.push(".".into());
-    said
+    message.push(".".into());
+    message
 }
 
 /// One sentence for every series: fixes, wrong fixes, and the errors along the axis.
@@ -177,7 +177,7 @@ fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
             let (found, attempted) = (total(|row| row.found), total(|row| row.attempted));
             let key = phrases::over(&trials, "/metrics/evaluation", "percent found of attempted".to_owned());
             let fraction = (attempted > 0).then(|| 100.0 * found as f64 / attempted as f64);
-            let mut said = text![
+            let mut message = text![
                 format!("{name}: "),
                 pooled("found", found),
                 " fixes in ",
@@ -188,12 +188,12 @@ fn by_series(run: &Run, summary: &RunSummary, labels: &Labels) -> Vec<Text> {
                 pooled("wrong", total(|row| row.wrong)),
                 " wrong"
             ];
-            said.extend(nowhere(summary, labels, &members).map(Span::from));
+            message.extend(nowhere(summary, labels, &members).map(Span::from));
             for metric in METRICS {
-                said.extend(course(run, summary, labels, &members, metric));
+                message.extend(course(run, summary, labels, &members, metric));
             }
-            said.push(".".into());
-            said
+            message.push(".".into());
+            message
         })
         .collect()
 }

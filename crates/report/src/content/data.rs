@@ -30,13 +30,13 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     let frames = distinct(run.trials.iter().map(|trial| trial.count().to_string())).join(", ");
     line("Frames", text![format!("{frames} per trial, {}", counted(run.trials.len(), "trial", "trials"))]);
     if let Some(trial) = run.trials.iter().find(|trial| trial.every() > 1) {
-        let mut said = text!["every "];
-        said.push(phrases::header(trial, "every", Some(trial.every() as f64), 0).into());
-        said.push(
+        let mut message = text!["every "];
+        message.push(phrases::header(trial, "every", Some(trial.every() as f64), 0).into());
+        message.push(
             "th frame, and more failures up to a limit; medians and quantiles are over the former, counts over all frames"
                 .into(),
         );
-        line("Frames logged", said);
+        line("Frames logged", message);
     }
     line("Targets", text![of(targets)]);
     line("Left camera", text![of(|header| camera(&header.rig.left))]);
@@ -110,12 +110,12 @@ fn disparity(run: &Run, summary: &RunSummary) -> Text {
     let end = |which: &str, value: f64| {
         Number::new(Some(value), 2, phrases::over(&trials, "/referencing/frame", format!("{which} disparity")))
     };
-    let mut said = text!["σ = ", end("least", low)];
+    let mut message = text!["σ = ", end("least", low)];
     if number(Some(low), 2) != number(Some(high), 2) {
-        said.extend(text!["–", end("greatest", high)]);
+        message.extend(text!["–", end("greatest", high)]);
     }
-    said.push(" px, RMS over the identified points within 2 px of the true projection, so a lower bound; targets with several objects excluded".into());
-    said
+    message.push(" px, RMS over the identified points within 2 px of the true projection, so a lower bound; targets with several objects excluded".into());
+    message
 }
 
 fn targets(header: &TrialHeader) -> String {

@@ -17,7 +17,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             "The question is one of estimation, answered by rates, errors and their intervals. No hypothesis is tested: {}.",
             match axes.as_slice() {
                 [] => "the run has a single trial".to_owned(),
-                _ => format!("{} varied, but no two trials share frames or random numbers", said(&axes)),
+                _ => format!("{} varied, but no two trials share frames or random numbers", message(&axes)),
             }
         )]);
         return section;
@@ -46,7 +46,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             "the pairs of attempts that both made",
         )
     };
-    section.say(text![format!("{} varied. Compared trials: {what}.", sentence_case(&said(&axes)))]);
+    section.say(text![format!("{} varied. Compared trials: {what}.", sentence_case(&message(&axes)))]);
     let items: Vec<Text> = vec![
         text![italic("H0"), format!(": {null}. Rejected attempts and wrong fixes count as infinite errors.")],
         text![italic("H1"), format!(": {alternative} (two-sided).")],
@@ -72,7 +72,7 @@ fn varied(run: &Run) -> Vec<String> {
 }
 
 /// The subject and verb `a, b and c are`.
-fn said(axes: &[String]) -> String {
+fn message(axes: &[String]) -> String {
     match axes {
         [] => "the run is".to_owned(),
         [one] => format!("{one} is"),

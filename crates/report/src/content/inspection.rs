@@ -45,15 +45,15 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
             line.push(name.clone().into());
             line.push(Number::count(own().count(), count).into());
             let all = |quantity| own().filter_map(move |point| point.get(quantity)).collect::<Vec<f64>>();
-            let said = |statistic, quantity, unit, decimals| {
+            let message = |statistic, quantity, unit, decimals| {
                 number(trial, name, statistic, quantity, all(quantity), (unit, decimals))
             };
-            line.push(said("sampled", PoiQuantity::Error, Unit::Plain, 0).into());
-            line.push(said("median", PoiQuantity::Range, Unit::Plain, 2).into());
+            line.push(message("sampled", PoiQuantity::Error, Unit::Plain, 0).into());
+            line.push(message("median", PoiQuantity::Range, Unit::Plain, 2).into());
             for statistic in ["median", "q95", "greatest"] {
-                line.push(said(statistic, PoiQuantity::Error, Unit::Millimetres, 1).into());
+                line.push(message(statistic, PoiQuantity::Error, Unit::Millimetres, 1).into());
             }
-            line.push(said("mean", PoiQuantity::Nees, Unit::Plain, 1).into());
+            line.push(message("mean", PoiQuantity::Nees, Unit::Plain, 1).into());
             table.line(place == 0 && results::breaks(summary, index), line);
         }
     }
@@ -85,12 +85,13 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             text![of("median"), " mm (median; ", of("q95"), " mm in 95 % of ", views, " views)"]
         };
         let [(_, best), .., (_, worst)] = known[..] else { return None };
-        let mut said = text![format!("{}: errors of the points of interest are smallest at {best} with ", name(index))];
-        said.extend(as_number(best));
-        said.push(format!(", and largest at {worst} with ").into());
-        said.extend(as_number(worst));
-        said.push(".".into());
-        Some(said)
+        let mut message =
+            text![format!("{}: errors of the points of interest are smallest at {best} with ", name(index))];
+        message.extend(as_number(best));
+        message.push(format!(", and largest at {worst} with ").into());
+        message.extend(as_number(worst));
+        message.push(".".into());
+        Some(message)
     };
     trials.filter_map(sentence).collect()
 }

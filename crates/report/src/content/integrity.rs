@@ -27,14 +27,14 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         return None;
     }
     let mut section = Section::new("Integrity");
-    section.say(said(run));
+    section.say(message(run));
     section.add(Block::Table(table(run, summary)));
     section.blocks.extend(stanford(run, summary).map(Block::Figure));
     Some(section)
 }
 
 /// The paragraph that defines protection level, alert limit and regions.
-fn said(run: &Run) -> Text {
+fn message(run: &Run) -> Text {
     let risks = distinct(run.trials.iter().filter_map(risk).map(|risk| format!("{risk:e}").replace('-', "−")));
     let risk = match &risks[..] {
         [risk] => format!("a probability of {risk} per fix"),
@@ -188,7 +188,7 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let entry = |(index, name): (usize, &String)| Entry::mark(name.clone(), index);
     let legend = if names.len() > 1 { names.iter().enumerate().map(entry).collect() } else { Vec::new() };
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.95, legend };
-    let mut said = text![format!(
+    let mut message = text![format!(
         "Stanford diagram: protection level over camera position error, {}. ",
         if one {
             format!("with an alert limit of {} mm", trimmed(limit))
@@ -196,15 +196,15 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
             "both divided by the alert limit of the target".to_owned()
         }
     )];
-    said.extend(fractions.said(run));
+    message.extend(fractions.message(run));
     let thinned = match (every, every_beyond) {
         (1, 1) => "Every fix has a mark. ".to_owned(),
         (_, 1) => format!("Marks: one in {every} fixes with an error within the level, and every fix beyond it. "),
         _ => format!("Marks: one in {every} fixes with an error within the level, one in {every_beyond} beyond it. "),
     };
-    said.extend(text![thinned]);
-    said.extend(figures::caption("", run));
-    figures::figure("stanford", said, &chart, data)
+    message.extend(text![thinned]);
+    message.extend(figures::caption("", run));
+    figures::figure("stanford", message, &chart, data)
 }
 
 /// The number of fixes of all trials in each region of the Stanford diagram.
@@ -270,7 +270,7 @@ impl Regions {
     }
 
     /// The sentences with the counts of all regions.
-    fn said(&self, run: &Run) -> Text {
+    fn message(&self, run: &Run) -> Text {
         let Some(counts) = &self.counts else { return Text::new() };
         let trials: Vec<&Trial> = run.trials.iter().collect();
         let as_number = |region: Region| {

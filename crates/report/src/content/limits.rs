@@ -169,9 +169,9 @@ fn table(run: &Run, summary: &RunSummary) -> Table {
         let pairs =
             [(Field::Tre, Field::TreCrlb, limits.tre), (Field::Position, Field::PositionBound, limits.position)];
         for ((field, bounded, [rmse, bound]), digits) in pairs.into_iter().zip(digits) {
-            let said = |what: String, value, digits| total(trial, &what, value, Unit::Millimetres, digits);
-            line.push(said(format!("rms {} of judged", field.name()), rmse, digits).into());
-            line.push(Cell::minor(said(format!("bound {} of judged", bounded.name()), bound, digits)));
+            let message = |what: String, value, digits| total(trial, &what, value, Unit::Millimetres, digits);
+            line.push(message(format!("rms {} of judged", field.name()), rmse, digits).into());
+            line.push(Cell::minor(message(format!("bound {} of judged", bounded.name()), bound, digits)));
             line.push(total(trial, &format!("ratio {} of judged", field.name()), rmse / bound, Unit::Plain, 3).into());
         }
         line.push(total(trial, "mean nees of judged", limits.nees, Unit::Plain, 3).into());

@@ -104,20 +104,20 @@ fn pipeline(run: &Run) -> Table {
             if known.contains(component) {
                 continue;
             }
-            let mut said = text![component.summary.clone()];
+            let mut message = text![component.summary.clone()];
             if !component.source.is_empty() {
-                said.push(format!(" ({})", component.source).into());
+                message.push(format!(" ({})", component.source).into());
             }
             if !component.settings.is_empty() {
-                said.push(". ".into());
+                message.push(". ".into());
             }
             for (index, (key, value)) in component.settings.iter().enumerate() {
-                said.extend((index > 0).then(|| Span::from(", ")));
-                said.push(code(format!("{key} = {value}")));
+                message.extend((index > 0).then(|| Span::from(", ")));
+                message.push(code(format!("{key} = {value}")));
             }
             let first = known.is_empty();
             let stage = if first { component.stage.clone() } else { String::new() };
-            table.line(first, vec![stage.into(), component.name.clone().into(), Cell::prose(said)]);
+            table.line(first, vec![stage.into(), component.name.clone().into(), Cell::prose(message)]);
             known.push(component);
         }
     }

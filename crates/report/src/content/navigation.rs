@@ -157,13 +157,13 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
             " (6 for a consistent covariance)."
         ]
     };
-    let mut said: Vec<Text> = trials.map(sentence).collect();
-    if said.len() > 1 {
-        said.extend(min(run, name));
-        said.push(text!["Each trial is a single dive; these numbers do not include the variation between dives."]);
+    let mut message: Vec<Text> = trials.map(sentence).collect();
+    if message.len() > 1 {
+        message.extend(min(run, name));
+        message.push(text!["Each trial is a single dive; these numbers do not include the variation between dives."]);
     }
-    said.extend(displaced(run, name));
-    said
+    message.extend(displaced(run, name));
+    message
 }
 
 /// A sentence on the trial with the smallest RMS position error.

@@ -63,18 +63,18 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
     let changes = |trial: &Trial| trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"));
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| changes(trial) && objects(trial).len() > 1);
     let sentence = |(index, trial): (usize, &Trial)| {
-        let mut said = text![format!("{}, by object — ", name(index))];
+        let mut message = text![format!("{}, by object — ", name(index))];
         for (place, object) in objects(trial).iter().enumerate() {
             let [attempted, found, _, _] = GROUPS.map(|group| count(trial, object, group));
             let median = error(trial, object, "median", Field::Position);
-            said.extend(text![format!("{}{object}: ", if place > 0 { "; " } else { "" }), found, " fixes in "]);
-            said.extend(text![attempted, " attempts"]);
+            message.extend(text![format!("{}{object}: ", if place > 0 { "; " } else { "" }), found, " fixes in "]);
+            message.extend(text![attempted, " attempts"]);
             if median.value.is_some() {
-                said.extend(text![", median position error ", median, " mm"]);
+                message.extend(text![", median position error ", median, " mm"]);
             }
         }
-        said.push(".".into());
-        said
+        message.push(".".into());
+        message
     };
     trials.map(sentence).collect()
 }
@@ -94,19 +94,25 @@ pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
     if !run.trials.iter().any(|trial| sizes(trial).into_iter().any(|size| size > 1)) {
         return None;
     }
-    let mut said = text!["Frames with a fix, by the number of targets in view — "];
+    let mut message = text!["Frames with a fix, by the number of targets in view — "];
     for (index, trial) in run.trials.iter().enumerate() {
-        said.push(format!("{}{}: ", if index > 0 { "; " } else { "" }, name(index)).into());
+        message.push(format!("{}{}: ", if index > 0 { "; " } else { "" }, name(index)).into());
         for (place, size) in sizes(trial).into_iter().enumerate() {
             let own = || trial.sample().filter(|frame| trial.attempts_of(frame).count() == size);
             let fixed = own().filter(|frame| trial.attempts_of(frame).any(AttemptRow::found)).count();
             let key = |which: &str| Key::of(trial, TOPIC, format!("count {which} with {size} targets"));
             let (fixed, all) = (Number::count(fixed, key("fixed-frames")), Number::count(own().count(), key("frames")));
-            said.extend(text![if place > 0 { ", " } else { "" }, fixed, " of ", all, format!(" with {size} in view")]);
+            message.extend(text![
+                if place > 0 { ", " } else { "" },
+                fixed,
+                " of ",
+                all,
+                format!(" with {size} in view")
+            ]);
         }
     }
-    said.push(".".into());
-    Some(said)
+    message.push(".".into());
+    Some(message)
 }
 
 /// The searched objects by name.

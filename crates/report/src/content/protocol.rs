@@ -15,13 +15,13 @@ fn intervals(run: &Run) -> String {
         return "Every frame is an independent draw: rates and recall have exact (Clopper–Pearson) 95 % intervals."
             .to_owned();
     }
-    let mut said = "Frames follow each other on one trajectory, so neighbours are not independent. The 95 % intervals of rates and the bands of recall are Clopper–Pearson intervals for the effective number of attempts (Korn and Graubard, 1998): n divided by the design effect. The design effect is the variance of sums over blocks of consecutive attempts relative to independent attempts, plus one standard error; a block has the cube root of n attempts. If all attempts have the same outcome (0 % or 100 %), every block counts as one attempt. Bands are widened so that they never fall along the bound.".to_owned();
+    let mut message = "Frames follow each other on one trajectory, so neighbours are not independent. The 95 % intervals of rates and the bands of recall are Clopper–Pearson intervals for the effective number of attempts (Korn and Graubard, 1998): n divided by the design effect. The design effect is the variance of sums over blocks of consecutive attempts relative to independent attempts, plus one standard error; a block has the cube root of n attempts. If all attempts have the same outcome (0 % or 100 %), every block counts as one attempt. Bands are widened so that they never fall along the bound.".to_owned();
     if run.trials.iter().any(|trial| trial.every() > 1) {
-        said.push_str(
+        message.push_str(
             " A trial that logged only some of its frames has counts of the others; every block counts as one attempt.",
         );
     }
-    said
+    message
 }
 
 pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {

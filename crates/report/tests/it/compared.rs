@@ -69,8 +69,8 @@ fn what_is_compared_of_a_shorter_run_is_stated() {
     let runs = [run(folder.path(), "a", "triad", 1), long(folder.path(), "b", "kabsch", 1, 24)];
     assert!(matches!(compare(&runs, false, None, None), Err(ReportError::Incomparable { .. })));
     let table = compare(&runs, true, None, None).unwrap().table;
-    let said = "a has 36 frames per trial, b has 24 frames per trial: the comparison uses the 24 attempts at the same frame and target in both.";
-    assert!(table.lines().any(|line| line == said) && table.contains("n 24, p "), "{table}");
+    let message = "a has 36 frames per trial, b has 24 frames per trial: the comparison uses the 24 attempts at the same frame and target in both.";
+    assert!(table.lines().any(|line| line == message) && table.contains("n 24, p "), "{table}");
     for width in [40, 80, 120] {
         let table = compare(&runs, true, None, Some(width)).unwrap().table;
         assert!(table.lines().all(|line| line.chars().count() <= width), "{width}: {table}");

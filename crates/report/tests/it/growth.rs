@@ -20,8 +20,8 @@ fn alone(test: &str) -> bool {
     let mut alone = Command::new(env::current_exe().unwrap());
     alone.args([test, "--exact", "--test-threads=1"]).env("SEAFIX_ALONE", "1");
     let output = alone.output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout);
-    assert!(output.status.success() && said.contains("1 passed"), "{said}");
+    let message = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && message.contains("1 passed"), "{message}");
     false
 }
 

@@ -73,9 +73,9 @@ fn each_object_has_its_own_attempts() {
             let medians = table.lines().filter_map(|l| l.split_once(&line)?.1.split(',').next()?.parse::<f64>().ok());
             let medians: Vec<f64> = medians.collect();
             assert!(medians.len() == 2 && medians.iter().all(|of| (of - tre).abs() < 1e-9), "{line} {tre} in {table}");
-            let said =
+            let message =
                 format!("{object}: {} fixes in {n} attempts, median position error {position:.1} mm", found.len());
-            assert!(page.contains(&said), "{said}");
+            assert!(page.contains(&message), "{message}");
         }
     }
     let verified = verify(folder.path(), &out).unwrap();

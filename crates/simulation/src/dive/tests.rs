@@ -209,7 +209,7 @@ fn is_x_mark(plan: &crate::ObjectPlan, point: usize) -> bool {
 }
 
 #[test]
-fn marks_are_generated_where_the_truth_states() {
+fn marks_are_rendered_where_the_truth_has_them() {
     let quiet = Sensor { noise: 0.0, ..Sensor::default() };
     let blueprint = Blueprint::drill_centre();
     let dive = Dive { sensor: quiet, distance: 3.0, frames: 7, ..Dive::default() }.plan(4, 0).unwrap();
@@ -275,7 +275,7 @@ fn numbers_that_make_no_dive_are_refused() {
 }
 
 #[test]
-fn the_camera_appearance_down_and_aft_is_below() {
+fn a_camera_that_points_down_and_aft_is_below() {
     let dive = small().plan(1, 0).unwrap();
     let place = Vector3::new(3.0, -2.0, 39.0);
     let north = dive.aim(&place, [0.0; 2], 0.0, 0.0, 0.0);

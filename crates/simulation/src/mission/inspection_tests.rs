@@ -175,16 +175,16 @@ fn a_gate_is_not_entered_where_it_is_empty() {
 /// interest.
 #[test]
 fn what_cannot_be_examined_is_refused() {
-    let said = |mission: &Mission| mission.plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
-    let far = said(&mission("drill-centre", Route { clearance: 3.0, ..Route::default() }));
+    let message = |mission: &Mission| mission.plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
+    let far = message(&mission("drill-centre", Route { clearance: 3.0, ..Route::default() }));
     assert!(far.contains("no clear view of `tree-a/valve-1` at north "), "{far}");
     assert!(
         far.contains("change route.stand-off, route.clearance or rig.ahead-deg") && far.lines().count() == 1,
         "{far}"
     );
-    let none = said(&mission("random", Route::default()));
+    let none = message(&mission("random", Route::default()));
     assert!(none.contains("the site has no point of interest"), "{none}");
-    let unknown = said(&mission("drill-centre", Route { object: "tree-z".into(), ..Route::default() }));
+    let unknown = message(&mission("drill-centre", Route { object: "tree-z".into(), ..Route::default() }));
     assert!(unknown.contains("route.object = `tree-z`; give one of "), "{unknown}");
     // A single object needs a shorter route.
     let full = planned(&mission("drill-centre", Route::default()));

@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn calibration_errors_show_as_the_geometry_states() {
+    fn calibration_errors_show_as_the_geometry_predicts() {
         let nominal = |error| RigPlan { error, ..RigPlan::default() }.build().unwrap().nominal;
         let truth = nominal(CalibrationError::default());
         let place = Point::<Camera>::new(0.125, 0.0, 3.0);

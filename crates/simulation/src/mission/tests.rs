@@ -210,7 +210,7 @@ fn routes_are_waypoints() {
 }
 
 #[test]
-fn a_sensor_away_from_the_centre_states_what_its_place_does() {
+fn a_sensor_away_from_the_centre_measures_the_motion_of_its_place() {
     let quiet = || {
         let mut sensors = Sensors {
             acoustic: Acoustic { sigma: 0.0, range_fraction: 0.0, outliers: 0.0, dropouts: 0.0, ..Acoustic::default() },
@@ -219,15 +219,15 @@ fn a_sensor_away_from_the_centre_states_what_its_place_does() {
         (sensors.doppler.sigma, sensors.doppler.scale, sensors.depth.sigma, sensors.depth.bias) = (0.0, 0.0, 0.0, 0.0);
         sensors
     };
-    let said = |place: [f64; 3]| {
+    let text = |place: [f64; 3]| {
         let mut sensors = quiet();
         (sensors.acoustic.at, sensors.doppler.at, sensors.depth.at) = (place, place, place);
         let plan = planned(&Mission { sensors, start: 2.0, ..small() });
         (plan.readings(), plan)
     };
     let place = [0.7, -0.3, 0.4];
-    let (centre, plan) = said([0.0; 3]);
-    let (away, _) = said(place);
+    let (centre, plan) = text([0.0; 3]);
+    let (away, _) = text(place);
     let lever = Vector3::from(place);
     for (a, b) in centre.doppler.iter().zip(&away.doppler).filter(|(a, b)| a.time == b.time) {
         let turning = plan.track.at(a.time).motion.fixed_rows::<3>(0).into_owned();

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn functions_are_what_they_state() {
+    fn functions_have_their_literature_values() {
         assert_eq!((exp(0.0), exp2(0.0), exp2(3.0)), (1.0, 1.0, 8.0));
         for k in -2000..2000 {
             let x = k as f32 * 0.043;

@@ -12,7 +12,7 @@ fn gaps(scene: &Scene) -> Vec<f64> {
 }
 
 #[test]
-fn built_in_sites_are_what_they_state() {
+fn built_in_sites_match_their_descriptions() {
     let paper = built_in("drill-centre").unwrap();
     assert_eq!(paper.site.objects.len(), 7);
     assert_eq!(paper.site.objects.iter().map(|o| o.points.len()).sum::<usize>(), 50);

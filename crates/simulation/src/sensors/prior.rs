@@ -104,13 +104,13 @@ impl SensorNavigation {
         let places = lbl.transponders.iter().map(|t| Vector3::from(*t));
         let ranges: Vec<_> =
             places.clone().zip(answer.value.0).filter_map(|(t, range)| Some((t, length(range?)))).collect();
-        let depth = latest(&self.depths, answer.arrival).map(|said| {
-            let turn = self.turned(said.time).map(|said| said.world_from_body).unwrap_or_default();
+        let depth = latest(&self.depths, answer.arrival).map(|message| {
+            let turn = self.turned(message.time).map(|message| message.world_from_body).unwrap_or_default();
             let between = (turn * (Vector3::from(lbl.at) - Vector3::from(self.sensors.depth.at))).z;
             let gauge = &self.sensors.depth;
             // The vehicle may have risen or sunk since the depth reading, at up to 0.1 m/s.
-            let slow = 0.1 * (answer.time - said.time);
-            Length { value: said.value + between, noise: gauge.sigma.hypot(slow), common: gauge.bias }
+            let slow = 0.1 * (answer.time - message.time);
+            Length { value: message.value + between, noise: gauge.sigma.hypot(slow), common: gauge.bias }
         });
         let middle = places.clone().sum::<Vector3<f64>>() / lbl.transponders.len().max(1) as f64;
         // Transponders stand on the seabed, so the vehicle is above them.
@@ -153,7 +153,7 @@ impl SensorNavigation {
 
     /// The vehicle's position at the time of a position of one of its parts.
     fn place(&self, position: &TimedReading<Position>) -> Vector3<f64> {
-        let turn = self.turned(position.time).map(|said| said.world_from_body).unwrap_or_default();
+        let turn = self.turned(position.time).map(|message| message.world_from_body).unwrap_or_default();
         position.value.at - turn * position.value.lever
     }
 
@@ -238,7 +238,8 @@ impl SensorNavigation {
             else {
                 break;
             };
-            let (turn, rate) = self.turned(last).map(|said| (said.world_from_body, said.rate)).unwrap_or_default();
+            let (turn, rate) =
+                self.turned(last).map(|message| (message.world_from_body, message.rate)).unwrap_or_default();
             let lever = rate.cross(&Vector3::from(self.sensors.doppler.at));
             let step = turn * (velocity.value - lever) * (next - last);
             sum += step;

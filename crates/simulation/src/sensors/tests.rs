@@ -126,8 +126,8 @@ fn what_sensors_state_has_an_error_by_what_is_set() {
         let error = |r: &TimedReading<Vector3<f64>>| (r.value - Vector3::new(0.5, 0.0, 0.0)) / noisy.sigma;
         doppler.extend(errors.iter().map(error).flat_map(|e| [e.x, e.y, e.z]));
         let steady = AttitudeSensor { sigma_deg: 0.0, level_deg: 0.0, ..sensors.attitude.clone() };
-        let said = steady.readings(&track, 0.1, seeds)[0].value.world_from_body;
-        heading.push(said.scaled_axis().z / steady.heading_deg.to_radians());
+        let text = steady.readings(&track, 0.1, seeds)[0].value.world_from_body;
+        heading.push(text.scaled_axis().z / steady.heading_deg.to_radians());
         let readings = sensors.depth.readings(&track, 10.0, seeds);
         let mean = readings.iter().map(|r| r.value - 36.0).sum::<f64>() / readings.len() as f64;
         depth.push(mean / sensors.depth.bias.hypot(sensors.depth.sigma / (readings.len() as f64).sqrt()));
@@ -146,7 +146,7 @@ fn what_sensors_state_has_an_error_by_what_is_set() {
 }
 
 #[test]
-fn the_prior_pose_has_an_error_as_its_covariance_states() {
+fn the_prior_pose_has_a_consistent_covariance() {
     let (track, scene) = (track(60), scene());
     let sensors = Sensors { acoustic: Acoustic { outliers: 0.0, ..Acoustic::default() }, ..Sensors::default() };
     let (mut nees, mut n) = (0.0, 0.0);
@@ -176,7 +176,7 @@ fn among_five() -> Sensors {
 }
 
 #[test]
-fn positions_among_transponders_err_as_their_covariance_states() {
+fn positions_among_transponders_have_a_consistent_covariance() {
     let (track, scene) = (track(60), scene());
     let sensors = among_five();
     let (mut nees, mut n, mut fixes, mut good) = (0.0, 0.0, 0, 0);
@@ -201,7 +201,7 @@ fn positions_among_transponders_err_as_their_covariance_states() {
 }
 
 #[test]
-fn exact_ranges_report_the_place_that_asks() {
+fn exact_ranges_determine_the_position() {
     let (track, scene) = (track(60), scene());
     let mut sensors = among_five();
     sensors.lbl = Lbl { sigma: 0.0, sound: 0.0, survey: 0.0, dropouts: 0.0, ..sensors.lbl };
@@ -216,9 +216,9 @@ fn exact_ranges_report_the_place_that_asks() {
     }
     // LBL without transponders is off, whatever its other settings.
     let none = Sensors { lbl: Lbl { transponders: Vec::new(), sigma: 9.0, ..sensors.lbl }, ..Sensors::default() };
-    let said = |sensors: &Sensors| SensorNavigation::new(sensors, &[], &track, &scene, 20.0, (4, 0));
-    assert_eq!(said(&none).readings(), said(&Sensors::default()).readings());
-    assert_eq!(said(&none).at(15.0), said(&Sensors::default()).at(15.0));
+    let text = |sensors: &Sensors| SensorNavigation::new(sensors, &[], &track, &scene, 20.0, (4, 0));
+    assert_eq!(text(&none).readings(), text(&Sensors::default()).readings());
+    assert_eq!(text(&none).at(15.0), text(&Sensors::default()).at(15.0));
 }
 
 #[test]

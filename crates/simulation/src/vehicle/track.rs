@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn between_states_the_vehicle_moves_smoothly() {
+    fn the_vehicle_moves_smoothly_between_states() {
         // Interpolated positions of a circular motion stay on the circle.
         let state = |k: usize| {
             let angle = 0.02 * k as f64;

@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_as_great_as_the_covariance_states() {
+    fn errors_are_consistent_with_the_covariance() {
         let mut state = 7_u64;
         let mut random = || {
             // Twelve uniform numbers make a normal one.

@@ -74,7 +74,7 @@ impl FittedCorners {
         in_range(candidates > 0, "candidates", candidates, "at least 1")?;
         in_range(features > 0, "features", features, "at least 1")?;
         in_range(cells > 0, "cells", cells, "at least 1")?;
-        fit.check().map_err(|said| format!("fit.{said}"))
+        fit.check().map_err(|message| format!("fit.{message}"))
     }
 
     fn find(&self, shape: Shape, image: &Image, work: &mut Workspace, found: &mut Vec<Keypoint>) {

@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_fraction_the_budget() {
+    fn cells_divide_the_budget() {
         let all = [point(5.0, 0.0, 7.5), point(1.0, 0.0, 9.0), point(60.0, 0.0, 1.0), point(3.0, 0.0, 8.0)];
         let columns = |selection, cells| kept(&all, 3, selection, cells).iter().map(|p| p.at.u).collect::<Vec<_>>();
         assert_eq!(columns(Selection::Strongest, 2), [1.0, 3.0, 5.0]);

@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lattice_of_points_that_nothing_reports_apart_has_no_match() {
+    fn a_lattice_of_indistinguishable_points_has_no_match() {
         let rig = rig(Vector3::new(0.25, 0.0, 0.0), Vector3::zeros());
         let mut next = numbers(3);
         let (mut found, mut wrong) = (0, 0);

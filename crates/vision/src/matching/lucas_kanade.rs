@@ -56,7 +56,7 @@ impl Component for LucasKanade {
         let beyond = format!("a depth beyond min-depth = {min_depth} (m)");
         in_range(max_depth > min_depth && max_depth.is_finite(), "max-depth", max_depth, &beyond)?;
         in_range((1..=100).contains(&places), "places", places, "a number from 1 to 100")?;
-        tracker.check().map_err(|said| format!("tracker.{said}"))
+        tracker.check().map_err(|message| format!("tracker.{message}"))
     }
 }
 

@@ -144,7 +144,7 @@ fn alignment_finds_the_place_for_every_rig() {
 /// On a plane and a rectified rig the median of the normalised squared error must be about 0.45, that of χ² with one
 /// degree of freedom. Seen to fail when `zncc-parabola` claims a tenth of its variance.
 #[test]
-fn every_refinement_has_an_error_as_it_states() {
+fn every_refinement_has_a_consistent_covariance() {
     let rig = scenes::rig([0.2, 0.0, 0.0], [0.0; 3], &[]);
     let [left, right] = scenes::images(&rig, 60.0, 2.0);
     let spreads = REFINEMENTS.names().map(|name| {

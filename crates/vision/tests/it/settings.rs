@@ -6,7 +6,7 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEM
 const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
 /// The error message of a registry for a choice; `None` if it is valid.
-fn refusal<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Option<String> {
+fn rejection<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Option<String> {
     registry.build(choice).err().map(|error| error.to_string())
 }
 
@@ -16,8 +16,12 @@ fn numbers_must_be_numbers<T: ?Sized>(registry: &Registry<T>) {
         registry.build(&Choice::named(listing.name)).expect("valid defaults");
         for (key, _) in listing.defaults.iter().filter(|(_, default)| default.is_float()) {
             for bad in NO_NUMBERS {
-                let said = refusal(registry, &Choice::named(listing.name).with(key, bad)).unwrap_or_default();
-                assert!(said.contains(&format!("{key} = {bad}; give ")), "{} {key} = {bad}: {said:?}", listing.name);
+                let message = rejection(registry, &Choice::named(listing.name).with(key, bad)).unwrap_or_default();
+                assert!(
+                    message.contains(&format!("{key} = {bad}; give ")),
+                    "{} {key} = {bad}: {message:?}",
+                    listing.name
+                );
             }
         }
     }
@@ -37,11 +41,11 @@ fn no_number_is_no_setting() {
 /// Asserts that the values `inside` of a setting are accepted and those `beyond` are rejected with its name.
 fn range<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, inside: &[f64], beyond: &[f64]) {
     for &value in inside {
-        assert_eq!(refusal(registry, &Choice::named(name).with(key, value)), None, "{key} = {value}");
+        assert_eq!(rejection(registry, &Choice::named(name).with(key, value)), None, "{key} = {value}");
     }
     for &value in beyond {
-        let said = refusal(registry, &Choice::named(name).with(key, value)).unwrap_or_default();
-        assert!(said.contains(&format!("`{name}`: {key} = {value}; give ")), "{key} = {value}: {said:?}");
+        let message = rejection(registry, &Choice::named(name).with(key, value)).unwrap_or_default();
+        assert!(message.contains(&format!("`{name}`: {key} = {value}; give ")), "{key} = {value}: {message:?}");
     }
 }
 
@@ -51,17 +55,18 @@ fn harris_refuses_what_finds_nothing() {
     range(&DETECTORS, "harris", "k", &[0.0, 0.24], &[-0.04, 0.25]);
     range(&DETECTORS, "harris", "quality", &[0.0, 1.0], &[-0.1, 1.1]);
     assert_eq!(
-        refusal(&DETECTORS, &Choice::named("harris").with("features", 0)).unwrap(),
+        rejection(&DETECTORS, &Choice::named("harris").with("features", 0)).unwrap(),
         "detector `harris`: features = 0; give at least 1"
     );
     // Seen to fail without an upper limit of the radius: 10¹² was accepted.
     for name in ["fast", "harris", "shi-tomasi"] {
-        assert_eq!(refusal(&DETECTORS, &Choice::named(name).with("radius", 1000)), None);
-        let said = refusal(&DETECTORS, &Choice::named(name).with("radius", 1_000_000_000_000_i64)).unwrap_or_default();
-        assert_eq!(said, format!("detector `{name}`: radius = 1000000000000; give at most 1000 (px)"));
+        assert_eq!(rejection(&DETECTORS, &Choice::named(name).with("radius", 1000)), None);
+        let message =
+            rejection(&DETECTORS, &Choice::named(name).with("radius", 1_000_000_000_000_i64)).unwrap_or_default();
+        assert_eq!(message, format!("detector `{name}`: radius = 1000000000000; give at most 1000 (px)"));
     }
-    assert!(refusal(&DETECTORS, &Choice::named("harris").with("radius", -1)).is_some());
-    assert!(refusal(&DETECTORS, &Choice::named("harris").with("cells", 0)).unwrap().contains("give at least 1"));
+    assert!(rejection(&DETECTORS, &Choice::named("harris").with("radius", -1)).is_some());
+    assert!(rejection(&DETECTORS, &Choice::named("harris").with("cells", 0)).unwrap().contains("give at least 1"));
 }
 
 #[test]
@@ -71,13 +76,13 @@ fn detectors_refuse_what_finds_nothing() {
     range(&DETECTORS, "fast", "threshold", &[0.0, 65535.0], &[-1.0, 1e6]);
     for name in ["fast", "shi-tomasi"] {
         for key in ["features", "cells"] {
-            let said = refusal(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
-            assert_eq!(said, format!("detector `{name}`: {key} = 0; give at least 1"));
+            let message = rejection(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
+            assert_eq!(message, format!("detector `{name}`: {key} = 0; give at least 1"));
         }
         for selection in ["strongest", "balanced", "adaptive"] {
-            assert_eq!(refusal(&DETECTORS, &Choice::named(name).with("selection", selection)), None);
+            assert_eq!(rejection(&DETECTORS, &Choice::named(name).with("selection", selection)), None);
         }
-        assert!(refusal(&DETECTORS, &Choice::named(name).with("selection", "best")).is_some());
+        assert!(rejection(&DETECTORS, &Choice::named(name).with("selection", "best")).is_some());
     }
 }
 
@@ -86,11 +91,11 @@ fn surf_blobs_refuse_what_finds_nothing() {
     range(&DETECTORS, "surf", "threshold", &[0.0, 1e9], &[-1.0, 2e9]);
     for (key, inside, beyond) in [("octaves", [1, 8], [0, 9]), ("layers", [1, 10], [0, 11])] {
         for value in inside {
-            assert_eq!(refusal(&DETECTORS, &Choice::named("surf").with(key, value)), None, "{key} = {value}");
+            assert_eq!(rejection(&DETECTORS, &Choice::named("surf").with(key, value)), None, "{key} = {value}");
         }
         for value in beyond {
-            let said = refusal(&DETECTORS, &Choice::named("surf").with(key, value)).unwrap_or_default();
-            assert!(said.contains(&format!("{key} = {value}; give ")), "{said:?}");
+            let message = rejection(&DETECTORS, &Choice::named("surf").with(key, value)).unwrap_or_default();
+            assert!(message.contains(&format!("{key} = {value}; give ")), "{message:?}");
         }
     }
 }
@@ -108,7 +113,8 @@ fn filters_refuse_what_they_cannot_do() {
     range(&FILTERS, "guided", "sigma", &[0.01, 255.0], &[0.0, -5.0, 256.0]);
     range(&FILTERS, "illumination", "sigma", &[1.0, 1000.0], &[0.5, 1001.0]);
     range(&FILTERS, "illumination", "gain", &[1.0, 1000.0], &[0.5, 1001.0]);
-    let states = |name: &str, key: &str, value: i64| refusal(&FILTERS, &Choice::named(name).with(key, value)).unwrap();
+    let states =
+        |name: &str, key: &str, value: i64| rejection(&FILTERS, &Choice::named(name).with(key, value)).unwrap();
     assert_eq!(states("median", "radius", 3), "filter `median`: radius = 3; give 1 (3×3) or 2 (5×5)");
     assert_eq!(states("clahe", "tiles", 0), "filter `clahe`: tiles = 0; give a number from 1 to 64");
     assert_eq!(states("clahe", "bins", 15), "filter `clahe`: bins = 15; give a number from 16 to 4096");
@@ -120,8 +126,8 @@ fn dog_and_sift_refuse_what_they_cannot_do() {
     range(&DETECTORS, "dog", "contrast", &[0.01, 255.0], &[0.0, -1.0, 256.0]);
     range(&DETECTORS, "dog", "edge", &[1.0, 1e6], &[0.5, 1e7]);
     for key in ["features", "cells"] {
-        let said = refusal(&DETECTORS, &Choice::named("dog").with(key, 0)).unwrap();
-        assert_eq!(said, format!("detector `dog`: {key} = 0; give at least 1"));
+        let message = rejection(&DETECTORS, &Choice::named("dog").with(key, 0)).unwrap();
+        assert_eq!(message, format!("detector `dog`: {key} = 0; give at least 1"));
     }
     range(&DESCRIPTORS, "sift", "scale", &[0.0, 1.5, 100.0], &[-1.5, 101.0]);
 }
@@ -131,8 +137,8 @@ fn zncc_patch_refuses_what_is_no_window() {
     range(&DESCRIPTORS, "zncc-patch", "step", &[0.1, 100.0], &[0.0, -1.0, 101.0]);
     range(&DESCRIPTORS, "zncc-patch", "sigma", &[0.0, 100.0], &[-1.0, 101.0]);
     for window in [1, 10, 53] {
-        let said = refusal(&DESCRIPTORS, &Choice::named("zncc-patch").with("window", window)).unwrap();
-        assert!(said.contains(&format!("window = {window}; give an odd number from 3 to 51")), "{said}");
+        let message = rejection(&DESCRIPTORS, &Choice::named("zncc-patch").with("window", window)).unwrap();
+        assert!(message.contains(&format!("window = {window}; give an odd number from 3 to 51")), "{message}");
     }
 }
 
@@ -143,10 +149,10 @@ fn epipolar_band_needs_a_band() {
     range(&MATCHERS, "epipolar-band", "min-depth", &[0.0, 49.0], &[-0.1]);
     range(&MATCHERS, "epipolar-band", "max-depth", &[0.2], &[0.1, 0.0, -1.0]);
     assert_eq!(
-        refusal(&MATCHERS, &Choice::named("epipolar-band").with("min-depth", 60.0)).unwrap(),
+        rejection(&MATCHERS, &Choice::named("epipolar-band").with("min-depth", 60.0)).unwrap(),
         "matcher `epipolar-band`: max-depth = 50; give a depth beyond min-depth = 60 (m)"
     );
-    assert!(refusal(&MATCHERS, &Choice::named("epipolar-band").with("neighbours", 1001)).is_some());
+    assert!(rejection(&MATCHERS, &Choice::named("epipolar-band").with("neighbours", 1001)).is_some());
 }
 
 #[test]
@@ -156,8 +162,11 @@ fn zncc_band_refuses_what_matches_nothing() {
     range(&MATCHERS, "zncc-band", "min-correlation", &[-1.0, 1.0], &[-1.1, 1.1]);
     range(&MATCHERS, "zncc-band", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
     for window in [1, 10, 53] {
-        let said = refusal(&MATCHERS, &Choice::named("zncc-band").with("window", window)).unwrap();
-        assert!(said.contains(&format!("window = {window}; give an odd number of pixels from 3 to 51")), "{said}");
+        let message = rejection(&MATCHERS, &Choice::named("zncc-band").with("window", window)).unwrap();
+        assert!(
+            message.contains(&format!("window = {window}; give an odd number of pixels from 3 to 51")),
+            "{message}"
+        );
     }
 }
 
@@ -167,8 +176,8 @@ fn fitted_corners_refuse_what_finds_nothing() {
         range(&DETECTORS, name, "sigma", &[0.3, 100.0], &[0.0, 0.01, 0.29, 101.0]);
         range(&DETECTORS, name, "quality", &[0.0, 1.0], &[-0.1, 1.1]);
         for key in ["candidates", "features", "cells"] {
-            let said = refusal(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
-            assert_eq!(said, format!("detector `{name}`: {key} = 0; give at least 1"));
+            let message = rejection(&DETECTORS, &Choice::named(name).with(key, 0)).unwrap_or_default();
+            assert_eq!(message, format!("detector `{name}`: {key} = 0; give at least 1"));
         }
     }
 }
@@ -178,7 +187,7 @@ fn mutual_ratio_refuses_what_matches_nothing() {
     range(&MATCHERS, "mutual-ratio", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
     range(&MATCHERS, "mutual-ratio", "max-distance", &[0.1, 2.0], &[0.0, -0.7, 2.1]);
     assert!(
-        refusal(&MATCHERS, &Choice::named("mutual-ratio").with("epipolar-px", 1.0)).is_some(),
+        rejection(&MATCHERS, &Choice::named("mutual-ratio").with("epipolar-px", 1.0)).is_some(),
         "a setting of another matcher is accepted"
     );
 }
@@ -188,7 +197,7 @@ fn lucas_kanade_refuses_what_follows_nothing() {
     range(&MATCHERS, "lucas-kanade", "epipolar-px", &[0.1, 1000.0], &[0.0, -1.0, 1001.0]);
     range(&MATCHERS, "lucas-kanade", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
     range(&MATCHERS, "lucas-kanade", "max-depth", &[0.2], &[0.1, 0.0]);
-    assert!(refusal(&MATCHERS, &Choice::named("lucas-kanade").with("places", 0)).is_some());
+    assert!(rejection(&MATCHERS, &Choice::named("lucas-kanade").with("places", 0)).is_some());
     for (tracker, key) in [
         (Tracker { window: 4, ..Tracker::default() }, "window"),
         (Tracker { levels: 0, ..Tracker::default() }, "levels"),
@@ -197,8 +206,8 @@ fn lucas_kanade_refuses_what_follows_nothing() {
         (Tracker { return_px: -1.0, ..Tracker::default() }, "return-px"),
         (Tracker { iterations: 0, ..Tracker::default() }, "iterations"),
     ] {
-        let said = tracker.check().expect_err(key);
-        assert!(said.starts_with(&format!("{key} = ")), "{said:?}");
+        let message = tracker.check().expect_err(key);
+        assert!(message.starts_with(&format!("{key} = ")), "{message:?}");
     }
 }
 
@@ -206,23 +215,26 @@ fn lucas_kanade_refuses_what_follows_nothing() {
 fn refinements_refuse_what_refines_nothing() {
     range(&REFINEMENTS, "direct", "reach", &[0.1, 100.0], &[0.0, -2.0, 101.0]);
     range(&REFINEMENTS, "zncc-parabola", "floor-px", &[0.0, 10.0], &[-0.1, 11.0]);
-    let states = |name: &str, key: &str, value: i64| refusal(&REFINEMENTS, &Choice::named(name).with(key, value));
+    let states = |name: &str, key: &str, value: i64| rejection(&REFINEMENTS, &Choice::named(name).with(key, value));
     for (name, max) in [("direct", 201), ("zncc-parabola", 51)] {
         range(&REFINEMENTS, name, "min-correlation", &[-1.0, 1.0], &[-2.0, 101.0]);
         for window in [0, 1, 10, max + 2] {
-            let said = states(name, "window", window).unwrap_or_default();
-            assert!(said.contains(&format!("`{name}`: window = {window}; give an odd number of pixels")), "{said:?}");
+            let message = states(name, "window", window).unwrap_or_default();
+            assert!(
+                message.contains(&format!("`{name}`: window = {window}; give an odd number of pixels")),
+                "{message:?}"
+            );
         }
         for window in [3, max] {
             assert_eq!(states(name, "window", window), None);
         }
         let choice = Choice::named(name).with("unaligned", "keep");
-        assert_eq!(refusal(&REFINEMENTS, &choice), None);
+        assert_eq!(rejection(&REFINEMENTS, &choice), None);
     }
     assert!(states("direct", "iterations", 0).unwrap_or_default().contains("iterations = 0; give "));
     for reach in [0, 8] {
-        let said = states("zncc-parabola", "reach", reach).unwrap_or_default();
-        assert!(said.contains(&format!("reach = {reach}; give a number from 1 to 7 (px)")), "{said:?}");
+        let message = states("zncc-parabola", "reach", reach).unwrap_or_default();
+        assert!(message.contains(&format!("reach = {reach}; give a number from 1 to 7 (px)")), "{message:?}");
     }
     assert!(states("none", "window", 11).is_some());
 }
@@ -250,8 +262,8 @@ fn fits_of_corners_refuse_what_cannot_be_fitted() {
         range(&LOCATORS, name, "contrast", &[0.0, 255.0], &[-1.0, 256.0]);
         range(&LOCATORS, name, "explained", &[0.0, 1.0], &[-0.1, 1.1]);
         for window in [5, 12, 33] {
-            let said = refusal(&LOCATORS, &Choice::named(name).with("window", window)).unwrap_or_default();
-            assert!(said.contains(&format!("`{name}`: window = {window}; give an odd number")), "{said:?}");
+            let message = rejection(&LOCATORS, &Choice::named(name).with("window", window)).unwrap_or_default();
+            assert!(message.contains(&format!("`{name}`: window = {window}; give an odd number")), "{message:?}");
         }
     }
 }

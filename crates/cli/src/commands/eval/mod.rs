@@ -58,7 +58,7 @@ pub(crate) struct Eval {
     all_pairs: bool,
     /// Choose pairs along the reference instead of the estimate.
     #[arg(long)]
-    pairs_from_fix: bool,
+    pairs_from_reference: bool,
     /// Maximum difference of associated stamps (s).
     #[arg(long, default_value_t = 0.01)]
     t_max_diff: f64,
@@ -158,7 +158,7 @@ impl Eval {
         }
         let Name(relation) = self.relation;
         let absolute = relation.is_absolute().then(|| ape(&matched.reference, &matched.estimate, relation));
-        let along = if self.pairs_from_fix { &matched.reference } else { &matched.estimate };
+        let along = if self.pairs_from_reference { &matched.reference } else { &matched.estimate };
         // Motions across a break are unknown and not evaluated.
         let (mut both, mut segments) = (Vec::new(), Vec::new());
         for scale_error in matched.stretches() {

@@ -109,7 +109,7 @@ impl Scene {
 fn refused(fallen: Result<(), Fallen>) -> Option<RejectionReason> {
     match fallen {
         Ok(()) => None,
-        Err(Fallen::Refused(refusal)) => Some(refusal),
+        Err(Fallen::Refused(rejection)) => Some(rejection),
         Err(Fallen::Degenerate(why)) => panic!("{why}"),
     }
 }
@@ -343,8 +343,8 @@ fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
         scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, hinge))
     };
     assert_eq!((of(&scene, None), of(&scene, Some((2, 0.05)))), (Ok(()), Ok(())));
-    let refusal = RejectionReason::Hinge { point: "V2".into(), rms: 0.0501, limit: 0.10 };
-    assert_eq!(of(&scene, Some((2, 0.0501))), Err(refusal));
+    let rejection = RejectionReason::Hinge { point: "V2".into(), rms: 0.0501, limit: 0.10 };
+    assert_eq!(of(&scene, Some((2, 0.0501))), Err(rejection));
     assert!(of(&scene, Some((2, f64::NAN))).is_err());
     scene.searched = false;
     assert_eq!(of(&scene, Some((2, 0.0501))), Ok(()));
@@ -378,8 +378,8 @@ fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
         scene.judge(&Kabsch::default(), |judge| judge.as_large_as_modelled(&hypothesis, &integrity(chi2, scale_error)))
     };
     for value in [0.01, -0.01] {
-        let refusal = of(10.0, 17.0, scale_error(value)).unwrap_err();
-        let RejectionReason::Stretched { scale_error: reported, off, limit } = refusal else { panic!("{refusal}") };
+        let rejection = of(10.0, 17.0, scale_error(value)).unwrap_err();
+        let RejectionReason::Stretched { scale_error: reported, off, limit } = rejection else { panic!("{rejection}") };
         assert!(reported.value == value && close(off, 0.18) && limit == 0.10, "{off}");
     }
     assert_eq!(of(10.0, 17.0, None), Ok(()));

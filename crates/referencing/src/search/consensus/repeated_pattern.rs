@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_alone_on_the_lattice_does_not_report_the_object() {
+    fn a_lone_point_on_the_lattice_is_not_distinctive() {
         // A row, a column, and isolated points.
         let row = (0..6).map(|x| (x, 0));
         let nodes: Vec<(i32, i32)> = row.chain([(5, 2), (5, 3), (5, 4), (5, 5), (0, 2), (2, 3), (3, 5)]).collect();

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_what_nalgebra_states() {
+    fn it_agrees_with_nalgebra() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for round in 0..1000 {
             let a = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));

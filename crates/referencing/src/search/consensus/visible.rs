@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_state_nothing_change_little_and_sure_ones_are_all_the_objects() {
+    fn uninformative_points_change_little_and_certain_ones_decide() {
         let fractions = fractions(50);
         let sure = vec![40.0; 20];
         let product = 800.0 + fractions[20];

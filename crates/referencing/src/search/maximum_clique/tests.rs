@@ -161,7 +161,7 @@ fn the_smallest_residual_decides_between_sets_of_one_size() {
 }
 
 #[test]
-fn alternatives_that_fraction_smallest_stand_first() {
+fn alternatives_with_the_smallest_overlap_come_first() {
     let best = named(4);
     let other = |clouds: [usize; 4]| (0..4).map(|i| Correspondence { model: i, cloud: clouds[i] }).collect::<Vec<_>>();
     let mut alternatives = vec![other([0, 1, 2, 9]), other([9, 8, 7, 6]), other([0, 1, 8, 7]), other([7, 8, 2, 3])];
@@ -244,7 +244,7 @@ fn tests_are_those_of_the_graph_and_of_the_proof() {
 ///
 /// The points are tested against the first sixteen while the set grows, and completely in the end.
 #[test]
-fn large_sets_are_tested_for_mirror_images_as_a_full() {
+fn large_sets_are_tested_for_mirror_images_as_a_unit() {
     let mut places: Vec<[f64; 3]> = scattered(45).iter().map(|[x, y, z]| [*x, *y, z - 1.0]).collect();
     let scene = Scene::of(&places, &places).named();
     let found = scene.search(&MaximumClique::default()).unwrap();

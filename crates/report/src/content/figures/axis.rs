@@ -110,11 +110,11 @@ pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
     let chart = Chart { panels: plotted, columns: 2, page: true, shape: 0.78, legend };
     let laws = if ranges(&key) { " Thin grey lines: growth with the distance z and with its square." } else { "" };
-    let said = format!(
+    let message = format!(
         "Error over {}: medians of the fixes, with bars from the 5 % to the 95 % quantile, slightly shifted apart. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m.{laws}",
         short(&key)
     );
-    figure("error-over-condition", caption(&said, run), &chart, data)
+    figure("error-over-condition", caption(&message, run), &chart, data)
 }
 
 /// Whether a condition is the distance to the objects, or nearly so.
@@ -203,8 +203,8 @@ pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let page = groups.len() * names.len() > 6;
     let chart = Chart { panels: plotted, columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
-    let said = "Distribution over the fixes: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
-    figure("distribution", caption(said, run), &chart, data)
+    let message = "Distribution over the fixes: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
+    figure("distribution", caption(message, run), &chart, data)
 }
 
 /// The number of fixes in the sample.

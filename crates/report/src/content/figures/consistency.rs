@@ -61,10 +61,10 @@ pub(super) fn histogram(run: &Run) -> Option<Figure> {
     };
     let legend = vec![Entry::line("fixes", 0), Entry::line("χ², six degrees of freedom", 1)];
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.66, legend };
-    let said = format!(
+    let message = format!(
         "NEES (normalised estimation error squared) of the {n} fixes of all trials that are not wrong. The curve is the density for a consistent covariance. The last column holds all larger values."
     );
-    figure("nees", caption(&said, run), &chart, data)
+    figure("nees", caption(&message, run), &chart, data)
 }
 
 /// The confidence levels (%) at which coverage is counted.
@@ -142,7 +142,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
     let legend = if names.len() > 1 { legend.collect() } else { Vec::new() };
     let chart = Chart { panels: vec![panel], columns: 1, page: false, shape: 0.8, legend };
     let called = proportion::called(run.trials.iter().map(|trial| &trial.header));
-    let said = format!(
+    let message = format!(
         "Coverage: the fraction of {n} fixes, wrong ones included, whose error is within the bound that their covariance gives for each confidence level{}. A consistent covariance is on the dashed diagonal; above it the covariance is too large, below it too small.",
         if banded {
             format!(", with {}", called.replace("intervals", "bands"))
@@ -150,7 +150,7 @@ pub(super) fn coverage(run: &Run) -> Option<Figure> {
             format!("; the table has {called}")
         }
     );
-    figure("coverage", caption(&said, run), &chart, data)
+    figure("coverage", caption(&message, run), &chart, data)
 }
 
 /// The quantile of χ² with six degrees of freedom, whose distribution function is 1 − e^(−x/2) (1 + x/2 + x²/8).

@@ -62,11 +62,11 @@ pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::both(name.clone(), index)).collect();
     let both = panels.len() > 1;
     let chart = Chart { panels, columns: 2, page: both, shape: 0.8, legend };
-    let said = format!(
+    let message = format!(
         "Search cost over the number of candidates: pair tests{}. Points are medians over half octaves with at least {MIN} attempts, bars run from the 5 % to the 95 % quantile. Searches that do not count pair tests have no line.",
         if both { " and time" } else { "" }
     );
-    figure("search-cost", caption(&said, run), &chart, data)
+    figure("search-cost", caption(&message, run), &chart, data)
 }
 
 /// The costs of all attempts, grouped by half octaves of the number of candidates.

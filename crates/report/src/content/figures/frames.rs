@@ -71,6 +71,6 @@ pub(super) fn errors(run: &Run) -> Option<Figure> {
         Vec::new()
     };
     let chart = Chart { panels: panels.collect(), columns: 2, page: true, shape: 0.7, legend };
-    let said = "Error of every fix over the frames; a frame without a mark has no fix. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m, which has another scene and camera.";
-    figure("error-over-frames", caption(said, run), &chart, data)
+    let message = "Error of every fix over the frames; a frame without a mark has no fix. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m, which has another scene and camera.";
+    figure("error-over-frames", caption(message, run), &chart, data)
 }

@@ -85,8 +85,8 @@ fn panels(run: &Run, max: usize) -> Vec<(String, Vec<(String, &Trial)>)> {
 }
 
 /// A caption that ends with the sentence on source and camera.
-pub(super) fn caption(said: &str, run: &Run) -> Text {
-    text![format!("{said} {}", conditions(run))]
+pub(super) fn caption(message: &str, run: &Run) -> Text {
+    text![format!("{message} {}", conditions(run))]
 }
 
 /// The index of the series with a name.

@@ -52,7 +52,7 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let legend = vec![Entry::mark("fixes", 0), Entry::mark("wrong fixes", 1)];
     let chart = Chart { panels: vec![panel], columns: 1, page: true, shape, legend };
     let intervals = proportion::called(run.trials.iter().map(|trial| &trial.header));
-    let said =
+    let message =
         format!("Fixes and wrong fixes in % of the attempts, with {intervals}. The remaining attempts were rejected.");
-    super::figure("rates", caption(&said, run), &chart, data)
+    super::figure("rates", caption(&message, run), &chart, data)
 }

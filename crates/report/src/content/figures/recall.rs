@@ -80,8 +80,8 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let chart = Chart { panels: plotted, columns, page, shape: if columns == 2 { 0.6 } else { 0.75 }, legend };
     let bands = proportion::called(run.trials.iter().map(|trial| &trial.header)).replace("intervals", "bands");
-    let said = format!(
+    let message = format!(
         "Recall: the fraction of all attempts whose TRE is below a bound, with {bands}. Rejected attempts and wrong fixes are below no bound."
     );
-    super::figure("recall", caption(&said, run), &chart, data)
+    super::figure("recall", caption(&message, run), &chart, data)
 }

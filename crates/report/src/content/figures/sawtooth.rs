@@ -93,6 +93,6 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
             Entry::mark("fix", 2),
         ],
     };
-    let said = "Camera position error relative to the object of the last fix, navigated and by odometry only from the first fix. Gaps are times without a pose.";
-    finish("sawtooth", caption(said, run), &chart, data)
+    let message = "Camera position error relative to the object of the last fix, navigated and by odometry only from the first fix. Gaps are times without a pose.";
+    finish("sawtooth", caption(message, run), &chart, data)
 }

@@ -98,13 +98,13 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         shape: 0.8,
         legend,
     };
-    let said = format!(
+    let message = format!(
         "Trajectory from above and from the side, on equal scales: true positions of the left camera, positions by the fixes and the survey,{} feature points and the bounding boxes of the objects. {}Log {}.",
         if sails { " the navigated trajectory, the trajectory by odometry only from the first fix," } else { "" },
         if every > 1 { format!("One frame in {every} is shown. ") } else { String::new() },
         trial.file()
     );
-    super::figure("trajectory", caption(&said, run), &chart, data)
+    super::figure("trajectory", caption(&message, run), &chart, data)
 }
 
 fn line(

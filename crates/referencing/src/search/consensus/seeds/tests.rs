@@ -31,7 +31,7 @@ fn scene(rng: &mut ChaCha8Rng) -> (Vec<ModelPoint>, Vec<MeasuredPoint>) {
 ///
 /// Fails if the pairs of parts are not followed, and if skipping them is not reported.
 #[test]
-fn a_part_is_found_where_there_are_no_limits_and_a_full_in_any_case() {
+fn a_part_is_found_without_limits_and_the_complete_set_always() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     for _ in 0..10 {
         let (model, cloud) = scene(&mut rng);
