@@ -3,8 +3,10 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::in_range;
 
-use super::Degenerate;
-use crate::{Observation, Observations};
+use crate::{
+    observations::{Observation, Observations},
+    solve::Degenerate,
+};
 
 /// Checks that the setting `key` is a fraction from 0 to below 1.
 pub(super) fn fraction(key: &str, value: f64) -> Result<(), String> {

@@ -5,14 +5,18 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{Term, minimize},
-    roots::widest,
-    sandwich,
+use crate::{
+    observations::Observations,
+    solve::{
+        Degenerate, Solver,
+        covariance::sandwich,
+        degeneracy::{check, fraction},
+        likelihood::{
+            descent::{Term, minimize},
+            roots::widest,
+        },
+    },
 };
-use crate::Observations;
 
 /// Least squares by a linearised rotation: min Σ ‖P_k − C_k H‖².
 ///

@@ -4,15 +4,17 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    irls::distance,
-    kabsch::{self, fit_weighted},
-    sandwich,
-    weighted_kabsch::variance,
+use crate::{
+    observations::Observations,
+    solve::{
+        Degenerate, Solver,
+        covariance::sandwich,
+        degeneracy::{check, fraction},
+        irls::distance,
+        kabsch::{self, fit_weighted},
+        weighted_kabsch::variance,
+    },
 };
-use crate::Observations;
 
 /// Truncated least squares: min Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, by graduated non-convexity.
 ///

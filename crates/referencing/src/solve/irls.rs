@@ -5,16 +5,20 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver, converged,
-    degeneracy::{check, fraction},
-    kabsch::fit_weighted,
-    normal::singular,
-    resampled::{self, Answer},
-    sandwich,
-    weighted_kabsch::variance,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        Degenerate, Solver, converged,
+        covariance::{
+            resampled::{self, Answer},
+            sandwich,
+        },
+        degeneracy::{check, fraction},
+        kabsch::fit_weighted,
+        likelihood::normal::singular,
+        weighted_kabsch::variance,
+    },
 };
-use crate::{Observation, Observations};
 
 /// The loss of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

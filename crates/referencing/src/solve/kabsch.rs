@@ -5,12 +5,14 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    sandwich,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        Degenerate, Solver,
+        covariance::sandwich,
+        degeneracy::{check, fraction},
+    },
 };
-use crate::{Observation, Observations};
 
 /// Kabsch's least squares over rigid motions: min Σ ‖P_k − C_k H‖², with equal weights.
 ///

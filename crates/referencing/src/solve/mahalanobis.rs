@@ -6,16 +6,20 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 use smallvec::SmallVec;
 
-use super::{
-    AlternativePose, Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{Term, linearize, minimize, model_errors},
-    initial_poses::{alternatives, maximum_likelihood},
-    kabsch,
-    pixel_terms::{FEW, PixelTerms, TermTarget},
-    profile::inflated,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        AlternativePose, Degenerate, Solver,
+        degeneracy::{check, fraction},
+        kabsch,
+        likelihood::{
+            descent::{Term, linearize, minimize, model_errors},
+            initial_poses::{alternatives, maximum_likelihood},
+            pixel_terms::{FEW, PixelTerms, TermTarget},
+            profile::inflated,
+        },
+    },
 };
-use crate::{Observation, Observations};
 
 /// Weighted 3D–3D least squares: min Σ rᵀ (Σ_measured + σ_model² I)⁻¹ r, r = C − H⁻¹P in camera axes.
 ///
@@ -166,7 +170,7 @@ mod tests {
     use seafix_geometry::{Pinhole, Point, UncertainPixels, UncertainPoint};
 
     use super::*;
-    use crate::solve::{StereoReprojection, numerical};
+    use crate::solve::{StereoReprojection, covariance::numerical};
 
     const PLACES: [[f64; 3]; 5] =
         [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];

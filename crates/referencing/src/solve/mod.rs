@@ -6,49 +6,36 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::Observations;
 
+mod covariance;
 mod degeneracy;
-mod descent;
 mod fast_local_matrix;
 mod gnc_tls;
 mod horn;
-mod initial_poses;
 mod irls;
 mod kabsch;
 mod l_bfgs;
-pub(crate) mod leave_out;
 pub(crate) mod likelihood;
 mod mahalanobis;
 mod nelder_mead;
-mod normal;
-mod numerical;
-mod p3p;
 mod p3p_stereo;
-mod pixel_cost;
-mod pixel_terms;
-mod profile;
-mod resampled;
-mod roots;
-mod sandwich;
-pub(crate) mod scale_error;
-mod sigma_directions;
-mod stereo_cameras;
 mod stereo_reprojection;
 #[cfg(test)]
 mod tests;
 mod triad;
 mod umeyama;
 mod weighted_kabsch;
-mod whitened;
 
 pub(crate) use degeneracy::{ON_A_LINE, second_ratio};
-pub(crate) use descent::Term;
 pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
 pub(crate) use kabsch::fit as least_squares;
+pub use likelihood::scale_error::ScaleError;
+pub(crate) use likelihood::{
+    descent::Term,
+    normal::{inverse, rounding},
+    pixel_terms::{PixelTerms, TermTarget as PixelTarget},
+};
 pub use mahalanobis::Mahalanobis;
-pub(crate) use normal::{inverse, rounding};
-pub(crate) use pixel_terms::{PixelTerms, TermTarget as PixelTarget};
-pub use scale_error::ScaleError;
 pub use stereo_reprojection::StereoReprojection;
 pub use triad::{Choose, Triad};
 
@@ -293,7 +280,7 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        numerical::covariance(|moved| self.solve(moved), data, at)
+        covariance::numerical::covariance(|moved| self.solve(moved), data, at)
     }
 
     /// The contribution of model errors to the [`covariance`](Self::covariance): H = σ_model ∂ξ/∂P for each point.
@@ -310,7 +297,7 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
-        numerical::model_errors(|moved| self.solve(moved), data, at)
+        covariance::numerical::model_errors(|moved| self.solve(moved), data, at)
     }
 }
 

@@ -4,17 +4,22 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    AlternativePose, Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{NEAR, descend, linearize, settle},
-    initial_poses, kabsch,
-    pixel_terms::{PixelTerms, TermTarget},
-    profile::inflated,
-    roots::{Roots, squares, widest},
-    stereo_reprojection::pixels_and_rig,
+use crate::{
+    observations::Observations,
+    solve::{
+        AlternativePose, Degenerate, Solver,
+        degeneracy::{check, fraction},
+        kabsch,
+        likelihood::{
+            descent::{NEAR, descend, linearize, settle},
+            initial_poses,
+            pixel_terms::{PixelTerms, TermTarget},
+            profile::inflated,
+            roots::{Roots, squares, widest},
+        },
+        stereo_reprojection::pixels_and_rig,
+    },
 };
-use crate::Observations;
 
 /// The pose from the twelve pixel coordinates of three widely spread points.
 ///

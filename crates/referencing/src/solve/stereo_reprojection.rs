@@ -5,15 +5,19 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    AlternativePose, Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{linearize, model_errors},
-    initial_poses::{alternatives, maximum_likelihood},
-    pixel_terms::{PixelTerms, TermTarget},
-    profile::inflated,
+use crate::{
+    observations::Observations,
+    solve::{
+        AlternativePose, Degenerate, Solver,
+        degeneracy::{check, fraction},
+        likelihood::{
+            descent::{linearize, model_errors},
+            initial_poses::{alternatives, maximum_likelihood},
+            pixel_terms::{PixelTerms, TermTarget},
+            profile::inflated,
+        },
+    },
 };
-use crate::Observations;
 
 /// The maximum-likelihood pose given the pixels of both images: min Σ rᵀ S⁻¹ r over SE(3).
 ///

@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Object, Pinhole, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
 
-use super::*;
+use super::{covariance::numerical, *};
 use crate::Observation;
 
 fn motion() -> Transform<Object, Camera> {
@@ -332,7 +332,7 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
 /// Fails if the lever of the rotation has the wrong sign.
 #[test]
 fn derivatives_are_those_of_the_projections_at_random_poses() {
-    use super::{
+    use super::likelihood::{
         descent::linearize,
         pixel_terms::{PixelTerms, TermTarget},
     };

@@ -4,13 +4,15 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    kabsch::fit_weighted,
-    sandwich,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        Degenerate, Solver,
+        covariance::sandwich,
+        degeneracy::{check, fraction},
+        kabsch::fit_weighted,
+    },
 };
-use crate::{Observation, Observations};
 
 /// Kabsch's least squares with weights: min Σ w_k ‖P_k − C_k H‖², w_k = 3 / tr(Σ_k + σ_model² I).
 ///

@@ -3,8 +3,10 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::descent::{Linearized, Term, linearize};
-use crate::Observation;
+use crate::{
+    observations::Observation,
+    solve::likelihood::descent::{Linearized, Term, linearize},
+};
 
 /// Standard deviation of the attitude (rad, three axes together) up to which first order holds.
 const STRAIGHT: f64 = 0.02;
@@ -34,7 +36,7 @@ const FOLLOWS: usize = 3;
 /// second moment about the answer, which includes its bias.
 ///
 /// (Bates and Watts, *Nonlinear regression analysis and its applications*, 1988, chapter 6.)
-pub(super) fn inflated(
+pub(crate) fn inflated(
     points: &[Observation],
     at: &Transform<Object, Camera>,
     first: Matrix6<f64>,

@@ -4,11 +4,17 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use seafix_geometry::StereoRig;
 use smallvec::SmallVec;
 
-use super::{Degenerate, descent::Term, mahalanobis::information, stereo_cameras::StereoCameras, whitened::Whitener};
-use crate::Observation;
+use crate::{
+    observations::Observation,
+    solve::{
+        Degenerate,
+        likelihood::{descent::Term, stereo_cameras::StereoCameras, whitened::Whitener},
+        mahalanobis::information,
+    },
+};
 
 /// Number of points that are kept without heap allocation.
-pub(super) const FEW: usize = 32;
+pub(crate) const FEW: usize = 32;
 
 /// The observed quantity that is compared with a point's projection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +30,7 @@ pub(crate) struct PixelTerms<'a> {
     cameras: StereoCameras<'a>,
     all: SmallVec<[PixelTerm; FEW]>,
     /// Whether a model point is uncertain, so that weights depend on the pose.
-    pub(super) weights_move: bool,
+    pub(crate) weights_move: bool,
 }
 
 enum PixelTerm {
@@ -35,7 +41,7 @@ enum PixelTerm {
 }
 
 /// Lower bound of pixel noise (px); exact pixels would have infinite weight.
-pub(super) const PIXEL_FLOOR: f64 = 1e-6;
+pub(crate) const PIXEL_FLOOR: f64 = 1e-6;
 
 impl<'a> PixelTerms<'a> {
     /// An empty set of terms; [`see`](Self::see) fills it in place, as it is large.

@@ -2,13 +2,17 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{
-    Mahalanobis, ScaleError,
-    descent::{Linearized, linearize},
-    mahalanobis::covariance,
-    scale_error::scale_error,
+use crate::{
+    observations::Observations,
+    solve::{
+        Mahalanobis, ScaleError,
+        likelihood::{
+            descent::{Linearized, linearize},
+            scale_error::scale_error,
+        },
+        mahalanobis::covariance,
+    },
 };
-use crate::Observations;
 
 /// The contribution of each point to the normal equations; an exclusion costs one 6×6 solve.
 pub(crate) struct Deletions<'a> {

@@ -5,14 +5,17 @@ use std::cell::RefCell;
 use nalgebra::{Matrix3, UnitQuaternion, UnitVector3, Vector3};
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
-use super::{
-    AlternativePose, Degenerate,
-    descent::{Linearized, NEAR, descend, linearize, settle},
-    kabsch,
-    pixel_terms::PixelTerms,
-    roots::{roots, widest},
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        AlternativePose, Degenerate, kabsch,
+        likelihood::{
+            descent::{Linearized, NEAR, descend, linearize, settle},
+            pixel_terms::PixelTerms,
+            roots::{roots, widest},
+        },
+    },
 };
-use crate::{Observation, Observations};
 
 /// Standard deviation of the attitude (rad, three axes together) above which the minimum may be a wrong one.
 const WEAK: f64 = 0.01;
@@ -27,7 +30,7 @@ const WEAK: f64 = 0.01;
 ///
 /// The error of the first initial pose if none leads to a minimum, and that of an unreached minimum with a cost below
 /// all others.
-pub(super) fn maximum_likelihood(
+pub(crate) fn maximum_likelihood(
     data: &Observations<'_>,
     rig: &StereoRig,
     starts: usize,
@@ -70,7 +73,7 @@ pub(super) fn maximum_likelihood(
 ///
 /// They are sought if [`maximum_likelihood`] doubts its first answer, from the P3P poses of either camera and from the
 /// mirror image; a solver with one initial pose returns none.
-pub(super) fn alternatives(
+pub(crate) fn alternatives(
     data: &Observations<'_>,
     rig: &StereoRig,
     starts: usize,

@@ -3,11 +3,13 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{
-    descent::{Term, linearize},
-    mahalanobis::Terms,
+use crate::{
+    observations::Observation,
+    solve::{
+        likelihood::descent::{Term, linearize},
+        mahalanobis::Terms,
+    },
 };
-use crate::Observation;
 
 /// The relative excess of measured distances over the model's, from a fit with a scale.
 ///
@@ -28,7 +30,7 @@ pub struct ScaleError {
 /// motion as in [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, where N = Σ
 /// JᵀWJ, c = Σ JᵀWd, s = Σ dᵀWd − cᵀ N⁻¹ c. `None` if the points determine no motion, or no scale beside it; see
 /// [`isotropic`].
-pub(super) fn scale_error(
+pub(crate) fn scale_error(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
     terms: Terms<'_>,

@@ -7,17 +7,19 @@ use nalgebra::{Matrix4, Matrix6, Vector6};
 use seafix_component::in_range;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
-use super::{
-    Degenerate, Solver, StereoReprojection, converged,
-    degeneracy::{check, fraction},
-    kabsch,
-    normal::{inverse, singular},
-    stereo_reprojection::pixels_and_rig,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        Degenerate, Solver, StereoReprojection, converged,
+        degeneracy::{check, fraction},
+        kabsch,
+        likelihood::normal::{inverse, singular},
+        stereo_reprojection::pixels_and_rig,
+    },
 };
-use crate::{Observation, Observations};
 
 /// A general-purpose optimiser that minimises a [`PixelCost`]; every implementor is a [`Solver`].
-pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
+pub(crate) trait Optimiser: Send + Sync + std::fmt::Debug {
     /// The maximum number of iterations, and the minimum ratio of second to first extent of the points.
     fn limits(&self) -> (u64, f64);
 
@@ -67,7 +69,7 @@ impl<T: Optimiser> Solver for T {
 
 /// The best evaluated argument: its cost and its six numbers.
 #[derive(Debug)]
-pub(super) struct Best(RefCell<(f64, [f64; 6])>);
+pub(crate) struct Best(RefCell<(f64, [f64; 6])>);
 
 impl Default for Best {
     fn default() -> Self {
@@ -77,7 +79,7 @@ impl Default for Best {
 
 impl Best {
     /// The cost and the six numbers; infinite cost and zeros before any evaluation.
-    pub(super) fn seen(&self) -> (f64, [f64; 6]) {
+    pub(crate) fn seen(&self) -> (f64, [f64; 6]) {
         *self.0.borrow()
     }
 }
@@ -87,7 +89,7 @@ impl Best {
 /// S = Σ_px + σ_model² J Jᵀ, with J at the measured point. L Lᵀ is the covariance at the start from small steps of its
 /// own, so that x is in standard deviations and the cost is equally steep in all directions. The function shares
 /// nothing with the solvers that it verifies: projections are the rig's, and the gradient is by central differences.
-pub(super) struct PixelCost<'a> {
+pub(crate) struct PixelCost<'a> {
     rig: &'a StereoRig,
     points: &'a [Observation],
     weights: Vec<Matrix4<f64>>,
@@ -103,7 +105,7 @@ const STEP: f64 = 1e-4;
 
 impl<'a> PixelCost<'a> {
     /// The cost function about `start`.
-    pub(super) fn of(
+    pub(crate) fn of(
         data: &'a Observations<'_>,
         rig: &'a StereoRig,
         start: Transform<Object, Camera>,
@@ -162,7 +164,7 @@ impl<'a> PixelCost<'a> {
     }
 
     /// The pose of six numbers.
-    pub(super) fn pose(&self, x: &[f64]) -> Transform<Object, Camera> {
+    pub(crate) fn pose(&self, x: &[f64]) -> Transform<Object, Camera> {
         self.start.perturbed(&(self.scale * Vector6::from_column_slice(x))).renormalized()
     }
 
