@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Checks that the setting `key` is a fraction from 0 to below 1.
-pub(super) fn fraction(key: &str, value: f64) -> Result<(), String> {
+pub(crate) fn fraction(key: &str, value: f64) -> Result<(), String> {
     in_range((0.0..1.0).contains(&value), key, value, "a fraction from 0 to below 1")
 }
 
@@ -17,6 +17,22 @@ pub(super) fn fraction(key: &str, value: f64) -> Result<(), String> {
 pub(crate) fn centroid(points: impl ExactSizeIterator<Item = Vector3<f64>>) -> Vector3<f64> {
     let count = points.len().max(1) as f64;
     points.sum::<Vector3<f64>>() / count
+}
+
+/// Three distant model points: the farthest from the centroid, the farthest from that, and the farthest from the line
+/// through both.
+pub(crate) fn widest(data: &Observations<'_>) -> [usize; 3] {
+    let at = |i: usize| data.points[i].model.coords;
+    let centre = data.points.iter().map(|point| point.model.coords).sum::<Vector3<f64>>() / data.points.len() as f64;
+    let farthest = |measure: &dyn Fn(usize) -> f64| {
+        let better = |best: usize, i: usize| if measure(i) > measure(best) { i } else { best };
+        (0..data.points.len()).fold(0, better)
+    };
+    let first = farthest(&|i| (at(i) - centre).norm_squared());
+    let second = farthest(&|i| (at(i) - at(first)).norm_squared());
+    let along = at(second) - at(first);
+    let third = farthest(&|i| along.cross(&(at(i) - at(first))).norm_squared());
+    [first, second, third]
 }
 
 /// Σ (p − p̄)(p − p̄)ᵀ.
@@ -51,7 +67,7 @@ pub(crate) fn second_ratio(points: impl ExactSizeIterator<Item = Vector3<f64>> +
 }
 
 /// Rejects too few points, and coordinates and noise that are not finite.
-pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
+pub(crate) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     let found = data.points.len();
     if found < needed {
         return Err(Degenerate::TooFew { found, needed });
@@ -64,7 +80,7 @@ pub(super) fn finite(data: &Observations<'_>, needed: usize) -> Result<(), Degen
 }
 
 /// Rejects as [`finite`] does and, with a rig, points behind the camera or too far away.
-pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
+pub(crate) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degenerate> {
     // One pass accepts valid points, which are the rule: a number that is not finite leaves no finite sum.
     let (mut sum, mut front) = (0.0, true);
     for point in &data.points {
@@ -86,7 +102,7 @@ pub(super) fn seen(data: &Observations<'_>, needed: usize) -> Result<(), Degener
 }
 
 /// Rejects as [`seen`] does, and collinear points, measured or model: second extent below `min` of the first.
-pub(super) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<(), Degenerate> {
+pub(crate) fn check(data: &Observations<'_>, needed: usize, min: f64) -> Result<(), Degenerate> {
     seen(data, needed)?;
     let model = data.points.iter().map(|point| point.model.coords);
     let measured = data.points.iter().map(|point| point.measured.at.coords);

@@ -10,11 +10,8 @@ use crate::{
     solve::{
         Degenerate, Solver,
         covariance::sandwich,
-        degeneracy::{check, fraction},
-        likelihood::{
-            descent::{Term, minimize},
-            roots::widest,
-        },
+        degeneracy::{check, fraction, widest},
+        likelihood::descent::{Term, minimize},
     },
 };
 

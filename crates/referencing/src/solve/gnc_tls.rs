@@ -8,11 +8,9 @@ use crate::{
     observations::Observations,
     solve::{
         Degenerate, Solver,
+        closed_form::{distance, fit, fit_weighted, variance},
         covariance::sandwich,
         degeneracy::{check, fraction},
-        irls::distance,
-        kabsch::{self, fit_weighted},
-        weighted_kabsch::variance,
     },
 };
 
@@ -87,7 +85,7 @@ impl Solver for GncTls {
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
         let kept = Observations { points: kept, rig: data.rig };
-        sandwich::or_resampled(&kept, at, |_| 1.0, |sampled| Ok(kabsch::fit(&sampled.points)))
+        sandwich::or_resampled(&kept, at, |_| 1.0, |sampled| Ok(fit(&sampled.points)))
     }
 }
 

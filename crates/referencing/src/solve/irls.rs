@@ -8,15 +8,15 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate, Solver, converged,
+        Degenerate, Solver,
+        closed_form::{distance, fit_weighted, variance},
+        converged,
         covariance::{
             resampled::{self, Answer},
             sandwich,
         },
         degeneracy::{check, fraction},
-        kabsch::fit_weighted,
         likelihood::normal::singular,
-        weighted_kabsch::variance,
     },
 };
 
@@ -138,12 +138,4 @@ impl Irls {
             Loss::UnSquared => 1.0 / point.residual(pose).norm().max(CORNER * variance(point).sqrt()),
         }
     }
-}
-
-/// The residual in standard deviations of its point, one number for all axes.
-///
-/// With the full covariance the weights would belong to another sum than the minimised one, and the iteration might not
-/// converge.
-pub(super) fn distance(point: &Observation, pose: &Transform<Object, Camera>) -> f64 {
-    point.residual(pose).norm() / variance(point).sqrt()
 }

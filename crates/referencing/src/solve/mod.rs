@@ -6,6 +6,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::Observations;
 
+mod closed_form;
 mod covariance;
 mod degeneracy;
 mod fast_local_matrix;
@@ -17,6 +18,7 @@ mod l_bfgs;
 pub(crate) mod likelihood;
 mod mahalanobis;
 mod nelder_mead;
+mod optimiser;
 mod p3p_stereo;
 mod stereo_reprojection;
 #[cfg(test)]
@@ -25,10 +27,10 @@ mod triad;
 mod umeyama;
 mod weighted_kabsch;
 
+pub(crate) use closed_form::fit as least_squares;
 pub(crate) use degeneracy::{ON_A_LINE, second_ratio};
 pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
-pub(crate) use kabsch::fit as least_squares;
 pub use likelihood::scale_error::ScaleError;
 pub(crate) use likelihood::{
     descent::Term,

@@ -11,7 +11,8 @@ use crate::{
     observations::Observations,
     solve::{
         Degenerate,
-        likelihood::pixel_cost::{Best, Optimiser, PixelCost},
+        likelihood::pixel_cost::{Best, PixelCost},
+        optimiser::Optimiser,
     },
 };
 

@@ -5,12 +5,12 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    observations::{Observation, Observations},
+    observations::Observations,
     solve::{
         Degenerate, Solver,
+        closed_form::{fit_weighted, variance},
         covariance::sandwich,
         degeneracy::{check, fraction},
-        kabsch::fit_weighted,
     },
 };
 
@@ -56,9 +56,4 @@ impl Solver for WeightedKabsch {
         let weight = |k: usize| 1.0 / variance(&data.points[k]);
         sandwich::or_resampled(data, at, weight, |sampled| self.solve(sampled))
     }
-}
-
-/// The mean variance of a residual along an axis (m²).
-pub(super) fn variance(point: &Observation) -> f64 {
-    point.noise().trace() / 3.0
 }

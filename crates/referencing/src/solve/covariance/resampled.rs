@@ -9,8 +9,8 @@ use crate::{
     observations::{Observation, Observations},
     solve::{
         Degenerate,
+        closed_form::distance,
         covariance::sigma_directions::{SigmaDirections, rows},
-        irls::distance,
         likelihood::{normal::singular, pixel_terms::PIXEL_FLOOR},
     },
 };

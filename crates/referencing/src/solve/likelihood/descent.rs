@@ -29,6 +29,9 @@ impl Term {
     }
 }
 
+/// The term of a point, by index, at the position where a pose puts it.
+pub(crate) type Terms<'a> = &'a dyn Fn(usize, &Vector3<f64>) -> Option<Term>;
+
 /// The sum of all terms at one pose: normal equations of the step ξ in `pose · Exp(ξ)`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Linearized {

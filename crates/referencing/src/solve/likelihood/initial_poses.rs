@@ -8,17 +8,22 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        AlternativePose, Degenerate, kabsch,
+        AlternativePose, Degenerate,
+        closed_form::fit,
+        degeneracy::widest,
         likelihood::{
             descent::{Linearized, NEAR, descend, linearize, settle},
             pixel_terms::PixelTerms,
-            roots::{roots, widest},
+            roots::roots,
         },
     },
 };
 
 /// Standard deviation of the attitude (rad, three axes together) above which the minimum may be a wrong one.
 const WEAK: f64 = 0.01;
+
+/// Default of the maximum number of initial poses: the unweighted fit and the four P3P poses of one camera.
+pub(crate) const STARTS: usize = 5;
 
 /// The pose of smallest cost over several initial poses.
 ///
@@ -47,7 +52,7 @@ pub(crate) fn maximum_likelihood(
             }
         })
     };
-    let first = from(&kabsch::fit(points));
+    let first = from(&fit(points));
     if starts == 1 || first.as_ref().is_ok_and(|(_, all)| is_clear(all, points.len())) {
         return first.map(|(pose, _)| pose);
     }

@@ -7,6 +7,8 @@ pub(crate) mod normal;
 mod p3p;
 pub(crate) mod pixel_cost;
 pub(crate) mod pixel_terms;
+pub(crate) mod point_fit;
+pub(crate) mod point_terms;
 pub(crate) mod profile;
 mod residuals;
 pub(crate) mod roots;

@@ -4,68 +4,15 @@ use std::cell::RefCell;
 
 use argmin::core::{CostFunction, Error, Gradient};
 use nalgebra::{Matrix4, Matrix6, Vector6};
-use seafix_component::in_range;
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate, Solver, StereoReprojection, converged,
-        degeneracy::{check, fraction},
-        kabsch,
+        Degenerate,
         likelihood::normal::{inverse, singular},
-        stereo_reprojection::pixels_and_rig,
     },
 };
-
-/// A general-purpose optimiser that minimises a [`PixelCost`]; every implementor is a [`Solver`].
-pub(crate) trait Optimiser: Send + Sync + std::fmt::Debug {
-    /// The maximum number of iterations, and the minimum ratio of second to first extent of the points.
-    fn limits(&self) -> (u64, f64);
-
-    /// The pose of lowest cost from `start`, and the number of iterations.
-    fn lower(
-        &self,
-        data: &Observations<'_>,
-        rig: &StereoRig,
-        start: &Transform<Object, Camera>,
-    ) -> Result<(Transform<Object, Camera>, u64), Degenerate>;
-
-    /// Checks the range of the limits.
-    fn check_limits(&self) -> Result<(), String> {
-        let (iterations, min_ratio) = self.limits();
-        in_range((1..=1_000_000).contains(&iterations), "iterations", iterations, "1 to 1000000")?;
-        fraction("min-ratio", min_ratio)
-    }
-}
-
-impl<T: Optimiser> Solver for T {
-    fn needs_pixels(&self) -> bool {
-        true
-    }
-
-    fn to_rounding(&self) -> bool {
-        false
-    }
-
-    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.limits().1)?;
-        let rig = pixels_and_rig(data)?;
-        let (pose, iterations) = self.lower(data, rig, &kabsch::fit(&data.points))?;
-        // Independent of the library's termination status: the gradient vanishes at a minimum.
-        let off = PixelCost::of(data, rig, pose, &Best::default())?.distance();
-        converged(iterations, off).map(|()| pose)
-    }
-
-    /// The covariance of the likelihood that the optimiser maximises.
-    fn covariance(
-        &self,
-        data: &Observations<'_>,
-        at: &Transform<Object, Camera>,
-    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        StereoReprojection::default().covariance(data, at)
-    }
-}
 
 /// The best evaluated argument: its cost and its six numbers.
 #[derive(Debug)]
@@ -146,7 +93,7 @@ impl<'a> PixelCost<'a> {
 
     /// The distance of the minimum from the start (standard deviations of the pose): half of the gradient, as χ² is the
     /// square of that distance.
-    fn distance(&self) -> f64 {
+    pub(crate) fn distance(&self) -> f64 {
         0.5 * Vector6::from(self.slope(&[0.0; 6])).norm()
     }
 

@@ -5,16 +5,17 @@ use seafix_geometry::StereoRig;
 use smallvec::SmallVec;
 
 use crate::{
-    observations::Observation,
+    observations::{Observation, Observations},
     solve::{
         Degenerate,
-        likelihood::{descent::Term, stereo_cameras::StereoCameras, whitened::Whitener},
-        mahalanobis::information,
+        likelihood::{
+            descent::Term,
+            point_terms::{FEW, information},
+            stereo_cameras::StereoCameras,
+            whitened::Whitener,
+        },
     },
 };
-
-/// Number of points that are kept without heap allocation.
-pub(crate) const FEW: usize = 32;
 
 /// The observed quantity that is compared with a point's projection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +24,16 @@ pub(crate) enum TermTarget {
     Pixels,
     /// The pixels of the triangulated point, as in 3D–3D fits with covariances at the fitted point.
     Triangulated,
+}
+
+/// The rig, if it and the pixels of every point are given.
+pub(crate) fn pixels_and_rig<'a>(data: &Observations<'a>) -> Result<&'a StereoRig, Degenerate> {
+    data.rig.filter(|_| data.points.iter().all(|point| point.pixels.is_some())).ok_or(Degenerate::NoPixels)
+}
+
+/// The rig, if it and the pixels of some point are given.
+pub(crate) fn rig_of_pixels<'a>(data: &Observations<'a>) -> Option<&'a StereoRig> {
+    data.rig.filter(|_| data.points.iter().any(|point| point.pixels.is_some()))
 }
 
 /// The observed points of one problem.

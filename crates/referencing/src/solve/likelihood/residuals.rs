@@ -4,9 +4,9 @@ use seafix_geometry::{Camera, Object, Transform};
 
 use crate::{
     observations::Observations,
-    solve::{
-        likelihood::descent::{linearize, minimize},
-        mahalanobis::Measured,
+    solve::likelihood::{
+        descent::{linearize, minimize},
+        point_terms::Measured,
     },
 };
 

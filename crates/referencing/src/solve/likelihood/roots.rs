@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
 
 use crate::{
     observations::{Observation, Observations},
-    solve::{Degenerate, kabsch, likelihood::p3p},
+    solve::{Degenerate, closed_form::fit, degeneracy::widest, likelihood::p3p},
 };
 
 /// Up to eight poses, in order of their cost over the pixels of all points.
@@ -63,7 +63,7 @@ impl Roots {
                 let at = ray * *distance;
                 point.measured.at = if right { left_from_right * Point::from(at) } else { Point::from(at) };
             }
-            let pose = kabsch::fit(&three);
+            let pose = fit(&three);
             if let Ok(cost) = squares(data, rig, &pose) {
                 self.insert(pose, cost);
             }
@@ -89,20 +89,4 @@ pub(crate) fn squares(
         Ok((seen.at.coordinates() - expected.coordinates()).norm_squared())
     };
     data.points.iter().enumerate().map(of).sum()
-}
-
-/// Three distant model points: the farthest from the centroid, the farthest from that, and the farthest from the line
-/// through both.
-pub(crate) fn widest(data: &Observations<'_>) -> [usize; 3] {
-    let at = |i: usize| data.points[i].model.coords;
-    let centre = data.points.iter().map(|point| point.model.coords).sum::<Vector3<f64>>() / data.points.len() as f64;
-    let farthest = |measure: &dyn Fn(usize) -> f64| {
-        let better = |best: usize, i: usize| if measure(i) > measure(best) { i } else { best };
-        (0..data.points.len()).fold(0, better)
-    };
-    let first = farthest(&|i| (at(i) - centre).norm_squared());
-    let second = farthest(&|i| (at(i) - at(first)).norm_squared());
-    let along = at(second) - at(first);
-    let third = farthest(&|i| along.cross(&(at(i) - at(first))).norm_squared());
-    [first, second, third]
 }

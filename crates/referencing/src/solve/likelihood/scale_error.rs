@@ -5,10 +5,7 @@ use seafix_geometry::{Camera, Object, Transform};
 
 use crate::{
     observations::Observation,
-    solve::{
-        likelihood::descent::{Term, linearize},
-        mahalanobis::Terms,
-    },
+    solve::likelihood::descent::{Term, Terms, linearize},
 };
 
 /// The relative excess of measured distances over the model's, from a fit with a scale.
@@ -77,7 +74,7 @@ mod tests {
     use seafix_geometry::{Point, UncertainPoint};
 
     use super::*;
-    use crate::{Mahalanobis, Observations};
+    use crate::{observations::Observations, solve::likelihood::point_fit::solved};
 
     const SIGMA: f64 = 0.002;
 
@@ -92,7 +89,7 @@ mod tests {
             model_sigma: 0.0,
         };
         let data = Observations { points: (0..8).map(seen).collect(), rig: None };
-        Mahalanobis::default().solved(&data, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
+        solved(&data, None, 1, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
     }
 
     /// For eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion equals a scaling: σ = 2 mm/√18 m.
