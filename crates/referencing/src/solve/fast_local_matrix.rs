@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate, Solver,
         covariance::sandwich,
-        degeneracy::{check, fraction, widest},
+        degeneracy::{Degenerate, check, fraction, widest},
         likelihood::descent::{Term, minimize},
+        solver::Solver,
     },
 };
 

@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate, Solver,
         closed_form::{distance, fit, fit_weighted, variance},
         covariance::sandwich,
-        degeneracy::{check, fraction},
+        degeneracy::{Degenerate, check, fraction},
+        solver::Solver,
     },
 };
 

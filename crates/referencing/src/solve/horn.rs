@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate, Solver,
         covariance::sandwich,
-        degeneracy::{centroid, check, fraction},
+        degeneracy::{Degenerate, centroid, check, fraction},
+        solver::Solver,
     },
 };
 

@@ -8,15 +8,14 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate, Solver,
         closed_form::{distance, fit_weighted, variance},
-        converged,
         covariance::{
             resampled::{self, Answer},
             sandwich,
         },
-        degeneracy::{check, fraction},
+        degeneracy::{Degenerate, check, converged, fraction},
         likelihood::normal::singular,
+        solver::Solver,
     },
 };
 

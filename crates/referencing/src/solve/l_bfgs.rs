@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate,
+        degeneracy::Degenerate,
         likelihood::pixel_cost::{Best, PixelCost},
         optimiser::Optimiser,
     },

@@ -8,16 +8,16 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        AlternativePose, Degenerate, Solver,
-        degeneracy::{check, fraction},
+        degeneracy::{Degenerate, check, fraction},
         likelihood::{
             descent::model_errors,
-            initial_poses::{STARTS, alternatives},
+            initial_poses::{AlternativePose, STARTS, alternatives},
             pixel_terms::{PixelTerms, TermTarget, rig_of_pixels},
             point_fit::{covariance, solved},
             point_terms::Measured,
             profile::pixel_covariance,
         },
+        solver::Solver,
     },
 };
 

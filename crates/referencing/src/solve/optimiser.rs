@@ -6,15 +6,14 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate, Solver,
         closed_form::fit,
-        converged,
-        degeneracy::{check, fraction},
+        degeneracy::{Degenerate, check, converged, fraction},
         likelihood::{
             pixel_cost::{Best, PixelCost},
             pixel_terms::{TermTarget, pixels_and_rig},
             profile::pixel_covariance,
         },
+        solver::Solver,
     },
 };
 

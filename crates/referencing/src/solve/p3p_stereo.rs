@@ -7,16 +7,16 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        AlternativePose, Degenerate, Solver,
         closed_form::fit,
-        degeneracy::{check, fraction, widest},
+        degeneracy::{Degenerate, check, fraction, widest},
         likelihood::{
             descent::{NEAR, descend, linearize, settle},
-            initial_poses,
+            initial_poses::{self, AlternativePose},
             pixel_terms::{PixelTerms, TermTarget, pixels_and_rig},
             profile::pixel_covariance,
             roots::{Roots, squares},
         },
+        solver::Solver,
     },
 };
 

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::Observations,
     solve::{
-        AlternativePose, Degenerate, Solver,
-        degeneracy::{check, fraction},
+        degeneracy::{Degenerate, check, fraction},
         likelihood::{
             descent::model_errors,
-            initial_poses::{STARTS, alternatives, maximum_likelihood},
+            initial_poses::{AlternativePose, STARTS, alternatives, maximum_likelihood},
             pixel_terms::{PixelTerms, TermTarget, pixels_and_rig},
             profile::pixel_covariance,
         },
+        solver::Solver,
     },
 };
 

@@ -3,10 +3,12 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use seafix_geometry::{Camera, Object, Pinhole, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
+use seafix_geometry::{
+    Camera, Covariance6, Object, Pinhole, Point, StereoRig, Transform, UncertainPixels, UncertainPoint,
+};
 
 use super::{covariance::numerical, *};
-use crate::Observation;
+use crate::observations::{Observation, Observations};
 
 fn motion() -> Transform<Object, Camera> {
     Transform::exp(&Vector6::new(0.4, -1.1, 0.7, 1.5, -2.0, 3.0))

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate, Solver,
         covariance::{numerical, resampled},
-        degeneracy::{fraction, seen},
+        degeneracy::{Degenerate, fraction, seen},
+        solver::Solver,
     },
 };
 

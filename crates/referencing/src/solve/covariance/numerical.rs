@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Pixel, StereoPixels, StereoRi
 
 use crate::{
     observations::{Observation, Observations},
-    solve::{Degenerate, likelihood::pixel_terms::PIXEL_FLOOR},
+    solve::{degeneracy::Degenerate, likelihood::pixel_terms::PIXEL_FLOOR},
 };
 
 /// Longest step (m) of the differences; rounding (1e-15 of the coordinates over the step) and the third derivative

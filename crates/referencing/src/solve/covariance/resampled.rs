@@ -8,9 +8,9 @@ use seafix_geometry::{
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate,
         closed_form::distance,
         covariance::sigma_directions::{SigmaDirections, rows},
+        degeneracy::Degenerate,
         likelihood::{normal::singular, pixel_terms::PIXEL_FLOOR},
     },
 };

@@ -6,8 +6,8 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate,
         covariance::resampled,
+        degeneracy::Degenerate,
         likelihood::{
             normal::{Normal, inverse},
             stereo_cameras::StereoCameras,

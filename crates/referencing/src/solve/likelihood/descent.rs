@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use crate::{
     observations::Observation,
     solve::{
-        Degenerate, converged,
+        degeneracy::{Degenerate, converged},
         likelihood::normal::{Normal, inverse, singular},
     },
 };

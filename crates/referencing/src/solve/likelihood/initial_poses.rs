@@ -8,9 +8,8 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        AlternativePose, Degenerate,
         closed_form::fit,
-        degeneracy::widest,
+        degeneracy::{Degenerate, widest},
         likelihood::{
             descent::{Linearized, NEAR, descend, linearize, settle},
             pixel_terms::PixelTerms,
@@ -18,6 +17,15 @@ use crate::{
         },
     },
 };
+
+/// An alternative pose that explains the same points nearly as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlternativePose {
+    /// The pose.
+    pub pose: Transform<Object, Camera>,
+    /// The excess of its χ² over the answer's; negative if its χ² is smaller.
+    pub worse: f64,
+}
 
 /// Standard deviation of the attitude (rad, three axes together) above which the minimum may be a wrong one.
 const WEAK: f64 = 0.01;

@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate,
+        degeneracy::{Degenerate, wide_enough},
         likelihood::{
             descent::{Linearized, Terms, linearize},
             initial_poses::STARTS,
@@ -13,7 +13,6 @@ use crate::{
             point_fit::{covariance, solved},
             scale_error::{ScaleError, scale_error},
         },
-        wide_enough,
     },
 };
 

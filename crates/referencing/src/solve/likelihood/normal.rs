@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use crate::solve::Degenerate;
+use crate::solve::degeneracy::Degenerate;
 
 /// Σ Jᵀ W J over points p with J = \[ \[p\]×, −I \]: in blocks, −\[p\]× W \[p\]×, \[p\]× W and W.
 #[derive(Debug, Clone, Copy, Default)]

@@ -9,7 +9,7 @@ use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate,
+        degeneracy::Degenerate,
         likelihood::normal::{inverse, singular},
     },
 };

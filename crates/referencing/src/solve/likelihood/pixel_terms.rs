@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 use crate::{
     observations::{Observation, Observations},
     solve::{
-        Degenerate,
+        degeneracy::Degenerate,
         likelihood::{
             descent::Term,
             point_terms::{FEW, information},

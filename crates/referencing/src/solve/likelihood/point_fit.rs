@@ -5,8 +5,8 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use crate::{
     observations::Observations,
     solve::{
-        Degenerate,
         closed_form::fit,
+        degeneracy::Degenerate,
         likelihood::{
             descent::{Terms, linearize, minimize},
             initial_poses::maximum_likelihood,

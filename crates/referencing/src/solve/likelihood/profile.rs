@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use crate::{
     observations::Observation,
     solve::{
-        Degenerate,
+        degeneracy::Degenerate,
         likelihood::{
             descent::{Linearized, Term, linearize},
             pixel_terms::{PixelTerms, TermTarget},

@@ -5,7 +5,11 @@ use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
 
 use crate::{
     observations::{Observation, Observations},
-    solve::{Degenerate, closed_form::fit, degeneracy::widest, likelihood::p3p},
+    solve::{
+        closed_form::fit,
+        degeneracy::{Degenerate, widest},
+        likelihood::p3p,
+    },
 };
 
 /// Up to eight poses, in order of their cost over the pixels of all points.
