@@ -1,5 +1,7 @@
 //! Common requirements of the solvers, and the particular ones of each.
 
+mod components;
+
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
