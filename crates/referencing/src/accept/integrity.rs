@@ -7,7 +7,7 @@ use super::{Acceptance, transfer::Transfer};
 use crate::{
     Observations, ScaleError,
     candidates::chi_square,
-    solve::{leave_out::Deletions, scale_error::isotropic},
+    solve::likelihood::{leave_out::Deletions, scale_error::isotropic},
 };
 
 /// The grade of redundancy for wrong matches, by the number of points.

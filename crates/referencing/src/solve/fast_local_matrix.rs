@@ -5,14 +5,15 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{Term, minimize},
-    roots::widest,
-    sandwich,
+use crate::{
+    observations::Observations,
+    solve::{
+        covariance::sandwich,
+        degeneracy::{Degenerate, check, fraction, widest},
+        likelihood::descent::{Term, minimize},
+        solver::Solver,
+    },
 };
-use crate::Observations;
 
 /// Least squares by a linearised rotation: min Σ ‖P_k − C_k H‖².
 ///

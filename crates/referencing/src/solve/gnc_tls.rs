@@ -4,15 +4,15 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    irls::distance,
-    kabsch::{self, fit_weighted},
-    sandwich,
-    weighted_kabsch::variance,
+use crate::{
+    observations::Observations,
+    solve::{
+        closed_form::{distance, fit, fit_weighted, variance},
+        covariance::sandwich,
+        degeneracy::{Degenerate, check, fraction},
+        solver::Solver,
+    },
 };
-use crate::Observations;
 
 /// Truncated least squares: min Σ σ_k² min(d_k², c²), d_k = ‖C·H − P‖ / σ_k, by graduated non-convexity.
 ///
@@ -85,7 +85,7 @@ impl Solver for GncTls {
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
         let kept = Observations { points: kept, rig: data.rig };
-        sandwich::or_resampled(&kept, at, |_| 1.0, |sampled| Ok(kabsch::fit(&sampled.points)))
+        sandwich::or_resampled(&kept, at, |_| 1.0, |sampled| Ok(fit(&sampled.points)))
     }
 }
 

@@ -5,16 +5,19 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver, converged,
-    degeneracy::{check, fraction},
-    kabsch::fit_weighted,
-    normal::singular,
-    resampled::{self, Answer},
-    sandwich,
-    weighted_kabsch::variance,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        closed_form::{distance, fit_weighted, variance},
+        covariance::{
+            resampled::{self, Answer},
+            sandwich,
+        },
+        degeneracy::{Degenerate, check, converged, fraction},
+        likelihood::normal::singular,
+        solver::Solver,
+    },
 };
-use crate::{Observation, Observations};
 
 /// The loss of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -134,12 +137,4 @@ impl Irls {
             Loss::UnSquared => 1.0 / point.residual(pose).norm().max(CORNER * variance(point).sqrt()),
         }
     }
-}
-
-/// The residual in standard deviations of its point, one number for all axes.
-///
-/// With the full covariance the weights would belong to another sum than the minimised one, and the iteration might not
-/// converge.
-pub(super) fn distance(point: &Observation, pose: &Transform<Object, Camera>) -> f64 {
-    point.residual(pose).norm() / variance(point).sqrt()
 }

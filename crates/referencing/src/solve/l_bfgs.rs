@@ -6,11 +6,14 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate,
-    pixel_cost::{Best, Optimiser, PixelCost},
+use crate::{
+    observations::Observations,
+    solve::{
+        degeneracy::Degenerate,
+        likelihood::pixel_cost::{Best, PixelCost},
+        optimiser::Optimiser,
+    },
 };
-use crate::Observations;
 
 /// Limited-memory BFGS: min Σ rᵀ S⁻¹ r over the pixels of both images.
 ///

@@ -1,21 +1,25 @@
 //! Mahalanobis: 3D–3D least squares with the full covariance of every point.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::SMatrix;
 use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
-use smallvec::SmallVec;
 
-use super::{
-    AlternativePose, Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{Term, linearize, minimize, model_errors},
-    initial_poses::{alternatives, maximum_likelihood},
-    kabsch,
-    pixel_terms::{FEW, PixelTerms, TermTarget},
-    profile::inflated,
+use crate::{
+    observations::Observations,
+    solve::{
+        degeneracy::{Degenerate, check, fraction},
+        likelihood::{
+            descent::model_errors,
+            initial_poses::{AlternativePose, STARTS, alternatives},
+            pixel_terms::{PixelTerms, TermTarget, rig_of_pixels},
+            point_fit::{covariance, solved},
+            point_terms::Measured,
+            profile::pixel_covariance,
+        },
+        solver::Solver,
+    },
 };
-use crate::{Observation, Observations};
 
 /// Weighted 3D–3D least squares: min Σ rᵀ (Σ_measured + σ_model² I)⁻¹ r, r = C − H⁻¹P in camera axes.
 ///
@@ -38,7 +42,7 @@ pub struct Mahalanobis {
 
 impl Default for Mahalanobis {
     fn default() -> Self {
-        Self { min_ratio: 1e-3, refit: true, starts: 5 }
+        Self { min_ratio: 1e-3, refit: true, starts: STARTS }
     }
 }
 
@@ -56,7 +60,8 @@ impl Component for Mahalanobis {
 
 impl Solver for Mahalanobis {
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        self.solved(data, |pose, _| Ok(*pose))
+        check(data, self.minimum(), self.min_ratio)?;
+        solved(data, self.rig(data), self.starts, |pose, _| Ok(*pose))
     }
 
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
@@ -77,11 +82,7 @@ impl Solver for Mahalanobis {
             let measured = Measured::of(&data.points);
             return covariance(data, at, &|k, place| Some(measured.term(k, place)));
         };
-        let mut all = PixelTerms::new(rig);
-        all.see(&data.points, TermTarget::Triangulated)?;
-        let live = |k: usize, place: &_| all.live(k, place);
-        let first = covariance(data, at, &live)?;
-        Ok(Covariance6::new(inflated(&data.points, at, first.matrix, &live)))
+        pixel_covariance(&data.points, rig, TermTarget::Triangulated, at)
     }
 
     fn model_errors(
@@ -99,74 +100,22 @@ impl Solver for Mahalanobis {
     }
 }
 
-/// The term of a point, by index, at the position where a pose puts it.
-pub(super) type Terms<'a> = &'a dyn Fn(usize, &Vector3<f64>) -> Option<Term>;
-
-/// The inverse of the points' information at a pose.
-pub(super) fn covariance(
-    data: &Observations<'_>,
-    at: &Transform<Object, Camera>,
-    terms: Terms<'_>,
-) -> Result<Covariance6<Object, Camera>, Degenerate> {
-    linearize(&data.points, at, &terms)?.covariance().map(Covariance6::new)
-}
-
 impl Mahalanobis {
-    /// Applies `work` to the answer and to the terms at it.
-    pub(super) fn solved<R>(
-        &self,
-        data: &Observations<'_>,
-        work: impl FnOnce(&Transform<Object, Camera>, Terms<'_>) -> Result<R, Degenerate>,
-    ) -> Result<R, Degenerate> {
-        check(data, self.minimum(), self.min_ratio)?;
-        let Some(rig) = self.rig(data) else {
-            let (start, measured) = (kabsch::fit(&data.points), Measured::of(&data.points));
-            let term = |k: usize, at: &_| Some(measured.term(k, at));
-            return work(&minimize(&data.points, &start, &term)?, &term);
-        };
-        let mut pixel_terms = PixelTerms::new(rig);
-        pixel_terms.see(&data.points, TermTarget::Triangulated)?;
-        work(&maximum_likelihood(data, rig, self.starts, &pixel_terms)?, &|k, place| pixel_terms.live(k, place))
-    }
-
     fn rig<'a>(&self, data: &Observations<'a>) -> Option<&'a StereoRig> {
-        data.rig.filter(|_| self.refit && data.points.iter().any(|point| point.pixels.is_some()))
+        rig_of_pixels(data).filter(|_| self.refit)
     }
-}
-
-/// The points with the inverse of their measured covariance.
-pub(super) struct Measured<'a> {
-    points: &'a [Observation],
-    information: SmallVec<[Matrix3<f64>; FEW]>,
-}
-
-impl<'a> Measured<'a> {
-    pub(super) fn of(points: &'a [Observation]) -> Self {
-        Self { points, information: points.iter().map(information).collect() }
-    }
-
-    /// The term of the k-th point at the position where a pose puts it.
-    #[inline]
-    pub(super) fn term(&self, k: usize, at: &Vector3<f64>) -> Term {
-        Term::of(self.information[k], &(self.points[k].measured.at.coords - at))
-    }
-}
-
-/// (Σ_measured + σ_model² I)⁻¹.
-pub(super) fn information(point: &Observation) -> Matrix3<f64> {
-    let noise = point.noise();
-    // Scaled to unit size, so that the determinant neither overflows nor underflows.
-    let size = noise.trace() / 3.0;
-    (noise / size).try_inverse().unwrap_or_else(Matrix3::identity) / size
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Matrix4, UnitQuaternion, Vector6};
+    use nalgebra::{Matrix3, Matrix4, UnitQuaternion, Vector3, Vector6};
     use seafix_geometry::{Pinhole, Point, UncertainPixels, UncertainPoint};
 
     use super::*;
-    use crate::solve::{StereoReprojection, numerical};
+    use crate::{
+        observations::Observation,
+        solve::{StereoReprojection, covariance::numerical},
+    };
 
     const PLACES: [[f64; 3]; 5] =
         [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];
@@ -206,25 +155,6 @@ mod tests {
         assert_eq!(message, "starts = 0; give 1 to 5");
         for bad in [-0.1, 1.0, f64::NAN] {
             assert!(Mahalanobis { min_ratio: bad, ..Mahalanobis::default() }.check().is_err(), "{bad}");
-        }
-    }
-
-    /// Noise of 1, 2 and 3 mm along the axes and 2 mm of the model: variances of 5, 8 and 13 mm².
-    #[test]
-    fn the_information_is_the_inverse_of_both_noises() {
-        let measured = UncertainPoint {
-            at: Point::new(0.1, 0.2, 3.0),
-            covariance: Matrix3::from_diagonal(&Vector3::new(1e-6, 4e-6, 9e-6)),
-        };
-        let point = Observation { measured, pixels: None, model: Point::origin(), model_sigma: 2e-3 };
-        let expected = Matrix3::from_diagonal(&Vector3::new(1.0 / 5e-6, 1.0 / 8e-6, 1.0 / 13e-6));
-        assert!((information(&point) - expected).amax() < 1e-6 * expected.amax());
-        // Determinants out of the range of numbers.
-        for sigma in [1e-60, 1e60] {
-            let point =
-                Observation { measured: UncertainPoint::isotropic(Point::origin(), sigma), model_sigma: 0.0, ..point };
-            let variance: f64 = 1.0 / (sigma * sigma + 1e-18);
-            assert!((information(&point)[(1, 1)] / variance - 1.0).abs() < 1e-9, "{sigma}");
         }
     }
 

@@ -1,20 +1,24 @@
 //! P3P with two cameras: the minimal solver of pixels.
 
 use seafix_component::Component;
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    AlternativePose, Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{NEAR, descend, linearize, settle},
-    initial_poses, kabsch,
-    pixel_terms::{PixelTerms, TermTarget},
-    profile::inflated,
-    roots::{Roots, squares, widest},
-    stereo_reprojection::pixels_and_rig,
+use crate::{
+    observations::Observations,
+    solve::{
+        closed_form::fit,
+        degeneracy::{Degenerate, check, fraction, widest},
+        likelihood::{
+            descent::{NEAR, descend, linearize, settle},
+            initial_poses::{self, AlternativePose},
+            pixel_terms::{PixelTerms, TermTarget, pixels_and_rig},
+            profile::pixel_covariance,
+            roots::{Roots, squares},
+        },
+        solver::Solver,
+    },
 };
-use crate::Observations;
 
 /// The pose from the twelve pixel coordinates of three widely spread points.
 ///
@@ -66,7 +70,7 @@ impl Solver for P3pStereo {
         for right in [false, true] {
             roots.of_camera(data, rig, chosen, right);
         }
-        let starts = roots.as_slice().iter().copied().chain([kabsch::fit(&three.points)]);
+        let starts = roots.as_slice().iter().copied().chain([fit(&three.points)]);
         let found = starts.map(|start| {
             let pose = refined(&three, &start, &pixel_terms)?;
             Ok((squares(data, rig, &pose)?, pose))
@@ -95,13 +99,8 @@ impl Solver for P3pStereo {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        let rig: &StereoRig = pixels_and_rig(data)?;
-        let three = widest(data).map(|i| data.points[i]);
-        let mut pixel_terms = PixelTerms::new(rig);
-        pixel_terms.see(&three, TermTarget::Pixels)?;
-        let live = |k: usize, place: &_| pixel_terms.live(k, place);
-        let first = linearize(&three, at, &live)?.covariance()?;
-        Ok(Covariance6::new(inflated(&three, at, first, &live)))
+        let rig = pixels_and_rig(data)?;
+        pixel_covariance(&widest(data).map(|i| data.points[i]), rig, TermTarget::Pixels, at)
     }
 
     /// The alternatives of the three points that the pixels of all points admit.

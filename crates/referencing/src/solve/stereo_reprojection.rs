@@ -2,18 +2,22 @@
 
 use nalgebra::SMatrix;
 use seafix_component::{Component, in_range};
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    AlternativePose, Degenerate, Solver,
-    degeneracy::{check, fraction},
-    descent::{linearize, model_errors},
-    initial_poses::{alternatives, maximum_likelihood},
-    pixel_terms::{PixelTerms, TermTarget},
-    profile::inflated,
+use crate::{
+    observations::Observations,
+    solve::{
+        degeneracy::{Degenerate, check, fraction},
+        likelihood::{
+            descent::model_errors,
+            initial_poses::{AlternativePose, STARTS, alternatives, maximum_likelihood},
+            pixel_terms::{PixelTerms, TermTarget, pixels_and_rig},
+            profile::pixel_covariance,
+        },
+        solver::Solver,
+    },
 };
-use crate::Observations;
 
 /// The maximum-likelihood pose given the pixels of both images: min Σ rᵀ S⁻¹ r over SE(3).
 ///
@@ -37,7 +41,7 @@ pub struct StereoReprojection {
 
 impl Default for StereoReprojection {
     fn default() -> Self {
-        Self { starts: 5, min_ratio: 1e-3 }
+        Self { starts: STARTS, min_ratio: 1e-3 }
     }
 }
 
@@ -80,12 +84,7 @@ impl Solver for StereoReprojection {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        let rig = pixels_and_rig(data)?;
-        let mut all = PixelTerms::new(rig);
-        all.see(&data.points, TermTarget::Pixels)?;
-        let live = |k: usize, place: &_| all.live(k, place);
-        let first = linearize(&data.points, at, &live)?.covariance()?;
-        Ok(Covariance6::new(inflated(&data.points, at, first, &live)))
+        pixel_covariance(&data.points, pixels_and_rig(data)?, TermTarget::Pixels, at)
     }
 
     fn model_errors(
@@ -97,9 +96,4 @@ impl Solver for StereoReprojection {
         all.see(&data.points, TermTarget::Pixels)?;
         model_errors(&data.points, at, &|k, place: &_| all.live(k, place))
     }
-}
-
-/// The rig, if it and the pixels of every point are given.
-pub(super) fn pixels_and_rig<'a>(data: &Observations<'a>) -> Result<&'a StereoRig, Degenerate> {
-    data.rig.filter(|_| data.points.iter().all(|point| point.pixels.is_some())).ok_or(Degenerate::NoPixels)
 }

@@ -1,12 +1,16 @@
 //! Common requirements of the solvers, and the particular ones of each.
 
+mod components;
+
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use seafix_geometry::{Camera, Object, Pinhole, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
+use seafix_geometry::{
+    Camera, Covariance6, Object, Pinhole, Point, StereoRig, Transform, UncertainPixels, UncertainPoint,
+};
 
-use super::*;
-use crate::Observation;
+use super::{covariance::numerical, *};
+use crate::observations::{Observation, Observations};
 
 fn motion() -> Transform<Object, Camera> {
     Transform::exp(&Vector6::new(0.4, -1.1, 0.7, 1.5, -2.0, 3.0))
@@ -332,7 +336,7 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
 /// Fails if the lever of the rotation has the wrong sign.
 #[test]
 fn derivatives_are_those_of_the_projections_at_random_poses() {
-    use super::{
+    use super::likelihood::{
         descent::linearize,
         pixel_terms::{PixelTerms, TermTarget},
     };

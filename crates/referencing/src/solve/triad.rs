@@ -5,12 +5,14 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{fraction, seen},
-    numerical, resampled,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        covariance::{numerical, resampled},
+        degeneracy::{Degenerate, fraction, seen},
+        solver::Solver,
+    },
 };
-use crate::{Observation, Observations};
 
 /// The rule that selects the three points of the triad.
 ///

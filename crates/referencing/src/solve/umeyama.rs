@@ -5,12 +5,14 @@ use seafix_component::{Component, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{centroid, check, fraction},
-    sandwich,
+use crate::{
+    observations::Observations,
+    solve::{
+        covariance::sandwich,
+        degeneracy::{Degenerate, centroid, check, fraction},
+        solver::Solver,
+    },
 };
-use crate::Observations;
 
 /// Umeyama's least squares min Σ ‖P_k − C_k H‖², with the scale as a diagnostic.
 ///

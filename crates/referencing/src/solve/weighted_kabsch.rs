@@ -4,13 +4,15 @@ use seafix_component::Component;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Degenerate, Solver,
-    degeneracy::{check, fraction},
-    kabsch::fit_weighted,
-    sandwich,
+use crate::{
+    observations::Observations,
+    solve::{
+        closed_form::{fit_weighted, variance},
+        covariance::sandwich,
+        degeneracy::{Degenerate, check, fraction},
+        solver::Solver,
+    },
 };
-use crate::{Observation, Observations};
 
 /// Kabsch's least squares with weights: min Σ w_k ‖P_k − C_k H‖², w_k = 3 / tr(Σ_k + σ_model² I).
 ///
@@ -54,9 +56,4 @@ impl Solver for WeightedKabsch {
         let weight = |k: usize| 1.0 / variance(&data.points[k]);
         sandwich::or_resampled(data, at, weight, |sampled| self.solve(sampled))
     }
-}
-
-/// The mean variance of a residual along an axis (m²).
-pub(super) fn variance(point: &Observation) -> f64 {
-    point.noise().trace() / 3.0
 }

@@ -4,11 +4,18 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use seafix_geometry::StereoRig;
 use smallvec::SmallVec;
 
-use super::{Degenerate, descent::Term, mahalanobis::information, stereo_cameras::StereoCameras, whitened::Whitener};
-use crate::Observation;
-
-/// Number of points that are kept without heap allocation.
-pub(super) const FEW: usize = 32;
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        degeneracy::Degenerate,
+        likelihood::{
+            descent::Term,
+            point_terms::{FEW, information},
+            stereo_cameras::StereoCameras,
+            whitened::Whitener,
+        },
+    },
+};
 
 /// The observed quantity that is compared with a point's projection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,12 +26,22 @@ pub(crate) enum TermTarget {
     Triangulated,
 }
 
+/// The rig, if it and the pixels of every point are given.
+pub(crate) fn pixels_and_rig<'a>(data: &Observations<'a>) -> Result<&'a StereoRig, Degenerate> {
+    data.rig.filter(|_| data.points.iter().all(|point| point.pixels.is_some())).ok_or(Degenerate::NoPixels)
+}
+
+/// The rig, if it and the pixels of some point are given.
+pub(crate) fn rig_of_pixels<'a>(data: &Observations<'a>) -> Option<&'a StereoRig> {
+    data.rig.filter(|_| data.points.iter().any(|point| point.pixels.is_some()))
+}
+
 /// The observed points of one problem.
 pub(crate) struct PixelTerms<'a> {
     cameras: StereoCameras<'a>,
     all: SmallVec<[PixelTerm; FEW]>,
     /// Whether a model point is uncertain, so that weights depend on the pose.
-    pub(super) weights_move: bool,
+    pub(crate) weights_move: bool,
 }
 
 enum PixelTerm {
@@ -35,7 +52,7 @@ enum PixelTerm {
 }
 
 /// Lower bound of pixel noise (px); exact pixels would have infinite weight.
-pub(super) const PIXEL_FLOOR: f64 = 1e-6;
+pub(crate) const PIXEL_FLOOR: f64 = 1e-6;
 
 impl<'a> PixelTerms<'a> {
     /// An empty set of terms; [`see`](Self::see) fills it in place, as it is large.

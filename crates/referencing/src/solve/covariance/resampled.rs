@@ -5,14 +5,15 @@ use seafix_geometry::{
     Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint,
 };
 
-use super::{
-    Degenerate,
-    irls::distance,
-    normal::singular,
-    pixel_terms::PIXEL_FLOOR,
-    sigma_directions::{SigmaDirections, rows},
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        closed_form::distance,
+        covariance::sigma_directions::{SigmaDirections, rows},
+        degeneracy::Degenerate,
+        likelihood::{normal::singular, pixel_terms::PIXEL_FLOOR},
+    },
 };
-use crate::{Observation, Observations};
 
 /// The parametric bootstrap covariance: the mean of ξξᵀ over answers `at · Exp(ξ)` to resampled noise.
 ///
@@ -25,7 +26,7 @@ use crate::{Observation, Observations};
 /// # Errors
 ///
 /// [`Degenerate::Scattered`] if more than one of ten draws has no answer.
-pub(super) fn covariance(
+pub(crate) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
@@ -64,7 +65,7 @@ pub(super) fn covariance(
 
 /// The linearity of the answer in the noise, which determines the number of draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Answer {
+pub(crate) enum Answer {
     /// Nearly linear: the draws give the covariance almost exactly.
     Straight,
     /// Nonlinear everywhere: the covariance is that of a sample.

@@ -2,11 +2,13 @@
 
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{
-    descent::{linearize, minimize},
-    mahalanobis::Measured,
+use crate::{
+    observations::Observations,
+    solve::likelihood::{
+        descent::{linearize, minimize},
+        point_terms::Measured,
+    },
 };
-use crate::Observations;
 
 /// The maximum-likelihood pose of a set of pairs, with its cost.
 #[derive(Debug, Clone, Copy, PartialEq)]

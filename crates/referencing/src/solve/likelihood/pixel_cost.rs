@@ -4,70 +4,19 @@ use std::cell::RefCell;
 
 use argmin::core::{CostFunction, Error, Gradient};
 use nalgebra::{Matrix4, Matrix6, Vector6};
-use seafix_component::in_range;
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
-use super::{
-    Degenerate, Solver, StereoReprojection, converged,
-    degeneracy::{check, fraction},
-    kabsch,
-    normal::{inverse, singular},
-    stereo_reprojection::pixels_and_rig,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        degeneracy::Degenerate,
+        likelihood::normal::{inverse, singular},
+    },
 };
-use crate::{Observation, Observations};
-
-/// A general-purpose optimiser that minimises a [`PixelCost`]; every implementor is a [`Solver`].
-pub(super) trait Optimiser: Send + Sync + std::fmt::Debug {
-    /// The maximum number of iterations, and the minimum ratio of second to first extent of the points.
-    fn limits(&self) -> (u64, f64);
-
-    /// The pose of lowest cost from `start`, and the number of iterations.
-    fn lower(
-        &self,
-        data: &Observations<'_>,
-        rig: &StereoRig,
-        start: &Transform<Object, Camera>,
-    ) -> Result<(Transform<Object, Camera>, u64), Degenerate>;
-
-    /// Checks the range of the limits.
-    fn check_limits(&self) -> Result<(), String> {
-        let (iterations, min_ratio) = self.limits();
-        in_range((1..=1_000_000).contains(&iterations), "iterations", iterations, "1 to 1000000")?;
-        fraction("min-ratio", min_ratio)
-    }
-}
-
-impl<T: Optimiser> Solver for T {
-    fn needs_pixels(&self) -> bool {
-        true
-    }
-
-    fn to_rounding(&self) -> bool {
-        false
-    }
-
-    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
-        check(data, self.minimum(), self.limits().1)?;
-        let rig = pixels_and_rig(data)?;
-        let (pose, iterations) = self.lower(data, rig, &kabsch::fit(&data.points))?;
-        // Independent of the library's termination status: the gradient vanishes at a minimum.
-        let off = PixelCost::of(data, rig, pose, &Best::default())?.distance();
-        converged(iterations, off).map(|()| pose)
-    }
-
-    /// The covariance of the likelihood that the optimiser maximises.
-    fn covariance(
-        &self,
-        data: &Observations<'_>,
-        at: &Transform<Object, Camera>,
-    ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-        StereoReprojection::default().covariance(data, at)
-    }
-}
 
 /// The best evaluated argument: its cost and its six numbers.
 #[derive(Debug)]
-pub(super) struct Best(RefCell<(f64, [f64; 6])>);
+pub(crate) struct Best(RefCell<(f64, [f64; 6])>);
 
 impl Default for Best {
     fn default() -> Self {
@@ -77,7 +26,7 @@ impl Default for Best {
 
 impl Best {
     /// The cost and the six numbers; infinite cost and zeros before any evaluation.
-    pub(super) fn seen(&self) -> (f64, [f64; 6]) {
+    pub(crate) fn seen(&self) -> (f64, [f64; 6]) {
         *self.0.borrow()
     }
 }
@@ -87,7 +36,7 @@ impl Best {
 /// S = Σ_px + σ_model² J Jᵀ, with J at the measured point. L Lᵀ is the covariance at the start from small steps of its
 /// own, so that x is in standard deviations and the cost is equally steep in all directions. The function shares
 /// nothing with the solvers that it verifies: projections are the rig's, and the gradient is by central differences.
-pub(super) struct PixelCost<'a> {
+pub(crate) struct PixelCost<'a> {
     rig: &'a StereoRig,
     points: &'a [Observation],
     weights: Vec<Matrix4<f64>>,
@@ -103,7 +52,7 @@ const STEP: f64 = 1e-4;
 
 impl<'a> PixelCost<'a> {
     /// The cost function about `start`.
-    pub(super) fn of(
+    pub(crate) fn of(
         data: &'a Observations<'_>,
         rig: &'a StereoRig,
         start: Transform<Object, Camera>,
@@ -144,7 +93,7 @@ impl<'a> PixelCost<'a> {
 
     /// The distance of the minimum from the start (standard deviations of the pose): half of the gradient, as χ² is the
     /// square of that distance.
-    fn distance(&self) -> f64 {
+    pub(crate) fn distance(&self) -> f64 {
         0.5 * Vector6::from(self.slope(&[0.0; 6])).norm()
     }
 
@@ -162,7 +111,7 @@ impl<'a> PixelCost<'a> {
     }
 
     /// The pose of six numbers.
-    pub(super) fn pose(&self, x: &[f64]) -> Transform<Object, Camera> {
+    pub(crate) fn pose(&self, x: &[f64]) -> Transform<Object, Camera> {
         self.start.perturbed(&(self.scale * Vector6::from_column_slice(x))).renormalized()
     }
 

@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, Frame, Pinhole, Point, RightCamera, StereoRig};
 /// A stereo rig with precomputed rotation matrix and without needless distortion.
 ///
 /// It computes [`StereoRig::project_with_jacobian`] at a third of the cost.
-pub(super) struct StereoCameras<'a> {
+pub(crate) struct StereoCameras<'a> {
     left: CameraModel<'a>,
     right: CameraModel<'a>,
     /// The right camera's rotation; `None` for a rectified rig.
@@ -22,7 +22,7 @@ struct CameraModel<'a> {
 }
 
 impl<'a> StereoCameras<'a> {
-    pub(super) fn of(rig: &'a StereoRig) -> Self {
+    pub(crate) fn of(rig: &'a StereoRig) -> Self {
         let pose = rig.right_from_left();
         let turn = pose.rotation_matrix();
         Self {
@@ -36,7 +36,7 @@ impl<'a> StereoCameras<'a> {
     /// The pixels of a point (u left, v left, u right, v right) and their derivative (px/m); `None` if a camera cannot
     /// see it.
     #[inline]
-    pub(super) fn project(&self, at: &Vector3<f64>) -> Option<(Vector4<f64>, Matrix4x3<f64>)> {
+    pub(crate) fn project(&self, at: &Vector3<f64>) -> Option<(Vector4<f64>, Matrix4x3<f64>)> {
         let ([ul, vl], [jul, jvl]) = self.left.project::<Camera>(at)?;
         let ([ur, vr], [jur, jvr]) = match &self.turn {
             None => self.right.project::<RightCamera>(&(at + self.step))?,

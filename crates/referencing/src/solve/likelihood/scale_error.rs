@@ -3,11 +3,10 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{
-    descent::{Term, linearize},
-    mahalanobis::Terms,
+use crate::{
+    observations::Observation,
+    solve::likelihood::descent::{Term, Terms, linearize},
 };
-use crate::Observation;
 
 /// The relative excess of measured distances over the model's, from a fit with a scale.
 ///
@@ -28,7 +27,7 @@ pub struct ScaleError {
 /// motion as in [`linearize`] and the pull W r of each point, ε = (Σ dᵀWr − cᵀ N⁻¹ Σ JᵀWr)/s and σ² = 1/s, where N = Σ
 /// JᵀWJ, c = Σ JᵀWd, s = Σ dᵀWd − cᵀ N⁻¹ c. `None` if the points determine no motion, or no scale beside it; see
 /// [`isotropic`].
-pub(super) fn scale_error(
+pub(crate) fn scale_error(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
     terms: Terms<'_>,
@@ -75,7 +74,7 @@ mod tests {
     use seafix_geometry::{Point, UncertainPoint};
 
     use super::*;
-    use crate::{Mahalanobis, Observations};
+    use crate::{observations::Observations, solve::likelihood::point_fit::solved};
 
     const SIGMA: f64 = 0.002;
 
@@ -90,7 +89,7 @@ mod tests {
             model_sigma: 0.0,
         };
         let data = Observations { points: (0..8).map(seen).collect(), rig: None };
-        Mahalanobis::default().solved(&data, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
+        solved(&data, None, 1, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
     }
 
     /// For eight corners Σ ‖d‖² = 8 · (1 + 1 + ¼) = 18 m², and no motion equals a scaling: σ = 2 mm/√18 m.

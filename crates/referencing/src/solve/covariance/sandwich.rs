@@ -3,13 +3,17 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{
-    Degenerate,
-    normal::{Normal, inverse},
-    resampled,
-    stereo_cameras::StereoCameras,
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        covariance::resampled,
+        degeneracy::Degenerate,
+        likelihood::{
+            normal::{Normal, inverse},
+            stereo_cameras::StereoCameras,
+        },
+    },
 };
-use crate::{Observation, Observations};
 
 /// The sandwich covariance A⁻¹ B A⁻¹ of the minimum of Σ w_k ‖C_k − p_k‖².
 ///
@@ -17,7 +21,7 @@ use crate::{Observation, Observations};
 /// maximum likelihood estimates under nonstandard conditions*, 1967). Levers and noise are evaluated at the fitted
 /// points p. The measured points are scattered by their noise, which in depth may be as large as the object: they would
 /// overstate the levers, and a point moved nearer by noise would appear more precise.
-pub(super) fn covariance(
+pub(crate) fn covariance(
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
     weight: impl Fn(usize) -> f64,
@@ -40,7 +44,7 @@ const STRAIGHT: f64 = 0.15;
 
 /// The sandwich [`covariance`] if errors are linear in the noise; otherwise, beyond [`STRAIGHT`], the covariance by
 /// resampling with `solve`.
-pub(super) fn or_resampled(
+pub(crate) fn or_resampled(
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
     weight: impl Fn(usize) -> f64,

@@ -2,11 +2,11 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use super::Degenerate;
+use crate::solve::degeneracy::Degenerate;
 
 /// Σ Jᵀ W J over points p with J = \[ \[p\]×, −I \]: in blocks, −\[p\]× W \[p\]×, \[p\]× W and W.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Normal {
+pub(crate) struct Normal {
     turn: Matrix3<f64>,
     mixed: Matrix3<f64>,
     shift: Matrix3<f64>,
@@ -15,7 +15,7 @@ pub(super) struct Normal {
 impl Normal {
     /// Adds a point with its symmetric information matrix.
     #[inline]
-    pub(super) fn add(&mut self, at: &Vector3<f64>, information: &Matrix3<f64>) {
+    pub(crate) fn add(&mut self, at: &Vector3<f64>, information: &Matrix3<f64>) {
         let w = information;
         let (x, y, z) = (at.x, at.y, at.z);
         // [p]× W, row by row.
@@ -33,20 +33,20 @@ impl Normal {
     }
 
     /// Adds the sums of `other`.
-    pub(super) fn join(&mut self, other: &Self) {
+    pub(crate) fn join(&mut self, other: &Self) {
         self.turn += other.turn;
         self.mixed += other.mixed;
         self.shift += other.shift;
     }
 
     /// Subtracts the sums of `other`.
-    pub(super) fn remove(&mut self, other: &Self) {
+    pub(crate) fn remove(&mut self, other: &Self) {
         self.turn -= other.turn;
         self.mixed -= other.mixed;
         self.shift -= other.shift;
     }
 
-    pub(super) fn matrix(&self) -> Matrix6<f64> {
+    pub(crate) fn matrix(&self) -> Matrix6<f64> {
         let mut all = Matrix6::zeros();
         all.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.turn);
         all.fixed_view_mut::<3, 3>(0, 3).copy_from(&self.mixed);
@@ -56,7 +56,7 @@ impl Normal {
     }
 
     /// The solution ξ of (N + damping · diag N) ξ = `gradient`; `None` if the matrix is not positive definite.
-    pub(super) fn solve(&self, damping: f64, gradient: &Vector6<f64>) -> Option<Vector6<f64>> {
+    pub(crate) fn solve(&self, damping: f64, gradient: &Vector6<f64>) -> Option<Vector6<f64>> {
         let n = self.matrix();
         let mut l = Matrix6::zeros();
         let mut inverse = [0.0; 6];
@@ -106,7 +106,7 @@ pub(crate) fn inverse(information: &Matrix6<f64>) -> Result<Matrix6<f64>, Degene
 /// The error for a matrix without a Cholesky factor.
 ///
 /// It states the smallest eigenvalue after scaling the diagonal to ones.
-pub(super) fn singular(information: &Matrix6<f64>) -> Degenerate {
+pub(crate) fn singular(information: &Matrix6<f64>) -> Degenerate {
     let root = information.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
     let scaled = information.component_mul(&(root * root.transpose()));
     // The eigenvalue iteration of a matrix that is not finite would not end.

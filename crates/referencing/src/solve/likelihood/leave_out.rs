@@ -2,13 +2,19 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{
-    Mahalanobis, ScaleError,
-    descent::{Linearized, linearize},
-    mahalanobis::covariance,
-    scale_error::scale_error,
+use crate::{
+    observations::Observations,
+    solve::{
+        degeneracy::{Degenerate, wide_enough},
+        likelihood::{
+            descent::{Linearized, Terms, linearize},
+            initial_poses::STARTS,
+            pixel_terms::rig_of_pixels,
+            point_fit::{covariance, solved},
+            scale_error::{ScaleError, scale_error},
+        },
+    },
 };
-use crate::Observations;
 
 /// The contribution of each point to the normal equations; an exclusion costs one 6×6 solve.
 pub(crate) struct Deletions<'a> {
@@ -30,7 +36,7 @@ const SURE: f64 = 0.01;
 impl<'a> Deletions<'a> {
     /// `None` if all points together determine no pose.
     pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
-        let solved = Mahalanobis::default().solved(data, |pose, terms| {
+        let solved = likely(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
             let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
             each.map(|each| (*pose, each, scale_error(&data.points, pose, terms)))
@@ -59,14 +65,26 @@ impl<'a> Deletions<'a> {
         let mut fewer = self.data.clone();
         let mut place = 0..;
         fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
-        Mahalanobis::default().solved(&fewer, |pose, terms| Ok((*pose, covariance(&fewer, pose, terms)?))).ok()
+        likely(&fewer, |pose, terms| Ok((*pose, covariance(&fewer, pose, terms)?))).ok()
     }
+}
+
+/// Applies `work` to the maximum-likelihood pose, from the usual number of initial poses, and to the terms at it.
+fn likely<R>(
+    data: &Observations<'_>,
+    work: impl FnOnce(&Transform<Object, Camera>, Terms<'_>) -> Result<R, Degenerate>,
+) -> Result<R, Degenerate> {
+    wide_enough(data)?;
+    solved(data, rig_of_pixels(data), STARTS, work)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Observation, Solver};
+    use crate::{
+        observations::Observation,
+        solve::{Mahalanobis, Solver},
+    };
     use nalgebra::Vector3;
     use seafix_geometry::{Point, UncertainPoint};
 

@@ -5,17 +5,33 @@ use std::cell::RefCell;
 use nalgebra::{Matrix3, UnitQuaternion, UnitVector3, Vector3};
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 
-use super::{
-    AlternativePose, Degenerate,
-    descent::{Linearized, NEAR, descend, linearize, settle},
-    kabsch,
-    pixel_terms::PixelTerms,
-    roots::{roots, widest},
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        closed_form::fit,
+        degeneracy::{Degenerate, widest},
+        likelihood::{
+            descent::{Linearized, NEAR, descend, linearize, settle},
+            pixel_terms::PixelTerms,
+            roots::roots,
+        },
+    },
 };
-use crate::{Observation, Observations};
+
+/// An alternative pose that explains the same points nearly as well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AlternativePose {
+    /// The pose.
+    pub pose: Transform<Object, Camera>,
+    /// The excess of its χ² over the answer's; negative if its χ² is smaller.
+    pub worse: f64,
+}
 
 /// Standard deviation of the attitude (rad, three axes together) above which the minimum may be a wrong one.
 const WEAK: f64 = 0.01;
+
+/// Default of the maximum number of initial poses: the unweighted fit and the four P3P poses of one camera.
+pub(crate) const STARTS: usize = 5;
 
 /// The pose of smallest cost over several initial poses.
 ///
@@ -27,7 +43,7 @@ const WEAK: f64 = 0.01;
 ///
 /// The error of the first initial pose if none leads to a minimum, and that of an unreached minimum with a cost below
 /// all others.
-pub(super) fn maximum_likelihood(
+pub(crate) fn maximum_likelihood(
     data: &Observations<'_>,
     rig: &StereoRig,
     starts: usize,
@@ -44,7 +60,7 @@ pub(super) fn maximum_likelihood(
             }
         })
     };
-    let first = from(&kabsch::fit(points));
+    let first = from(&fit(points));
     if starts == 1 || first.as_ref().is_ok_and(|(_, all)| is_clear(all, points.len())) {
         return first.map(|(pose, _)| pose);
     }
@@ -70,7 +86,7 @@ pub(super) fn maximum_likelihood(
 ///
 /// They are sought if [`maximum_likelihood`] doubts its first answer, from the P3P poses of either camera and from the
 /// mirror image; a solver with one initial pose returns none.
-pub(super) fn alternatives(
+pub(crate) fn alternatives(
     data: &Observations<'_>,
     rig: &StereoRig,
     starts: usize,

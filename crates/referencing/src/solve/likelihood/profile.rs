@@ -1,10 +1,18 @@
 //! The covariance of a weak attitude under a nonlinear likelihood.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
-use super::descent::{Linearized, Term, linearize};
-use crate::Observation;
+use crate::{
+    observations::Observation,
+    solve::{
+        degeneracy::Degenerate,
+        likelihood::{
+            descent::{Linearized, Term, linearize},
+            pixel_terms::{PixelTerms, TermTarget},
+        },
+    },
+};
 
 /// Standard deviation of the attitude (rad, three axes together) up to which first order holds.
 const STRAIGHT: f64 = 0.02;
@@ -23,6 +31,24 @@ const MIN: i32 = 12;
 /// Number of steps in which the other five coordinates follow a rotation.
 const FOLLOWS: usize = 3;
 
+/// The covariance of the maximum-likelihood pose of the pixels: first order, and [`inflated`] for a weak attitude.
+///
+/// # Errors
+///
+/// The first invalid or hidden point, or an undetermined motion.
+pub(crate) fn pixel_covariance(
+    points: &[Observation],
+    rig: &StereoRig,
+    target: TermTarget,
+    at: &Transform<Object, Camera>,
+) -> Result<Covariance6<Object, Camera>, Degenerate> {
+    let mut all = PixelTerms::new(rig);
+    all.see(points, target)?;
+    let live = |k: usize, place: &_| all.live(k, place);
+    let first = linearize(points, at, &live)?.covariance()?;
+    Ok(Covariance6::new(inflated(points, at, first, &live)))
+}
+
 /// The covariance `first`, with the part of its most uncertain rotation from the profile likelihood.
 ///
 /// With e an axis of the attitude's covariance, σ² = eᵀ Σ_φφ e and d = Σ (e, 0) / σ, first order states that χ² grows
@@ -34,7 +60,7 @@ const FOLLOWS: usize = 3;
 /// second moment about the answer, which includes its bias.
 ///
 /// (Bates and Watts, *Nonlinear regression analysis and its applications*, 1988, chapter 6.)
-pub(super) fn inflated(
+fn inflated(
     points: &[Observation],
     at: &Transform<Object, Camera>,
     first: Matrix6<f64>,

@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Vector3, Vector4};
 
-use super::descent::Term;
+use crate::solve::likelihood::descent::Term;
 
 /// The inverse of the Cholesky factor of a pixel covariance, S = L Lᵀ.
 ///
 /// L⁻¹ r has the unit covariance, so that rᵀ S⁻¹ r = ‖L⁻¹ r‖².
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Whitener {
+pub(crate) struct Whitener {
     /// The diagonal of L⁻¹.
     scale: [f64; 4],
     /// The part of L⁻¹ below the diagonal, row by row; `None` for independent pixel errors, the usual case.
@@ -17,7 +17,7 @@ pub(super) struct Whitener {
 
 impl Whitener {
     /// `None` if the covariance is not positive definite.
-    pub(super) fn of(noise: &Matrix4<f64>) -> Option<Self> {
+    pub(crate) fn of(noise: &Matrix4<f64>) -> Option<Self> {
         let s = |i: usize, j: usize| noise[(i, j)];
         let root = |pivot: f64| (pivot > 0.0 && pivot.is_finite()).then(|| 1.0 / pivot.sqrt());
         let independent = (0..4).all(|i| (0..i).all(|j| s(i, j) == 0.0));
@@ -47,7 +47,7 @@ impl Whitener {
 
     /// Jᵀ S⁻¹ J, Jᵀ S⁻¹ r and rᵀ S⁻¹ r.
     #[inline]
-    pub(super) fn term(&self, j: &Matrix4x3<f64>, r: &Vector4<f64>) -> Term {
+    pub(crate) fn term(&self, j: &Matrix4x3<f64>, r: &Vector4<f64>) -> Term {
         let [a, b, c, d] = self.scale;
         let row = |i: usize| Vector3::new(j[(i, 0)], j[(i, 1)], j[(i, 2)]);
         let (j0, j1, j2, j3) = (row(0), row(1), row(2), row(3));

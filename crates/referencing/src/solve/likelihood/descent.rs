@@ -3,11 +3,13 @@
 use nalgebra::{Matrix3, Matrix6, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{
-    Degenerate, converged,
-    normal::{Normal, inverse, singular},
+use crate::{
+    observations::Observation,
+    solve::{
+        degeneracy::{Degenerate, converged},
+        likelihood::normal::{Normal, inverse, singular},
+    },
 };
-use crate::Observation;
 
 /// The term of one point at the position where a pose puts it, camera axes.
 pub(crate) struct Term {
@@ -21,21 +23,24 @@ pub(crate) struct Term {
 
 impl Term {
     /// The term of a residual (m) with this information.
-    pub(super) fn of(information: Matrix3<f64>, residual: &Vector3<f64>) -> Self {
+    pub(crate) fn of(information: Matrix3<f64>, residual: &Vector3<f64>) -> Self {
         let pull = information * residual;
         Self { information, pull, cost: residual.dot(&pull) }
     }
 }
 
+/// The term of a point, by index, at the position where a pose puts it.
+pub(crate) type Terms<'a> = &'a dyn Fn(usize, &Vector3<f64>) -> Option<Term>;
+
 /// The sum of all terms at one pose: normal equations of the step ξ in `pose · Exp(ξ)`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Linearized {
+pub(crate) struct Linearized {
     /// Σ Jᵀ W J: the information on ξ.
     normal: Normal,
     /// Σ Jᵀ W r.
-    pub(super) gradient: Vector6<f64>,
+    pub(crate) gradient: Vector6<f64>,
     /// χ².
-    pub(super) cost: f64,
+    pub(crate) cost: f64,
 }
 
 /// The normal equations at `pose`.
@@ -47,7 +52,7 @@ pub(super) struct Linearized {
 ///
 /// [`Degenerate::Hidden`]: the first point without a term.
 #[inline]
-pub(super) fn linearize(
+pub(crate) fn linearize(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
@@ -71,7 +76,7 @@ pub(super) fn linearize(
 ///
 /// With n the pixel errors and e the model errors the minimum satisfies Σ Jᵀ W (J ξ + Rᵀ e + n) = 0, R of the pose, so
 /// that ξ = −(Σ JᵀWJ)⁻¹ Σ Jᵀ W Rᵀ e + ….
-pub(super) fn model_errors(
+pub(crate) fn model_errors(
     points: &[Observation],
     pose: &Transform<Object, Camera>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,
@@ -93,7 +98,7 @@ pub(super) fn model_errors(
 
 impl Linearized {
     /// The sum with the terms of `other`.
-    pub(super) fn plus(mut self, other: &Self) -> Self {
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
         self.normal.join(&other.normal);
         self.gradient += other.gradient;
         self.cost += other.cost;
@@ -101,7 +106,7 @@ impl Linearized {
     }
 
     /// The sum without the terms of `other`, which it contains.
-    pub(super) fn less(mut self, other: &Self) -> Self {
+    pub(crate) fn less(mut self, other: &Self) -> Self {
         self.normal.remove(&other.normal);
         self.gradient -= other.gradient;
         self.cost -= other.cost;
@@ -113,17 +118,17 @@ impl Linearized {
     /// # Errors
     ///
     /// A motion that changes no measurement.
-    pub(super) fn covariance(&self) -> Result<Matrix6<f64>, Degenerate> {
+    pub(crate) fn covariance(&self) -> Result<Matrix6<f64>, Degenerate> {
         inverse(&self.normal.matrix())
     }
 
     /// The squared length of a step in standard deviations: ξᵀ Σ⁻¹ ξ.
-    pub(super) fn away(&self, step: &Vector6<f64>) -> f64 {
+    pub(crate) fn away(&self, step: &Vector6<f64>) -> f64 {
         step.dot(&(self.normal.matrix() * step))
     }
 
     /// tr Σ_φφ (rad²), by the Schur complement of the translation.
-    pub(super) fn attitude_variance(&self) -> Option<f64> {
+    pub(crate) fn attitude_variance(&self) -> Option<f64> {
         let normal = self.normal.matrix();
         let block = |row, column| normal.fixed_view::<3, 3>(row, column).into_owned();
         let (turn, mixed, shift) = (block(0, 0), block(0, 3), block(3, 3));
@@ -132,7 +137,7 @@ impl Linearized {
     }
 
     /// The step and its decrement gᵀ ξ, the squared length in standard deviations.
-    pub(super) fn step(&self, damping: f64) -> Option<(Vector6<f64>, f64)> {
+    pub(crate) fn step(&self, damping: f64) -> Option<(Vector6<f64>, f64)> {
         let step = self.normal.solve(damping, &self.gradient)?;
         let decrement = self.gradient.dot(&step);
         decrement.is_finite().then_some((step, decrement))
@@ -146,7 +151,7 @@ impl Linearized {
 /// Decrement below which no improvement is left: a step of 1e-10 standard deviations.
 const NOTHING: f64 = 1e-20;
 /// Decrement below which the cost is dominated by rounding; the steps themselves must shrink from there.
-pub(super) const NEAR: f64 = 1e-4;
+pub(crate) const NEAR: f64 = 1e-4;
 /// Maximum number of steps of one descent. Six suffice for nearly all problems; a few weak points have a long curved
 /// valley, in which Gauss–Newton steps are far too short or too long.
 const MAX_STEPS: u64 = 500;
@@ -160,7 +165,7 @@ const MAX_STEPS: u64 = 500;
 /// # Errors
 ///
 /// A start that puts a point behind a camera, or an undetermined motion.
-pub(super) fn descend(
+pub(crate) fn descend(
     points: &[Observation],
     start: &Transform<Object, Camera>,
     near: f64,
@@ -196,7 +201,7 @@ pub(super) fn descend(
 /// # Errors
 ///
 /// As [`descend`], and steps that do not vanish.
-pub(super) fn settle(
+pub(crate) fn settle(
     points: &[Observation],
     start: Transform<Object, Camera>,
     here: Linearized,
@@ -247,7 +252,7 @@ fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Obj
 /// # Errors
 ///
 /// As these.
-pub(super) fn minimize(
+pub(crate) fn minimize(
     points: &[Observation],
     start: &Transform<Object, Camera>,
     term: &impl Fn(usize, &Vector3<f64>) -> Option<Term>,

@@ -3,8 +3,10 @@
 use nalgebra::{Matrix3, Matrix4, Matrix4x3, Matrix6, SMatrix, SVector, Vector3, Vector4, Vector6};
 use seafix_geometry::{Camera, Covariance6, Object, Pixel, StereoPixels, StereoRig, Transform, UncertainPixels};
 
-use super::{Degenerate, pixel_terms::PIXEL_FLOOR};
-use crate::{Observation, Observations};
+use crate::{
+    observations::{Observation, Observations},
+    solve::{degeneracy::Degenerate, likelihood::pixel_terms::PIXEL_FLOOR},
+};
 
 /// Longest step (m) of the differences; rounding (1e-15 of the coordinates over the step) and the third derivative
 /// (squared step) are then below 1e-9 of the result.
@@ -31,7 +33,7 @@ fn min<const N: usize>(covariance: &SMatrix<f64, N, N>) -> f64 {
 /// A model point has the covariance σ² I. J_i = ∂ξ/∂point_i, with ξ the change of the answer, `solve(moved) = at ·
 /// Exp(ξ)`. With pixels and a rig, the four pixel coordinates are the measurement: they are moved one by one, and the
 /// triangulated point with them, so that solvers of pixels and of points are differentiated alike.
-pub(super) fn covariance(
+pub(crate) fn covariance(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
@@ -85,7 +87,7 @@ pub(super) fn covariance(
 }
 
 /// σ ∂ξ/∂P of each model point P.
-pub(super) fn model_errors(
+pub(crate) fn model_errors(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,

@@ -3,12 +3,18 @@
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, StereoRig, Transform};
 
-use super::{Degenerate, kabsch, p3p};
-use crate::{Observation, Observations};
+use crate::{
+    observations::{Observation, Observations},
+    solve::{
+        closed_form::fit,
+        degeneracy::{Degenerate, widest},
+        likelihood::p3p,
+    },
+};
 
 /// Up to eight poses, in order of their cost over the pixels of all points.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Roots {
+pub(crate) struct Roots {
     poses: [Transform<Object, Camera>; 8],
     costs: [f64; 8],
     count: usize,
@@ -21,7 +27,7 @@ impl Default for Roots {
 }
 
 impl Roots {
-    pub(super) fn as_slice(&self) -> &[Transform<Object, Camera>] {
+    pub(crate) fn as_slice(&self) -> &[Transform<Object, Camera>] {
         &self.poses[..self.count]
     }
 
@@ -38,7 +44,7 @@ impl Roots {
 }
 
 /// The P3P poses of the left camera for three widely spread points.
-pub(super) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
+pub(crate) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
     let mut roots = Roots::default();
     roots.of_camera(data, rig, widest(data), false);
     roots
@@ -46,7 +52,7 @@ pub(super) fn roots(data: &Observations<'_>, rig: &StereoRig) -> Roots {
 
 impl Roots {
     /// Adds the P3P poses of these three points for the left or the right camera.
-    pub(super) fn of_camera(&mut self, data: &Observations<'_>, rig: &StereoRig, three: [usize; 3], right: bool) {
+    pub(crate) fn of_camera(&mut self, data: &Observations<'_>, rig: &StereoRig, three: [usize; 3], right: bool) {
         let mut three = three.map(|i| data.points[i]);
         let ray = |point: &Observation| -> Option<Vector3<f64>> {
             let seen = point.pixels?.at;
@@ -61,7 +67,7 @@ impl Roots {
                 let at = ray * *distance;
                 point.measured.at = if right { left_from_right * Point::from(at) } else { Point::from(at) };
             }
-            let pose = kabsch::fit(&three);
+            let pose = fit(&three);
             if let Ok(cost) = squares(data, rig, &pose) {
                 self.insert(pose, cost);
             }
@@ -74,7 +80,7 @@ impl Roots {
 /// # Errors
 ///
 /// The first point out of a camera's view.
-pub(super) fn squares(
+pub(crate) fn squares(
     data: &Observations<'_>,
     rig: &StereoRig,
     pose: &Transform<Object, Camera>,
@@ -87,20 +93,4 @@ pub(super) fn squares(
         Ok((seen.at.coordinates() - expected.coordinates()).norm_squared())
     };
     data.points.iter().enumerate().map(of).sum()
-}
-
-/// Three distant model points: the farthest from the centroid, the farthest from that, and the farthest from the line
-/// through both.
-pub(super) fn widest(data: &Observations<'_>) -> [usize; 3] {
-    let at = |i: usize| data.points[i].model.coords;
-    let centre = data.points.iter().map(|point| point.model.coords).sum::<Vector3<f64>>() / data.points.len() as f64;
-    let farthest = |measure: &dyn Fn(usize) -> f64| {
-        let better = |best: usize, i: usize| if measure(i) > measure(best) { i } else { best };
-        (0..data.points.len()).fold(0, better)
-    };
-    let first = farthest(&|i| (at(i) - centre).norm_squared());
-    let second = farthest(&|i| (at(i) - at(first)).norm_squared());
-    let along = at(second) - at(first);
-    let third = farthest(&|i| along.cross(&(at(i) - at(first))).norm_squared());
-    [first, second, third]
 }
