@@ -11,7 +11,7 @@ use std::{
 use seafix_component::{Fault, read_text};
 use serde::Deserialize;
 
-use crate::manifest;
+use crate::run::manifest;
 
 /// A value that differs; `None` if it exists in the other run only.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

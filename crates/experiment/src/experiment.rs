@@ -18,9 +18,11 @@ use seafix_data::{
 };
 
 use crate::{
-    Axis, AxisValue, Logging, Navigation, keyframes,
+    keyframes,
+    logging::Logging,
+    navigation::Navigation,
     parse::{self, Read, Texts},
-    sweep::{self, Cell},
+    sweep::{self, Axis, AxisValue, Cell},
 };
 
 /// An experiment file: a question, a source, a pipeline, and the settings that vary.

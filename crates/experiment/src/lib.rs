@@ -7,13 +7,12 @@
 
 mod diff;
 mod experiment;
-mod identity;
+mod git;
 mod inspect;
 mod judge;
 mod keyframes;
 mod log_decimation;
 mod logging;
-mod manifest;
 mod navigation;
 mod odometry_fault;
 mod parse;
@@ -27,14 +26,13 @@ mod sweep;
 
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};
-pub use identity::{SHARED, SharedPart, components};
 pub use logging::{ImagesLogged, Logging};
-pub use manifest::{changed_outputs, check_run, is_run, kept_identity};
 pub use navigation::Navigation;
 pub use odometry_fault::OdometryFault;
 pub use range::{Number, Range};
 pub use replay::{Replay, ReplayFrom};
 pub use run::{
-    Existing, Finished, Observer, Options, Remade, RunError, RunEstimate, Shard, Silent, estimate, merge, remake, run,
+    Existing, Finished, Observer, Options, Remade, RunError, RunEstimate, SHARED, Shard, SharedPart, Silent,
+    changed_outputs, check_run, components, estimate, is_run, kept_identity, merge, remake, run,
 };
 pub use sweep::{Axis, AxisValue, Case, changed, changed_pipeline};

@@ -12,7 +12,7 @@ use toml::{
     de::{DeTable, DeValue, Deserializer},
 };
 
-use crate::Experiment;
+use crate::experiment::Experiment;
 
 /// The texts of an experiment: its own, then that of its base.
 #[derive(Debug, Clone, Default)]

@@ -5,7 +5,7 @@ use seafix_log::{GreyImage, encode_png};
 use seafix::FrameData;
 use seafix_data::{dataset::grey, log_conversion};
 
-use crate::ImagesLogged;
+use crate::logging::ImagesLogged;
 
 /// The images of a frame at one level of logging.
 #[derive(Debug)]

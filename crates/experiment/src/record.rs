@@ -16,7 +16,12 @@ use seafix_navigation::{FUSIONS, Navigated, ODOMETRIES, POLICIES};
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
 use seafix_vision::{DESCRIPTORS, DETECTORS, LOCATORS, MATCHERS};
 
-use crate::{AxisValue, Experiment, Plan, Trial, manifest::Git, pictures::Pictures};
+use crate::{
+    experiment::{Experiment, Plan, Trial},
+    git::Git,
+    pictures::Pictures,
+    sweep::AxisValue,
+};
 
 /// The name of the search for labelled points.
 const LABELLED: &str = "labelled";

@@ -7,7 +7,11 @@ use seafix_log::Reader;
 
 use seafix::Pipeline;
 
-use crate::{Axis, Experiment, Plan, parse::Texts, sweep};
+use crate::{
+    experiment::{Experiment, Plan},
+    parse::Texts,
+    sweep::{self, Axis},
+};
 
 /// The part of a log's inputs that a replay starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

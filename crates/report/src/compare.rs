@@ -5,10 +5,14 @@ use std::path::{Path, PathBuf};
 use seafix_log::Axis;
 
 use crate::{
-    Forms, ReportError, RunSummary, content, format,
+    content,
+    error::ReportError,
+    format::{self, distinct},
+    forms::Forms,
     paired::{self, Comparison},
     print,
     run::{Run, Trial},
+    summary::RunSummary,
     terminal::wrapped,
     write::write,
 };
@@ -52,7 +56,7 @@ pub fn compare(
         let differences = differences.join(", ");
         forced += &format!("{} and {} have different data: {differences}.\n", printed(&names[0]), printed(name));
     }
-    let keys = content::distinct(runs.iter().flat_map(|run| run.header().axes.iter().map(|axis| axis.key.clone())));
+    let keys = distinct(runs.iter().flat_map(|run| run.header().axes.iter().map(|axis| axis.key.clone())));
     for (run, name) in runs.iter_mut().zip(&names) {
         for trial in &mut run.trials {
             joined(trial, name, &keys);
@@ -124,7 +128,7 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
             found.push(format!("{what}: {} against {}{more}", show(&left), show(&right)));
         }
     };
-    let of = |run: &Run, lines: fn(&Trial) -> Vec<String>| content::distinct(run.trials.iter().flat_map(lines));
+    let of = |run: &Run, lines: fn(&Trial) -> Vec<String>| distinct(run.trials.iter().flat_map(lines));
     let mut both = |what: &str, lines: fn(&Trial) -> Vec<String>| say(what, of(first, lines), of(other, lines));
     both("source", |trial| vec![trial.header.source.clone()]);
     both("settings of the source", |trial| {
@@ -175,7 +179,7 @@ fn same(run: &Run, names: &[String]) -> String {
 fn lengths(run: &Run, names: &[String], comparisons: &[Comparison]) -> String {
     let of = |name: &String| {
         let own = run.trials.iter().filter(|trial| trial.header.axes[0].value == *name);
-        content::distinct(own.map(|trial| trial.count().to_string())).join(" or ")
+        distinct(own.map(|trial| trial.count().to_string())).join(" or ")
     };
     let lengths: Vec<String> = names.iter().map(of).collect();
     if lengths.iter().all(|length| *length == lengths[0]) {

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{ReportError, RunSummary, content, print, run::Run, write::write};
+use crate::{content, error::ReportError, print, run::Run, summary::RunSummary, write::write};
 
 /// The file name of the page.
 const NAME: &str = "README.md";

@@ -15,7 +15,9 @@ mod error;
 mod field;
 mod figure;
 mod fix_intervals;
+mod fonts;
 mod format;
+mod forms;
 mod index;
 mod lever;
 mod navigation_quantity;
@@ -34,16 +36,15 @@ mod write;
 
 pub use compare::{Compared, compare};
 pub use error::ReportError;
+pub use forms::Forms;
 pub use index::{index, index_holds};
 pub use paper::PAPER_FIT_RMS;
 pub use summary::{Distribution, Limits, Row, RunSummary, StageTimeSummary};
 pub use verify::{Mismatch, Verified, verify};
-pub use write::{Forms, Report, report};
+pub use write::{Report, report};
 
 use std::path::Path;
 
-use field::Field;
-use number::{Key, Number};
 use run::Run;
 
 /// Summarises the logs in `run_dir`, one row for every trial.

@@ -6,10 +6,10 @@ use seafix_evaluation::{Bootstrap, holm, mcnemar, median, signed_rank};
 use seafix_log::Axis;
 
 use crate::{
-    Field, RunSummary,
-    content::distinct,
-    format,
+    field::Field,
+    format::{self, distinct},
     run::{Run, Trial},
+    summary::RunSummary,
 };
 
 /// The seed of the bootstrap, fixed so that results are reproducible.

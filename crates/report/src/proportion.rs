@@ -11,6 +11,9 @@ const BOUNDS: [f64; 25] = [
     8.8388, 10.5112, 12.5, 14.865, 17.6777, 21.0224, 25.0, 29.7302, 35.3553, 42.0448, 50.0,
 ];
 
+/// Minimum fix rate (%) at which a method counts as not broken down; set before the experiments.
+pub(crate) const BORNE: f64 = 95.0;
+
 /// Whether the frames of a trial follow each other on one trajectory, so that neighbours are correlated.
 ///
 /// Frames are independent draws if every frame has another object (the header has no target then) or another layout.

@@ -14,7 +14,9 @@ use seafix_log::{
 };
 
 use crate::{
-    Field, ReportError, disparity,
+    disparity,
+    error::ReportError,
+    field::Field,
     fix_intervals::{self, Step},
     lever,
     navigation_quantity::{Counted, NavigationQuantity},

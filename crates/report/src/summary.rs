@@ -7,7 +7,8 @@ use seafix_evaluation::quantile;
 use seafix_log::{Axis, Outcome, Region, SharedStages, Totals};
 
 use crate::{
-    Field, paired,
+    field::Field,
+    format, paired,
     run::{AttemptRow, Run, Trial},
 };
 
@@ -209,6 +210,11 @@ impl RunSummary {
         }
     }
 
+    /// Whether any trial has Cramér–Rao bounds.
+    pub(crate) fn has_limits(&self) -> bool {
+        self.rows.iter().any(|row| row.limits.is_some())
+    }
+
     /// A sentence on stages shared by several trials; `None` without shared stages.
     pub(crate) fn shared_times(&self) -> Option<String> {
         let any = |is_shared: fn(&SharedStages) -> bool| self.rows.iter().any(|row| is_shared(&row.shared));
@@ -329,7 +335,7 @@ impl Row {
 
     /// The axes other than search and solver, which the method names already.
     pub(crate) fn conditions(&self) -> impl Iterator<Item = &Axis> {
-        self.axes.iter().filter(|axis| !matches!(crate::format::short(&axis.key), "search" | "solver"))
+        self.axes.iter().filter(|axis| !matches!(format::short(&axis.key), "search" | "solver"))
     }
 }
 

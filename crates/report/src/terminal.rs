@@ -2,7 +2,11 @@
 
 use std::fmt;
 
-use crate::{Distribution, PAPER_FIT_RMS, Row, RunSummary, format};
+use crate::{
+    format,
+    paper::PAPER_FIT_RMS,
+    summary::{Distribution, Row, RunSummary},
+};
 
 impl fmt::Display for RunSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -5,6 +5,7 @@
 use std::process::Command;
 
 mod bad_input;
+mod circles;
 mod cloud;
 mod eval;
 mod generate;

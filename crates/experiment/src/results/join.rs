@@ -15,7 +15,7 @@ use parquet::{
     },
 };
 
-use super::table::{self, ROW_GROUP, Table};
+use crate::results::table::{self, ROW_GROUP, Table};
 
 /// The rows of one trial in the tables of one piece.
 #[derive(Debug, Clone)]

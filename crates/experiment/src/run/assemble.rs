@@ -8,16 +8,16 @@ use std::{
 
 use rayon::{ThreadPool, prelude::*};
 
-use super::{
-    Observer, RunError,
-    store::{Sealed, pose_graph},
+use crate::{
+    results::{TrialRows, join_csv, join_parquet},
+    run::{
+        manifest::Manifest,
+        observer::Observer,
+        outcome::RunError,
+        store::{Sealed, pose_graph},
+    },
 };
 use seafix_data::dataset::sha256;
-
-use crate::{
-    manifest::Manifest,
-    results::{TrialRows, join_csv, join_parquet},
-};
 
 /// Writes the logs and tables of the run that `manifest` describes from its pieces, in order; `false` if the observer
 /// stopped it.

@@ -9,8 +9,11 @@ use std::{
 use seafix_component::Fault;
 use seafix_log::Writer;
 
-use super::{RunError, group, partition};
-use crate::{Plan, results::Table};
+use crate::{
+    experiment::Plan,
+    results::Table,
+    run::{group, outcome::RunError, partition},
+};
 
 /// The estimated time and space of a run.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,11 +8,12 @@ use std::{
 
 use seafix_component::Fault;
 
-use super::{
-    Existing, Options, RunError,
+use crate::run::{
+    manifest::{self, Manifest},
+    options::{Existing, Options},
+    outcome::RunError,
     store::{self, Store},
 };
-use crate::manifest::{self, Manifest};
 
 /// The folder of a run, locked during the lifetime of this value.
 #[derive(Debug)]

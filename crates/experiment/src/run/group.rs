@@ -14,11 +14,18 @@ use seafix_navigation::PoseGraph;
 use seafix_referencing::{ObjectObservations, Site, Target, TargetKind};
 use seafix_simulation::{Purpose, Stream};
 
-use super::{
-    RunError,
-    sharing::{SharedFrame, Sharing},
+use crate::{
+    experiment::{Plan, Trial},
+    judge::Evaluator,
+    logging::ImagesLogged,
+    odometry_fault::Motions,
+    pictures::Levels,
+    record,
+    run::{
+        outcome::RunError,
+        sharing::{SharedFrame, Sharing},
+    },
 };
-use crate::{ImagesLogged, Plan, Trial, judge::Evaluator, odometry_fault::Motions, pictures::Levels, record};
 
 /// The trials with the same sequence. They share its frames, so that they are compared on the same noise.
 pub(crate) struct Group<'a> {

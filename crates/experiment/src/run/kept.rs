@@ -9,13 +9,20 @@ use std::{
 use seafix_component::Fault;
 use seafix_log::{FrameRecord, Reader};
 
-use super::{
-    Observer, Options, RunError, group, partition,
-    partition::Piece,
-    store::{Sealed, Store},
-    worker,
+use crate::{
+    experiment::Plan,
+    results::TrialRows,
+    run::{
+        group,
+        manifest::{self, Manifest},
+        observer::Observer,
+        options::Options,
+        outcome::RunError,
+        partition::{self, Piece},
+        store::{Sealed, Store},
+        worker,
+    },
 };
-use crate::{Plan, manifest, manifest::Manifest, results::TrialRows};
 
 /// A repeated part of a stored run.
 #[derive(Debug)]

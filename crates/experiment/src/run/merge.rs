@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use seafix_component::Fault;
 
-use super::{
-    Finished, Observer, Options, RunError, assemble,
+use crate::run::{
+    assemble,
     folder::Claim,
+    manifest::{self, Manifest},
+    observer::Observer,
+    options::Options,
+    outcome::{Finished, RunError},
     store::{Sealed, Store},
 };
-use crate::manifest::{self, Manifest};
 
 /// Joins the shards in `folders` into a run in the folder of `options`. Except for durations, the bytes are those of an
 /// undivided run. Shards may come from different machines and from different divisions of the run.

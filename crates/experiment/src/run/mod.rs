@@ -5,97 +5,38 @@
 //! one log for each trial and one table. The partition depends on the plan alone, so that results do not depend on the
 //! number of threads, on the machines, or on interruptions.
 
-use std::path::{Path, PathBuf};
-
 use seafix_component::Fault;
-use seafix_log::LogError;
 
 mod assemble;
 mod estimate;
 mod folder;
 mod group;
+mod identity;
 mod kept;
+pub(crate) mod manifest;
 mod merge;
+mod observer;
 mod options;
+mod outcome;
 mod partition;
 mod sharing;
 mod store;
 mod worker;
 
 pub use estimate::{RunEstimate, estimate};
+pub use identity::{SHARED, SharedPart, components};
 pub use kept::{Remade, remake};
+pub use manifest::{changed_outputs, check_run, is_run, kept_identity};
 pub use merge::merge;
+pub use observer::{Observer, Silent};
 pub use options::{Existing, Options, Shard};
+pub use outcome::{Finished, RunError};
 
-use crate::{Plan, manifest::Manifest};
+use crate::experiment::Plan;
 use folder::Claim;
-pub(crate) use group::Group;
-#[cfg(test)]
-pub(crate) use group::open;
+use manifest::Manifest;
 use partition::Piece;
 use store::Store;
-
-/// An observer of a run that may stop it. The runner itself prints nothing.
-pub trait Observer: Sync {
-    /// Reports the start: the number of frames over all trials, the approximate size of the logs, and the folder.
-    fn begins(&self, _frames: usize, _bytes: u64, _folder: &Path) {}
-    /// Reports the number of frames kept from before an interruption.
-    fn resumes(&self, _frames: usize) {}
-    /// Reports that an existing run is repeated, and the reason.
-    fn renews(&self, _reason: &str) {}
-    /// Reports a warning about an input.
-    fn warns(&self, _warning: &Fault) {}
-    /// Reports that one more frame of `trial` is logged.
-    fn frame(&self, _trial: &str) {}
-    /// Whether to stop the run; each thread then finishes its frame.
-    fn stops(&self) -> bool {
-        false
-    }
-}
-
-/// An observer without output.
-#[derive(Debug, Clone, Copy)]
-pub struct Silent;
-impl Observer for Silent {}
-
-/// The reason why a run was not finished.
-#[derive(Debug, thiserror::Error)]
-pub enum RunError {
-    /// Invalid inputs; nothing was written.
-    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
-    Input(Vec<Fault>),
-    /// An output that cannot be written.
-    #[error("{0}")]
-    Output(Fault),
-    /// A log that cannot be written.
-    #[error(transparent)]
-    Log(#[from] LogError),
-    /// An interruption by the observer; the finished part is kept.
-    #[error("interrupted; resume with `--resume --out {}`, or recover the finished part with `seafix recover {}`", .0.display(), .0.display())]
-    Interrupted(PathBuf),
-}
-
-impl RunError {
-    /// The fault of a file that cannot be written, with the number of bytes written before.
-    pub(crate) fn unwritable(path: &Path, error: impl std::fmt::Display) -> Self {
-        let after =
-            std::fs::metadata(path).map_or_else(|_| String::new(), |file| format!(", after {} bytes", file.len()));
-        Self::Output(
-            Fault::new(format!("cannot write ({error}{after})"), path).remedy("free some disk space and use --resume"),
-        )
-    }
-}
-
-/// A complete run or shard.
-#[derive(Debug)]
-pub struct Finished {
-    /// The folder.
-    pub folder: PathBuf,
-    /// The number of attempts over all trials and frames; zero for a shard.
-    pub rows: usize,
-    /// Whether the run existed already and nothing was computed.
-    pub kept: bool,
-}
 
 /// Runs `plan` into a folder.
 ///

@@ -9,7 +9,7 @@ use std::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use seafix_component::Fault;
 
-use super::RunError;
+use crate::run::outcome::RunError;
 
 /// The options of a run: its folder, its threads and its part.
 #[derive(Debug, Clone, PartialEq, Eq)]

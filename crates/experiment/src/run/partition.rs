@@ -1,7 +1,6 @@
 //! Partition of a run into pieces, determined by the plan alone.
 
-use super::group::Group;
-use crate::log_decimation::Thinned;
+use crate::{log_decimation::Thinned, run::group::Group};
 
 /// A sequence of successive frames of one source, processed by every trial that shares the source. It is the unit of
 /// work of a thread, of loss after an interruption, and of shards.

@@ -8,7 +8,7 @@ use std::sync::{
 use seafix::{Cloud, FrameResult, Pipeline, Sought};
 use seafix_log::SharedStages;
 
-use crate::Trial;
+use crate::experiment::Trial;
 
 /// The common stages of a group's trials: for each trial, the index of the first trial with the same stage.
 #[derive(Debug)]

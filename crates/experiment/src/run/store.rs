@@ -11,10 +11,14 @@ use std::{
 };
 
 use rayon::prelude::*;
+use seafix_log::Writer;
 use serde::{Deserialize, Serialize};
 
-use super::{RunError, worker::Output};
-use crate::results::{TrialRows, create_parquet};
+use crate::{
+    log_decimation::Thinned,
+    results::{Table, TrialRows, create_parquet},
+    run::outcome::RunError,
+};
 
 const FORMAT: &str = "seafix-piece/1";
 
@@ -154,6 +158,16 @@ impl Store {
             _ => Ok(()),
         }
     }
+}
+
+/// The output of one trial for a piece.
+pub(super) struct Output {
+    pub(super) trial: String,
+    pub(super) log: Writer,
+    pub(super) thinned: Thinned,
+    pub(super) table: Table,
+    /// The pose graph, if the trial keeps one.
+    pub(super) pose_graph: Option<String>,
 }
 
 /// A piece in progress.

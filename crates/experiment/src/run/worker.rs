@@ -10,13 +10,16 @@ use seafix_component::Fault;
 use seafix_log::{FrameRecord, FrameTimes, TargetTimes, Writer};
 use seafix_referencing::ObjectObservations;
 
-use super::{
-    Observer, RunError,
-    group::Group,
-    partition::Piece,
-    store::{Draft, Store},
+use crate::{
+    results::Table,
+    run::{
+        group::Group,
+        observer::Observer,
+        outcome::RunError,
+        partition::Piece,
+        store::{Draft, Output, Store},
+    },
 };
-use crate::{log_decimation::Thinned, results::Table};
 
 /// Computes all `pieces`; `false` if the observer stopped it.
 pub(super) fn work(
@@ -49,16 +52,6 @@ pub(super) fn work(
         Some(error) => Err(error),
         None => Ok(!observer.stops() || pieces.iter().all(|piece| store.has(piece.number))),
     }
-}
-
-/// The output of one trial for a piece.
-pub(super) struct Output {
-    pub(super) trial: String,
-    pub(super) log: Writer,
-    pub(super) thinned: Thinned,
-    pub(super) table: Table,
-    /// The pose graph, if the trial keeps one.
-    pub(super) pose_graph: Option<String>,
 }
 
 /// Computes one piece; `false` if it was stopped. Its logs are then closed after the last frame.

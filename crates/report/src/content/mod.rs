@@ -1,39 +1,26 @@
 //! The content of a report, section by section.
 
-mod ablation;
-mod abstract_;
-mod answer;
-mod breakdown;
-mod data;
-mod failures;
+mod conditions;
 mod figures;
-mod hypotheses;
-mod inspection;
-mod integrity;
-mod limits;
-mod method;
-mod navigation;
-mod objects;
+mod findings;
 mod phrases;
-mod protocol;
-mod reach;
-mod reproduce;
-mod results;
-mod significance;
-mod threats;
-mod time;
-
-pub(crate) use breakdown::BORNE;
-
-use std::collections::BTreeSet;
+mod sections;
 
 use rayon::prelude::*;
 
+use findings::abstract_;
+use sections::{
+    ablation, data, failures, hypotheses, inspection, integrity, method, navigation, objects, protocol, reproduce,
+    results, significance, threats, time,
+};
+
 use crate::{
-    ReportError, RunSummary,
     document::{Document, Section},
-    paired::{self, Comparison},
+    error::ReportError,
+    format::sentence_case,
+    paired,
     run::Run,
+    summary::RunSummary,
 };
 
 /// The report on a run.
@@ -79,33 +66,4 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
 /// The sentences of the abstract.
 pub(crate) fn findings(run: &Run, summary: &RunSummary) -> Vec<crate::document::Text> {
     abstract_::section(run, summary, &paired::comparisons(run, summary))
-}
-
-/// The distinct texts in the order of their first appearance.
-pub(crate) fn distinct(texts: impl IntoIterator<Item = String>) -> Vec<String> {
-    let mut seen = Vec::new();
-    for text in texts {
-        if !seen.contains(&text) {
-            seen.push(text);
-        }
-    }
-    seen
-}
-
-/// `text` with a capital first letter.
-fn sentence_case(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
-/// Whether `index` is significantly better than every trial of its group.
-fn best(comparisons: &[Comparison], index: usize) -> bool {
-    let is_of = |c: &&Comparison| !c.over_conditions && !c.between_conditions;
-    let own: Vec<&Comparison> =
-        comparisons.iter().filter(is_of).filter(|c| c.first == index || c.second == index).collect();
-    let Some(condition) = own.first().map(|c| &c.condition) else { return false };
-    // In a large group each trial is compared with the first only, so no trial is known to be the best.
-    let family = comparisons.iter().filter(is_of).filter(|c| c.condition == *condition);
-    let members: BTreeSet<usize> = family.flat_map(|c| [c.first, c.second]).collect();
-    own.len() + 1 == members.len() && own.iter().all(|c| c.better() == Some(index))
 }

@@ -1,8 +1,10 @@
 //! Numbers of trials with their keys, and the words for outcomes.
 
 use crate::{
-    Field, Key, Number, format,
+    field::Field,
+    format,
     navigation_quantity::NavigationQuantity,
+    number::{Key, Number},
     points_of_interest::PoiQuantity,
     proportion,
     run::{AttemptRow, Trial},
@@ -10,14 +12,14 @@ use crate::{
 
 /// The unit in which a quantity is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unit {
+pub(crate) enum Unit {
     Plain,
     Millimetres,
     Degrees,
 }
 
 impl Unit {
-    pub(super) fn scale(self) -> f64 {
+    pub(crate) fn scale(self) -> f64 {
         match self {
             Self::Plain => 1.0,
             Self::Millimetres => 1e3,
@@ -40,7 +42,7 @@ fn counted(trial: &Trial) -> &'static str {
 }
 
 /// The printed word for a counted group: keys keep the names `found` and `refused`.
-pub(super) fn outcome(group: &str) -> &str {
+pub(crate) fn outcome(group: &str) -> &str {
     match group {
         "attempted" => "attempts",
         "found" => "fixes",
@@ -50,12 +52,12 @@ pub(super) fn outcome(group: &str) -> &str {
 }
 
 /// The number of attempts of `group`.
-pub(super) fn count(trial: &Trial, group: &str, n: usize) -> Number {
+pub(crate) fn count(trial: &Trial, group: &str, n: usize) -> Number {
     Number::count(n, Key::of(trial, counted(trial), format!("count {group}")))
 }
 
 /// The fraction of `group` among all attempts (%).
-pub(super) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number {
+pub(crate) fn percent(trial: &Trial, group: &str, k: usize, n: usize) -> Number {
     let key = Key::of(trial, counted(trial), format!("percent {group} of attempted"));
     Number::new((n > 0).then(|| 100.0 * k as f64 / n as f64), 1, key)
 }
@@ -83,7 +85,7 @@ fn ends(trial: &Trial, group: &str, k: usize, n: usize) -> (f64, f64) {
 }
 
 /// The fraction of `group` among all attempts (%), or an end of its 95 % interval: `percent`, `low`, `high`.
-pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize), decimals: usize) -> Number {
+pub(crate) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize), decimals: usize) -> Number {
     let (low, high) = ends(trial, group, k, n);
     let value = match what {
         "low" => 100.0 * low,
@@ -97,7 +99,7 @@ pub(super) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize
 /// The 95 % interval of the fraction of `group` (%).
 ///
 /// It has two decimals from a thousand attempts on: with one decimal it would print as the fraction itself.
-pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
+pub(crate) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Number; 2] {
     let (low, high) = ends(trial, group, k, n);
     let decimals = if n < 1000 { 1 } else { 2 };
     [("low", low), ("high", high)].map(|(end, value)| {
@@ -107,7 +109,7 @@ pub(super) fn interval(trial: &Trial, group: &str, k: usize, n: usize) -> [Numbe
 }
 
 /// A statistic of a quantity over the attempts of a group, with the key `median tre_rms of found`.
-pub(super) fn statistic(
+pub(crate) fn statistic(
     trial: &Trial,
     name: &str,
     field: Field,
@@ -120,7 +122,7 @@ pub(super) fn statistic(
 }
 
 /// A statistic of a navigated quantity over the frames that have it.
-pub(super) fn navigated(
+pub(crate) fn navigated(
     trial: &Trial,
     name: &str,
     quantity: NavigationQuantity,
@@ -132,7 +134,7 @@ pub(super) fn navigated(
 }
 
 /// A statistic of a point of interest over the frames that have it in view.
-pub(super) fn poi(
+pub(crate) fn poi(
     trial: &Trial,
     name: &str,
     (quantity, point): (PoiQuantity, &str),
@@ -144,7 +146,7 @@ pub(super) fn poi(
 }
 
 /// A navigated quantity after one frame.
-pub(super) fn navigated_at(
+pub(crate) fn navigated_at(
     trial: &Trial,
     (frame, stamp_ns): (u64, u64),
     quantity: NavigationQuantity,
@@ -161,7 +163,7 @@ pub(super) fn navigated_at(
 }
 
 /// A quantity of one attempt.
-pub(super) fn value(
+pub(crate) fn value(
     trial: &Trial,
     (object, frame, stamp_ns): (&str, u64, u64),
     field: Field,
@@ -180,29 +182,29 @@ pub(super) fn value(
 /// A key over several logs.
 ///
 /// A count is summed over them; `least`, `greatest` and `middle` select among their values.
-pub(super) fn over(trials: &[&Trial], topic: &str, what: String) -> Key {
+pub(crate) fn over(trials: &[&Trial], topic: &str, what: String) -> Key {
     let spans = trials.iter().map(|trial| trial.span());
     let span = spans.fold([u64::MAX, 0], |[a, b], [from, to]| [a.min(from), b.max(to)]);
     Key { what, topic: topic.to_owned(), span, logs: trials.iter().map(|trial| trial.file()).collect() }
 }
 
 /// A number from the header of a trial.
-pub(super) fn header(trial: &Trial, what: &str, value: Option<f64>, decimals: usize) -> Number {
+pub(crate) fn header(trial: &Trial, what: &str, value: Option<f64>, decimals: usize) -> Number {
     Number::new(value, decimals, Key { span: [0; 2], ..Key::of(trial, "/run/header", what) })
 }
 
 /// The value of a trial on an axis.
-pub(super) fn axis(trial: &Trial, key: &str, value: Option<f64>) -> Number {
+pub(crate) fn axis(trial: &Trial, key: &str, value: Option<f64>) -> Number {
     header(trial, &format!("axis {key}"), value, 4)
 }
 
 /// The number of a frame.
-pub(super) fn frame(trial: &Trial, number: u64, stamp_ns: u64) -> Number {
+pub(crate) fn frame(trial: &Trial, number: u64, stamp_ns: u64) -> Number {
     let key = Key { span: [stamp_ns; 2], ..Key::of(trial, "/referencing/frame", "frame") };
     Number::count(number as usize, key)
 }
 
 /// The number of decimals that a column of `values` needs.
-pub(super) fn decimals(values: impl Iterator<Item = Option<f64>>, unit: Unit) -> usize {
+pub(crate) fn decimals(values: impl Iterator<Item = Option<f64>>, unit: Unit) -> usize {
     format::decimals(values.flatten().map(|value| value * unit.scale()))
 }

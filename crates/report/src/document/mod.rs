@@ -1,6 +1,6 @@
 //! The data structure of a report, independent of its printed form.
 
-mod span;
+pub(crate) mod span;
 mod table;
 
 pub(crate) use span::{Span, Text, bold, code, italic, plain_text, sub, sup, text};

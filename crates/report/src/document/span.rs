@@ -1,6 +1,6 @@
 //! Formatted text.
 
-use crate::Number;
+use crate::number::Number;
 
 /// A formatted text: a sequence of spans.
 pub(crate) type Text = Vec<Span>;
@@ -39,7 +39,7 @@ impl From<Number> for Span {
 
 /// A text from pieces that convert to spans: `text!["of ", number, " frames"]`.
 macro_rules! text {
-    ($($piece:expr),* $(,)?) => { vec![$($crate::document::Span::from($piece)),*] };
+    ($($piece:expr),* $(,)?) => { vec![$($crate::document::span::Span::from($piece)),*] };
 }
 pub(crate) use text;
 

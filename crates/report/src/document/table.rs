@@ -1,6 +1,6 @@
 //! Tables.
 
-use super::{Span, Text, plain_text};
+use crate::document::span::{Span, Text, plain_text};
 
 /// A table with rows of heads, and lines with one cell for every column.
 #[derive(Debug, Default)]

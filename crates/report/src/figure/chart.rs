@@ -1,11 +1,13 @@
 //! Charts: panels with axes and layers, and a legend.
 
-use super::{
-    Anchor, Axis, Drawing, Ink, Scale, Stroke,
-    drawing::FONT,
-    layer::{self, Layer},
+use crate::{
+    figure::{
+        axis::{Axis, Scale},
+        drawing::{Anchor, Drawing, FONT, Ink, Stroke},
+        layer::{self, Layer},
+    },
+    fonts::width_of,
 };
-use crate::print::width_of;
 
 /// The width of a column and of a page of a journal (pt): 85 mm and 170 mm.
 const COLUMN: f64 = 85.0 * 72.0 / 25.4;

@@ -1,6 +1,9 @@
 //! The layers of a panel.
 
-use super::{Anchor, Drawing, Ink, Scale, Stroke, drawing::Shape};
+use crate::figure::{
+    axis::Scale,
+    drawing::{Anchor, Drawing, FONT, Ink, Shape, Stroke},
+};
 
 /// A layer of a panel: one kind of mark for many values.
 #[derive(Debug, Clone)]
@@ -141,7 +144,7 @@ impl Layer {
                     drawing.shapes.push(Shape::Words {
                         at: [u, v + 2.6],
                         text: words.clone(),
-                        size: super::drawing::FONT,
+                        size: FONT,
                         anchor: Anchor::Middle,
                         turned: false,
                         ink,

@@ -1,6 +1,6 @@
 //! Anti-aliased marks on an image.
 
-use super::canvas::Canvas;
+use crate::figure::canvas::Canvas;
 
 /// The colour white.
 pub(super) const WHITE: [u8; 3] = [255; 3];

@@ -8,7 +8,7 @@ mod layer;
 mod marks;
 mod picture;
 
-pub(crate) use axis::{Axis, Scale};
+pub(crate) use axis::Axis;
 pub(crate) use chart::{Chart, Entry, Panel};
 pub(crate) use drawing::{Anchor, DASHES, Drawing, Ink, PALETTE, Shape, Stroke, mix};
 pub(crate) use layer::Layer;

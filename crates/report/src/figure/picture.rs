@@ -5,11 +5,15 @@ use std::collections::BTreeSet;
 use nalgebra::{Matrix4, Point3};
 use seafix_log::{CameraRecord, FrameRecord, GreyImage, Outcome, Reader, TargetRecord, TrialHeader};
 
-use super::{
-    canvas::{self, Canvas},
-    marks::{BLACK, BLUE, ORANGE, VERMILION, WHITE, digit, disc, frame as rectangle, plus, ring},
+use crate::{
+    error::ReportError,
+    figure::{
+        canvas::{self, Canvas},
+        marks::{BLACK, BLUE, ORANGE, VERMILION, WHITE, digit, disc, frame as rectangle, plus, ring},
+    },
+    place::matrix,
+    run::Trial,
 };
-use crate::{ReportError, place::matrix, run::Trial};
 
 /// The gap between the two images (px).
 const GAP: u32 = 8;

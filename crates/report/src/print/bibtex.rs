@@ -1,7 +1,6 @@
 //! A run as a BibTeX entry.
 
-use super::latex::escape;
-use crate::run::Run;
+use crate::{print::latex::escape, run::Run};
 
 /// The `@misc` entry of a run.
 pub(crate) fn bibtex(run: &Run) -> String {

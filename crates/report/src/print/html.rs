@@ -3,10 +3,12 @@
 use base64::{Engine, engine::general_purpose::STANDARD};
 use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
 
-use super::{fonts::Font, svg};
 use crate::{
-    Forms, Number,
     document::{Block, Cell, Document, Figure, Picture, Span, Table},
+    fonts::Font,
+    forms::Forms,
+    number::Number,
+    print::{svg, unicode},
 };
 
 /// The name of the meta element that records the forms of a report.
@@ -114,7 +116,7 @@ fn number(number: &Number) -> Markup {
 
 /// A text without invisible characters.
 fn plain(text: &str) -> String {
-    super::unicode::harmless(text)
+    unicode::harmless(text)
 }
 
 fn table(table: &Table) -> Markup {

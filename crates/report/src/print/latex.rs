@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
-use super::unicode::harmless;
-use crate::document::{Block, Cell, Document, Figure, Picture, Span, Table};
+use crate::{
+    document::{Block, Cell, Document, Figure, Picture, Span, Table},
+    print::unicode::harmless,
+};
 
 /// Maximum number of lines of a table on a page; longer tables are split.
 const LINES: usize = 42;

@@ -1,6 +1,6 @@
 //! Formatted text as Markdown.
 
-use crate::document::Span;
+use crate::{document::Span, print::unicode};
 
 /// `text` as Markdown with its emphasis; special characters are escaped.
 pub(crate) fn markdown(text: &[Span]) -> String {
@@ -20,7 +20,7 @@ pub(crate) fn markdown(text: &[Span]) -> String {
 /// A text with all special characters of Markdown escaped.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::new();
-    for c in super::unicode::harmless(text).chars() {
+    for c in unicode::harmless(text).chars() {
         match c {
             '<' => out += "&lt;",
             '&' => out += "&amp;",

@@ -2,7 +2,6 @@
 
 mod bibtex;
 mod data;
-mod fonts;
 mod html;
 mod latex;
 mod markdown;
@@ -12,7 +11,6 @@ mod unicode;
 
 pub(crate) use bibtex::bibtex;
 pub(crate) use data::{csv, json};
-pub(crate) use fonts::width_of;
 pub(crate) use html::{FORMS, html};
 pub(crate) use latex::latex;
 pub(crate) use markdown::{escape as escape_markdown, markdown};

@@ -5,16 +5,17 @@ use std::{collections::BTreeMap, rc::Rc};
 use seafix_evaluation::{holm, mcnemar, quantile};
 use seafix_log::{FrameTimes, Outcome, Region, TargetRecord};
 
-use super::logs::{Log, Logs, Row};
 use crate::{
-    Field, Key, ReportError,
-    content::BORNE,
+    error::ReportError,
+    field::Field,
     fix_intervals::{FixInterval, fix_intervals},
     lever::ARMS,
     navigation_quantity::{Counted, NavigationQuantity},
+    number::Key,
     paired::Statistics,
     points_of_interest::{self, PoiQuantity},
-    proportion,
+    proportion::{self, BORNE},
+    verify::logs::{Log, Logs, Row, Seen},
 };
 
 /// The value of a key, `None` for a dash, or the reason why it cannot be computed.
@@ -243,7 +244,7 @@ fn area<'a>(attempts: impl Iterator<Item = &'a TargetRecord>, field: Field, boun
     Some(100.0 * steps.sum::<f64>() / (attempts.len() as f64 * bound))
 }
 
-fn at(log: &Log, span: [u64; 2]) -> Option<&super::logs::Seen> {
+fn at(log: &Log, span: [u64; 2]) -> Option<&Seen> {
     log.at(span[0]).next()
 }
 

@@ -12,7 +12,8 @@ use seafix_log::{
 };
 
 use crate::{
-    ReportError, disparity,
+    disparity,
+    error::ReportError,
     fix_intervals::{self, Step},
     lever,
     paired::Statistics,

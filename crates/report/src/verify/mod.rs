@@ -9,9 +9,13 @@ use std::{
 };
 
 use crate::{
-    Forms, Key, Number, ReportError, RunSummary, index,
+    error::ReportError,
+    forms::Forms,
+    index,
+    number::{Key, Number},
     print::FORMS,
     run::Run,
+    summary::RunSummary,
     write::{files, strangers},
 };
 use evaluate::evaluate;

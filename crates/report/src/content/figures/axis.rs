@@ -1,40 +1,20 @@
 //! Figures of errors over a numeric condition.
 
-use super::{caption, distinct, figure, panels, series};
 use crate::{
-    Distribution, Field, Number, PAPER_FIT_RMS, Row, RunSummary,
-    content::phrases::{self, Unit},
+    content::{
+        conditions::axes::{keys, name, numeric, on},
+        figures::layout::{caption, figure, panels, series},
+        phrases::{self, Unit},
+    },
     document::{Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::{headed, short},
+    format::{distinct, headed, short},
+    number::{Key, Number},
+    paper::PAPER_FIT_RMS,
     run::{Run, Trial},
+    summary::{Distribution, Row, RunSummary},
 };
-
-/// The first numeric condition that varies.
-pub(in crate::content) fn numeric(summary: &RunSummary) -> Option<String> {
-    keys(summary).into_iter().next()
-}
-
-/// All numeric conditions that vary.
-pub(in crate::content) fn keys(summary: &RunSummary) -> Vec<String> {
-    let axes = summary.rows.first().into_iter().flat_map(Row::conditions);
-    let varies = |key: &String| {
-        let values: Vec<Option<f64>> = summary.rows.iter().map(|row| on(row, key)).collect();
-        values.iter().all(Option::is_some) && values.iter().any(|value| *value != values[0])
-    };
-    axes.map(|axis| axis.key.clone()).filter(varies).collect()
-}
-
-/// The value of a row on an axis.
-pub(in crate::content) fn on(row: &Row, key: &str) -> Option<f64> {
-    row.axes.iter().find(|axis| axis.key == key).and_then(|axis| axis.value.parse().ok())
-}
-
-/// The name of a row's series in a figure over `key`: its method and its other conditions.
-pub(in crate::content) fn name(row: &Row, key: &str) -> String {
-    let others = row.conditions().filter(|axis| axis.key != key);
-    others.fold(row.method(), |name, axis| format!("{name}, {} {}", short(&axis.key), axis.value))
-}
 
 /// A quantity with its distribution in a row and its axis label.
 type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
@@ -42,7 +22,7 @@ type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
 /// The figure of fit RMS and TRE over the condition, with the paper's range.
 ///
 /// Over distance it also shows growth with z and z².
-pub(super) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
+pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let key = numeric(summary)?;
     let names = distinct(summary.rows.iter().map(|row| name(row, &key)));
     if names.len() > 14 {
@@ -147,7 +127,7 @@ type Distributed = (Field, Unit, &'static str);
 ///
 /// It shows the TRE; over a fraction of outliers it shows attitude error, position error and search time, as the
 /// literature on robust registration does.
-pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
+pub(crate) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let groups = panels(run, 12);
     let names = distinct(groups.iter().flat_map(|(_, members)| members.iter().map(|(name, _)| name.clone())));
     if names.len() > 7 || run.trials.len() < 2 {
@@ -209,6 +189,6 @@ pub(super) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
 
 /// The number of fixes in the sample.
 fn n(trial: &Trial, field: Field, n: usize) -> Number {
-    let key = crate::Key::of(trial, field.topic(), format!("sampled {} of found", field.name()));
+    let key = Key::of(trial, field.topic(), format!("sampled {} of found", field.name()));
     Number::count(n, key)
 }

@@ -1,13 +1,18 @@
 //! Figures of the consistency of covariances: the NEES histogram and the coverage curve.
 
-use super::{caption, distinct, figure};
 use crate::{
-    Field, Number, RunSummary,
-    content::phrases,
+    content::{
+        figures::layout::{caption, figure},
+        phrases,
+    },
     document::{Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
+    format::distinct,
+    number::Number,
     proportion,
     run::{Run, Trial},
+    summary::RunSummary,
 };
 
 /// The width of a column of the histogram, and the number of columns.
@@ -15,7 +20,7 @@ const STEP: f64 = 1.5;
 const COLUMNS: usize = 16;
 
 /// The histogram of the NEES of all fixes, with the density of χ² with six degrees of freedom.
-pub(super) fn histogram(run: &Run) -> Option<Figure> {
+pub(crate) fn histogram(run: &Run) -> Option<Figure> {
     let trials: Vec<_> = run.trials.iter().collect();
     let all = || {
         run.trials
@@ -77,7 +82,7 @@ const LINES: usize = 7;
 /// The coverage curve: the fraction of fixes, wrong ones included, within their error bound at each confidence level.
 ///
 /// It is on the diagonal for a consistent covariance, above it for one that is too large.
-pub(super) fn coverage(run: &Run) -> Option<Figure> {
+pub(crate) fn coverage(run: &Run) -> Option<Figure> {
     // A decimated log has all failures and few of the other frames.
     if run.trials.iter().any(|trial| trial.every() > 1) {
         return None;

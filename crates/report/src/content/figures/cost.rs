@@ -2,12 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use super::{caption, distinct, figure, series};
 use crate::{
-    Field, Key, Number,
-    content::phrases,
+    content::{
+        figures::layout::{caption, figure, series},
+        phrases,
+    },
     document::{Cell, Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
+    format::distinct,
+    number::{Key, Number},
     run::{Run, Trial},
 };
 
@@ -19,7 +23,7 @@ const MIN: usize = 3;
 /// The figure of pair tests and search time over the number of candidates, on logarithmic axes.
 ///
 /// It has times only if durations are logged.
-pub(in crate::content) fn search_cost(run: &Run) -> Option<Figure> {
+pub(crate) fn search_cost(run: &Run) -> Option<Figure> {
     let names = distinct(run.trials.iter().map(|trial| trial.method()[0].clone()));
     if names.len() > MAX {
         return None;

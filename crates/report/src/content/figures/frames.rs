@@ -1,19 +1,24 @@
 //! The figure of the error of every fix over the frames.
 
-use super::{caption, distinct, figure, series};
 use crate::{
-    Field, PAPER_FIT_RMS, RunSummary,
-    content::phrases::{self, Unit},
+    content::{
+        figures::layout::{caption, figure, series},
+        phrases::{self, Unit},
+    },
     document::{Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
+    format::distinct,
+    paper::PAPER_FIT_RMS,
     run::Run,
+    summary::RunSummary,
 };
 
 /// Maximum number of plotted fixes; more marks hide each other.
 const MAX: usize = 4000;
 
 /// The figure of fit RMS and TRE of every fix.
-pub(super) fn errors(run: &Run) -> Option<Figure> {
+pub(crate) fn errors(run: &Run) -> Option<Figure> {
     let names = distinct(run.trials.iter().map(|trial| RunSummary::name(run, trial)));
     let fixes: usize = run.trials.iter().map(|trial| trial.attempts().count()).sum();
     if names.len() > 7 || fixes > MAX {

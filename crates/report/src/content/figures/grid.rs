@@ -1,20 +1,23 @@
 //! The figure of the fix rate over two conditions.
 
-use super::{axis, caption, distinct};
 use crate::{
-    Row, RunSummary,
-    content::phrases,
+    content::{
+        conditions::axes,
+        figures::layout::{self, caption},
+        phrases,
+    },
     document::{Cell, Figure, Head, Table, text},
     figure::{Axis, Chart, Layer, Panel},
-    format::headed,
+    format::{distinct, headed},
     run::Run,
+    summary::{Row, RunSummary},
 };
 
 /// The heat maps of the fix rate, one for every method, over the first two numeric conditions.
 ///
 /// Runs without them use their only two axes, with one trial in every cell.
-pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
-    let numeric = axis::keys(summary);
+pub(crate) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
+    let numeric = axes::keys(summary);
     let keys = if numeric.len() < 2 { varying(summary) } else { numeric };
     let [first, second] = keys.get(..2)? else { return None };
     let others = |index: usize| {
@@ -29,7 +32,7 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
         return None;
     }
     let head = |key: &str| {
-        let numbers = summary.rows.iter().all(|row| axis::on(row, key).is_some());
+        let numbers = summary.rows.iter().all(|row| axes::on(row, key).is_some());
         Head { numbers, ..Head::words(headed(key)) }
     };
     let heads = vec![Head::words("series"), head(first), head(second), Head::numbers("fixes (%)")];
@@ -43,7 +46,7 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
             let fraction = row.found as f64 / row.attempted.max(1) as f64;
             let number = phrases::percent(&run.trials[index], "found", row.found, row.attempted);
             values.push(([x, y, fraction], format!("{:.0}", 100.0 * fraction)));
-            let place = |key: &str| match axis::on(row, key) {
+            let place = |key: &str| match axes::on(row, key) {
                 Some(number) => Cell::from(phrases::axis(&run.trials[index], key, Some(number))),
                 None => value(row, key).into(),
             };
@@ -61,7 +64,7 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
         panels,
         legend: Vec::new(),
     };
-    super::figure("success", caption("Fix rate (fixes in % of the attempts) over two conditions.", run), &chart, data)
+    layout::figure("success", caption("Fix rate (fixes in % of the attempts) over two conditions.", run), &chart, data)
 }
 
 /// The two axes along which trials differ; `None` if their number is not two.
@@ -79,7 +82,7 @@ fn value(row: &Row, key: &str) -> String {
 /// The values of an axis: numbers in increasing order, words in order of appearance.
 fn ticks(summary: &RunSummary, key: &str) -> Vec<String> {
     let mut values = distinct(summary.rows.iter().map(|row| value(row, key)));
-    if summary.rows.iter().all(|row| axis::on(row, key).is_some()) {
+    if summary.rows.iter().all(|row| axes::on(row, key).is_some()) {
         let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
         values.sort_by(|a, b| number(a).total_cmp(&number(b)));
     }

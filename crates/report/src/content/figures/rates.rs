@@ -1,20 +1,22 @@
 //! The figure of the rates of fixes and wrong fixes, one line for every trial.
 
-use super::caption;
 use crate::{
-    RunSummary,
-    content::phrases,
+    content::{
+        figures::layout::{self, caption},
+        phrases,
+    },
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     proportion,
     run::Run,
+    summary::RunSummary,
 };
 
 /// Maximum number of trials in the figure.
 const MAX: usize = 36;
 
 /// The figure: rates of fixes and wrong fixes among the attempts, with 95 % intervals.
-pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
+pub(crate) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let n = summary.rows.len();
     if !(2..=MAX).contains(&n) {
         return None;
@@ -54,5 +56,5 @@ pub(super) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let intervals = proportion::called(run.trials.iter().map(|trial| &trial.header));
     let message =
         format!("Fixes and wrong fixes in % of the attempts, with {intervals}. The remaining attempts were rejected.");
-    super::figure("rates", caption(&message, run), &chart, data)
+    layout::figure("rates", caption(&message, run), &chart, data)
 }

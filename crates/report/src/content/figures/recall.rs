@@ -1,11 +1,12 @@
 //! The figure of recall: the fraction of attempts with an error below a bound.
 
-use super::{caption, distinct, panels, series};
 use crate::{
-    Field, Key, Number,
-    content::limits::same_axes,
+    content::figures::layout::{self, caption, panels, same_axes, series},
     document::{Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
+    format::distinct,
+    number::{Key, Number},
     proportion,
     run::Run,
 };
@@ -16,7 +17,7 @@ const BANDS: usize = 3;
 /// The figure of recall over the TRE with 95 % bands.
 ///
 /// Rejected attempts and wrong fixes are below no bound.
-pub(super) fn figure(run: &Run) -> Option<Figure> {
+pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let mut groups = panels(run, 6);
     // Many bands in one panel hide each other.
     if let [(_, members)] = &groups[..]
@@ -83,5 +84,5 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
     let message = format!(
         "Recall: the fraction of all attempts whose TRE is below a bound, with {bands}. Rejected attempts and wrong fixes are below no bound."
     );
-    super::figure("recall", caption(&message, run), &chart, data)
+    layout::figure("recall", caption(&message, run), &chart, data)
 }

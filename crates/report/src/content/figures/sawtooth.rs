@@ -1,8 +1,10 @@
 //! The figure of error growth between fixes, with and without further fixes.
 
-use super::{caption, figure as finish};
 use crate::{
-    content::phrases::{self, Unit},
+    content::{
+        figures::layout::{caption, figure as finish},
+        phrases::{self, Unit},
+    },
     document::{Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::condition,

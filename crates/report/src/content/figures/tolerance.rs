@@ -2,14 +2,19 @@
 
 use seafix_log::Outcome;
 
-use super::{axis, caption, distinct, figure, series};
 use crate::{
-    Field, Key, Number, Row, RunSummary,
-    content::phrases,
+    content::{
+        conditions::axes,
+        figures::layout::{caption, figure, series},
+        phrases,
+    },
     document::{Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::{headed, short, trimmed},
+    format::{distinct, headed, short, trimmed},
+    number::{Key, Number},
     run::{AttemptRow, Run},
+    summary::{Row, RunSummary},
 };
 
 /// Maximum number of methods, and of conditions, in the figure.
@@ -18,8 +23,8 @@ const MAX: usize = 7;
 /// The figure of precision over recall of identified points along the tolerance Δ.
 ///
 /// Every method has a line, every condition a panel. A ring marks the tolerance with the largest F1 score.
-pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure> {
-    let key = axis::keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
+pub(crate) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure> {
+    let key = axes::keys(summary).into_iter().find(|key| key.contains("tolerance"))?;
     let condition = |row: &Row| {
         let others = row.conditions().filter(|axis| axis.key != key);
         others.map(|axis| format!("{} {}", short(&axis.key), axis.value)).collect::<Vec<_>>().join(", ")
@@ -46,7 +51,7 @@ pub(super) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
                 let fixed = |row: &AttemptRow| row.outcome == Outcome::Fix;
                 let (correct, identified) = (sum(Field::Correct, fixed), sum(Field::Identified, fixed));
                 let visible = sum(Field::Visible, |_| true);
-                let tolerance = axis::on(row, &key)?;
+                let tolerance = axes::on(row, &key)?;
                 // Precision is undefined without a fix.
                 if !(visible > 0.0 && identified > 0.0) {
                     continue;

@@ -2,14 +2,14 @@
 
 use seafix_log::TrialHeader;
 
-use super::caption;
 use crate::{
-    Key, Number,
-    document::{Figure, Head, Table, text},
+    content::figures::layout::{self, caption},
+    document::{Cell, Figure, Head, Table, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
+    number::{Key, Number},
     place::matrix,
     proportion,
-    run::Run,
+    run::{Run, Trial},
 };
 
 /// Maximum number of plotted frames; the positions of more would overlap.
@@ -18,7 +18,7 @@ const PLACES: usize = 1000;
 /// The figure of the first trial's trajectory, from above and from the side.
 ///
 /// It shows true positions, fixes, navigated and odometry-only trajectories, feature points and bounding boxes.
-pub(super) fn figure(run: &Run) -> Option<Figure> {
+pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let trial = &run.trials[0];
     if !proportion::is_trajectory(&trial.header) {
         return None;
@@ -104,16 +104,10 @@ pub(super) fn figure(run: &Run) -> Option<Figure> {
         if every > 1 { format!("One frame in {every} is shown. ") } else { String::new() },
         trial.file()
     );
-    super::figure("trajectory", caption(&message, run), &chart, data)
+    layout::figure("trajectory", caption(&message, run), &chart, data)
 }
 
-fn line(
-    trial: &crate::run::Trial,
-    what: &str,
-    name: &str,
-    (frame, stamp): (u64, u64),
-    at: [f64; 3],
-) -> Vec<crate::document::Cell> {
+fn line(trial: &Trial, what: &str, name: &str, (frame, stamp): (u64, u64), at: [f64; 3]) -> Vec<Cell> {
     let number = |axis: usize| {
         let what = format!("place-{} {what} of {name} at {frame}", ["x", "y", "z"][axis]);
         let key = Key { what, topic: "/referencing/frame".to_owned(), span: [stamp; 2], logs: vec![trial.file()] };

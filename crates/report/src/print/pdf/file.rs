@@ -9,7 +9,7 @@ use pdf_writer::{
 };
 use subsetter::{Profile, subset};
 
-use super::{super::fonts::Font, sheet::Sheets};
+use crate::{fonts::Font, print::pdf::sheet::Sheets};
 
 /// The compression level of streams, from 0 (none) to 10 (best).
 const LEVEL: u8 = 8;

@@ -9,9 +9,11 @@ use file::File;
 use paragraph::{Align, Style, set};
 use sheet::{BOTTOM, LEFT, Sheets, WIDTH};
 
-use super::fonts::Font;
-use crate::document::{Block, Document, Figure, Picture, Span, bold, italic};
-use crate::figure::Drawing;
+use crate::{
+    document::{Block, Document, Figure, Picture, Span, bold, italic},
+    figure::Drawing,
+    fonts::Font,
+};
 
 /// The font sizes of body text and small text (pt).
 const BODY: f64 = 10.0;

@@ -1,7 +1,6 @@
 //! Paragraphs, broken greedily into lines.
 
-use super::{super::fonts::Font, sheet::Sheets};
-use crate::document::Span;
+use crate::{document::Span, fonts::Font, print::pdf::sheet::Sheets};
 
 /// The style of a text.
 #[derive(Debug, Clone, Copy)]

@@ -4,8 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pdf_writer::{Content, Name, Str};
 
-use super::super::{fonts::Font, unicode::harmless};
-use crate::figure::{Anchor, DASHES, Drawing, Ink, Shape, Stroke};
+use crate::{
+    figure::{Anchor, DASHES, Drawing, Ink, Shape, Stroke},
+    fonts::Font,
+    print::unicode::harmless,
+};
 
 /// The size of A4 (pt).
 pub(super) const PAGE: [f64; 2] = [595.28, 841.89];

@@ -1,13 +1,13 @@
 //! Tables with columns as wide as their content, split over several pages if long.
 
-use super::{
-    SMALL,
-    paragraph::{self, Align, LEADING, Style, natural, set_at},
-    sheet::{LEFT, Sheets, WIDTH},
-};
 use crate::{
     document::{Cell, Head, Line, Span, Table, bold},
-    print::fonts::Font,
+    fonts::Font,
+    print::pdf::{
+        SMALL,
+        paragraph::{self, Align, LEADING, Style, natural, set_at},
+        sheet::{LEFT, Sheets, WIDTH},
+    },
 };
 
 /// The gap between columns, in units of the font size.

@@ -3,17 +3,16 @@
 use hmac_sha256::Hash as Sha256;
 use seafix_log::{CameraRecord, TrialHeader};
 
-use super::distinct;
 use crate::{
-    Number, RunSummary,
-    document::{Block, Cell, Head, Section, Table, Text, code, text},
-    format::{number, trimmed},
+    content::{conditions::setup::baseline, phrases},
+    document::{self, Block, Cell, Head, Section, Table, Text, code, text},
+    format::{counted, distinct, number, trimmed},
+    number::Number,
     run::Run,
+    summary::RunSummary,
 };
 
-use super::phrases;
-
-pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
+pub(crate) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     let of = |say: fn(&TrialHeader) -> String| distinct(run.trials.iter().map(|trial| say(&trial.header))).join("; ");
     let mut table = Table::new(
         "data",
@@ -22,7 +21,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
     );
     let mut line = |name: &str, value: Text| {
         if !value.iter().all(|span| span.plain().is_empty()) {
-            let name = Cell { text: vec![crate::document::italic(name)], ..Cell::default() };
+            let name = Cell { text: vec![document::italic(name)], ..Cell::default() };
             table.line(false, vec![name, Cell::prose(value)]);
         }
     };
@@ -68,10 +67,6 @@ pub(super) fn section(run: &Run, summary: &RunSummary, small: bool) -> Section {
 
 fn pairs<'a>(of: impl Iterator<Item = (&'a String, String)>) -> String {
     of.map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(", ")
-}
-
-pub(super) fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
 }
 
 /// The table of hashes that identify configuration, site and results.
@@ -141,12 +136,6 @@ fn camera(camera: &CameraRecord) -> String {
     let k = camera.matrix;
     let distortion = if camera.distortion.iter().all(|k| *k == 0.0) { "no distortion" } else { "with distortion" };
     format!("{} × {} px, f = {:.1}, {:.1} px, {distortion}", camera.size[0], camera.size[1], k[0][0], k[1][1])
-}
-
-/// The stereo baseline (m).
-pub(super) fn baseline(header: &TrialHeader) -> f64 {
-    let t = header.rig.right_from_left.map(|row| row[3]);
-    t[..3].iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 fn rig(header: &TrialHeader) -> String {

@@ -2,22 +2,24 @@
 
 use seafix_evaluation::recall_area;
 
-use super::{
-    phrases::{self, Unit},
-    results,
-};
 use crate::{
-    Distribution, Field, Key, Number, RunSummary,
+    content::{
+        conditions::columns,
+        phrases::{self, Unit},
+    },
     document::{Block, Cell, Head, Table, Text, text},
+    field::Field,
     lever::ARMS,
+    number::{Key, Number},
     run::{AttemptRow, Run, Trial},
+    summary::{Distribution, RunSummary},
 };
 
 /// The errors whose recall is integrated, with the upper bound as printed and its unit.
 const AREAS: [(Field, f64, Unit); 2] = [(Field::Tre, 50.0, Unit::Millimetres), (Field::Attitude, 5.0, Unit::Degrees)];
 
 /// The table; `None` without ground truth.
-pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
+pub(crate) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
     if !run.trials.iter().any(|trial| AREAS.iter().any(|area| found(trial).any(|row| row.get(area.0).is_some()))) {
         return None;
     }
@@ -27,9 +29,9 @@ pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
         .map(|trial| ARMS.map(|arm| Distribution::of(found(trial).filter_map(|row| row.at_arm(arm)))))
         .collect();
     let known = arms.iter().flatten().any(Option::is_some);
-    let mut above = results::blank(summary, 1);
+    let mut above = columns::blank(summary, 1);
     above.push(Head::over(2, "area under recall (%)"));
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.extend(["n", "TRE to 50 mm", "attitude to 5°"].map(Head::numbers));
     if known {
         above.push(Head::words(""));
@@ -43,7 +45,7 @@ pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
     let mut table =
         Table { id: "reach".to_owned(), caption: caption(run, known), heads: vec![above, below], lines: Vec::new() };
     for (index, ((row, trial), spreads)) in summary.rows.iter().zip(&run.trials).zip(&arms).enumerate() {
-        let mut line = results::cells(row);
+        let mut line = columns::cells(row);
         let attempts = trial.attempts().count();
         line.push(Number::count(attempts, Key::of(trial, "/metrics/evaluation", "count logged")).into());
         line.extend(AREAS.map(|(field, bound, unit)| Cell::from(area(trial, field, bound, unit))));
@@ -61,7 +63,7 @@ pub(super) fn table(run: &Run, summary: &RunSummary) -> Option<Block> {
                 line.push(Cell::minor(as_number(arm, "q95", spread.map(|s| s.p95), unit)));
             }
         }
-        table.line(results::breaks(summary, index), line);
+        table.line(columns::breaks(summary, index), line);
     }
     Some(Block::Table(table))
 }

@@ -5,7 +5,7 @@ use crate::{
     run::Run,
 };
 
-pub(super) fn section(run: &Run) -> Section {
+pub(crate) fn section(run: &Run) -> Section {
     let header = run.header();
     let command =
         if header.command.is_empty() { "seafix run CONFIGURATION".to_owned() } else { header.command.clone() };
@@ -19,7 +19,7 @@ pub(super) fn section(run: &Run) -> Section {
     ])
 }
 
-pub(super) fn configuration(run: &Run) -> Section {
+pub(crate) fn configuration(run: &Run) -> Section {
     let header = run.header();
     let mut section = Section::new("Configuration");
     section.say(text![

@@ -4,8 +4,6 @@ use std::{
     collections::{BTreeMap, BTreeSet},
     io::Write,
     path::Path,
-    process::Command,
-    sync::OnceLock,
 };
 
 use seafix_component::{Fault, read_text};
@@ -14,9 +12,14 @@ use serde::{Deserialize, Serialize};
 use seafix_data::dataset::sha256;
 
 use crate::{
-    Plan, Trial,
-    identity::{self, Versions},
-    run::{Group, Options, RunError},
+    experiment::{Plan, Trial},
+    git::Git,
+    run::{
+        group::Group,
+        identity::{self, Input, Versions},
+        options::Options,
+        outcome::RunError,
+    },
 };
 
 /// The format that this version writes.
@@ -73,23 +76,6 @@ pub(crate) struct TrialEntry {
     pub(crate) log: String,
     pub(crate) frames: usize,
     pub(crate) configuration: String,
-}
-
-/// The inputs of one source.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Input {
-    pub(crate) source: String,
-    /// The warnings about them, including skipped pairs.
-    #[serde(default)]
-    pub(crate) warnings: Vec<String>,
-    pub(crate) files: BTreeMap<String, String>,
-}
-
-/// The state of the source code, if the program was built in a checkout.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Git {
-    pub(crate) commit: Option<String>,
-    pub(crate) dirty: Option<bool>,
 }
 
 /// The kind of machine, which affects durations.
@@ -302,42 +288,6 @@ pub(crate) fn without(folder: &Path) -> Option<Fault> {
 
 /// The file name.
 pub(crate) const NAME: &str = "manifest.json";
-
-impl Git {
-    /// The last commit that changed this program, and whether there are uncommitted changes. Both come from the
-    /// checkout of the build and are empty without it. Commits of other files, such as reports, do not affect runs.
-    pub(crate) fn here() -> Self {
-        static HERE: OnceLock<Git> = OnceLock::new();
-        HERE.get_or_init(Self::find).clone()
-    }
-
-    fn find() -> Self {
-        let workspace = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
-        let inside = std::env::current_exe().ok().zip(std::fs::canonicalize(workspace).ok());
-        if !inside.is_some_and(|(program, workspace)| program.starts_with(workspace)) {
-            return Self { commit: None, dirty: None };
-        }
-        let git = |arguments: &[&str]| {
-            let output = Command::new("git").arg("-C").arg(env!("CARGO_MANIFEST_DIR")).args(arguments).output().ok()?;
-            output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-        };
-        Self {
-            commit: git(&["log", "-1", "--format=%H", "--", ":/crates", ":/Cargo.toml", ":/Cargo.lock"]),
-            dirty: git(&["status", "--porcelain", "--", ":/crates", ":/Cargo.toml", ":/Cargo.lock"])
-                .map(|changes| !changes.is_empty()),
-        }
-    }
-
-    /// Whether both are known and differ. An unknown state, for example without `git`, is no difference, so that a run
-    /// can be resumed.
-    /// installed, is no difference: it must not keep a run from being resumed.
-    fn contradicts(&self, other: &Self) -> bool {
-        fn differ<T: PartialEq>(a: Option<&T>, b: Option<&T>) -> bool {
-            a.zip(b).is_some_and(|(a, b)| a != b)
-        }
-        differ(self.commit.as_ref(), other.commit.as_ref()) || differ(self.dirty.as_ref(), other.dirty.as_ref())
-    }
-}
 
 impl Machine {
     pub(crate) fn here() -> Self {

@@ -1,31 +1,28 @@
 //! RMS errors and the Cramér–Rao bound, for trials in which every fix has a bound.
 
-use super::{
-    distinct,
-    phrases::{self, Unit},
-    results,
-};
 use crate::{
-    Field, Number, Row, RunSummary,
+    content::{
+        conditions::columns,
+        figures::layout::same_axes,
+        phrases::{self, Unit},
+    },
     document::{Block, Cell, Figure, Head, Table, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::{headed, short, unit},
+    format::{distinct, headed, short, unit},
+    number::{Key, Number},
     run::{Run, Trial},
+    summary::{Limits, Row, RunSummary},
 };
 
-/// Whether any row has a bound.
-pub(super) fn known(summary: &RunSummary) -> bool {
-    summary.rows.iter().any(|row| row.limits.is_some())
-}
-
-pub(super) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
+pub(crate) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
     over_noise(run, summary).into_iter().map(Block::Figure).chain([Block::Table(table(run, summary))]).collect()
 }
 
 /// A number from the totals of a trial.
 fn total(trial: &Trial, what: &str, value: f64, unit: Unit, decimals: usize) -> Number {
     let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
-    let key = crate::Key::of(trial, "/metrics/totals", format!("{what}{suffix}"));
+    let key = Key::of(trial, "/metrics/totals", format!("{what}{suffix}"));
     Number::new(Some(value * unit.scale()), decimals, key)
 }
 
@@ -127,45 +124,23 @@ fn columns(titles: &[String]) -> usize {
     (ACROSS / (longest + 2)).clamp(1, 6).min(titles.len().max(1))
 }
 
-/// Gives all panels the same axis ranges.
-pub(super) fn same_axes(panels: &mut [Panel]) {
-    let values = |which: usize| {
-        panels
-            .iter()
-            .flat_map(|panel| &panel.layers)
-            .flat_map(|layer| layer.reach())
-            .map(move |point| point[which])
-            .collect::<Vec<_>>()
-    };
-    let Some(first) = panels.first() else { return };
-    let (x, y) = (first.x.ends(values(0).into_iter()), first.y.ends(values(1).into_iter()));
-    for panel in panels {
-        let power =
-            |axis: &Axis, ends: [f64; 2]| if axis.logarithmic { ends.map(|end| 10_f64.powf(end)) } else { ends };
-        panel.x.range = Some(power(&panel.x, x));
-        panel.y.range = Some(power(&panel.y, y));
-    }
-}
-
 fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
         "RMS errors (RMSE), Cramér–Rao bounds and their ratios, over all n fixes including wrong ones. NEES: mean normalised estimation error squared, 6 for a consistent covariance; below 95 %: fraction of the fixes below the 95 % quantile of χ² with six degrees of freedom."
     ];
-    let mut above = results::blank(summary, 1);
+    let mut above = columns::blank(summary, 1);
     above.extend([Head::over(3, "TRE (mm)"), Head::over(3, "position error (mm)"), Head::words(""), Head::words("")]);
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.push(Head::numbers("n"));
     below.extend((0..2).flat_map(|_| ["RMSE", "bound", "ratio"].map(Head::numbers)));
     below.extend(["NEES", "below 95 %"].map(Head::numbers));
-    let limits = |which: fn(&crate::Limits) -> f64| summary.rows.iter().map(move |row| row.limits.map(|l| which(&l)));
+    let limits = |which: fn(&Limits) -> f64| summary.rows.iter().map(move |row| row.limits.map(|l| which(&l)));
     let digits = [limits(|l| l.tre[1]), limits(|l| l.position[1])].map(|of| phrases::decimals(of, Unit::Millimetres));
     let mut table = Table { id: "limits".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let Some(limits) = row.limits else { continue };
-        let mut line = results::cells(row);
-        line.push(
-            Number::count(limits.count as usize, crate::Key::of(trial, "/metrics/totals", "count judged")).into(),
-        );
+        let mut line = columns::cells(row);
+        line.push(Number::count(limits.count as usize, Key::of(trial, "/metrics/totals", "count judged")).into());
         let pairs =
             [(Field::Tre, Field::TreCrlb, limits.tre), (Field::Position, Field::PositionBound, limits.position)];
         for ((field, bounded, [rmse, bound]), digits) in pairs.into_iter().zip(digits) {
@@ -176,7 +151,7 @@ fn table(run: &Run, summary: &RunSummary) -> Table {
         }
         line.push(total(trial, "mean nees of judged", limits.nees, Unit::Plain, 3).into());
         line.push(total(trial, "within nees of judged", limits.coverage, Unit::Plain, 4).into());
-        table.line(results::breaks(summary, index), line);
+        table.line(columns::breaks(summary, index), line);
     }
     table
 }

@@ -1,16 +1,18 @@
 //! The answer to an experiment's question: one sentence for every quantity or series.
 
-use super::{
-    figures, inspection, navigation, objects,
-    phrases::{self, Unit},
-    significance,
-};
 use crate::{
-    Distribution, Field, Number, Row, RunSummary,
+    content::{
+        conditions::axes,
+        phrases::{self, Unit},
+        sections::{inspection, navigation, objects, significance},
+    },
     document::{Span, Text, text},
-    format,
+    field::Field,
+    format::{self, distinct},
+    number::Number,
     paired::Comparison,
     run::{Run, Trial},
+    summary::{Distribution, Limits, Row, RunSummary},
 };
 
 /// Maximum number of trials that are listed one by one; more are summed up by series.
@@ -19,7 +21,7 @@ const REPORTED: usize = 9;
 const DIFFERENCES: usize = 3;
 
 /// The sentences of the answer, in order.
-pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
+pub(crate) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let labels = Labels::of(summary);
     let name = |index: usize| labels.of_trial(&summary.rows[index]);
     let mut message = navigation::sentences(run, &name);
@@ -29,7 +31,7 @@ pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
         message.extend(wrong(run, summary, &labels));
         return message;
     }
-    message = match super::limits::known(summary) {
+    message = match summary.has_limits() {
         true => limits(run, summary),
         false if summary.rows.len() == 1 => errors(run, summary),
         false if labels.reported_singly(summary) => one_by_one(run, summary, &labels),
@@ -51,7 +53,7 @@ struct Labels {
 
 impl Labels {
     fn of(summary: &RunSummary) -> Self {
-        let along = figures::numeric(summary);
+        let along = axes::numeric(summary);
         let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
         let varies = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
         let apart = axes.into_iter().map(|axis| axis.key).filter(|key| Some(key) != along.as_ref() && varies(key));
@@ -255,14 +257,14 @@ fn course(run: &Run, summary: &RunSummary, labels: &Labels, members: &[usize], (
 
 /// One sentence for every method: the smallest and the largest ratio of RMS error to Cramér–Rao bound.
 fn limits(run: &Run, summary: &RunSummary) -> Vec<Text> {
-    let methods = super::distinct(summary.rows.iter().map(Row::method)).into_iter();
+    let methods = distinct(summary.rows.iter().map(Row::method)).into_iter();
     methods
         .filter_map(|method| {
             let own: Vec<usize> = (0..summary.rows.len())
                 .filter(|&index| summary.rows[index].method() == method && summary.rows[index].limits.is_some())
                 .collect();
             let trials: Vec<&Trial> = own.iter().map(|&index| &run.trials[index]).collect();
-            let ratios = |which: fn(&crate::Limits) -> [f64; 2]| -> Vec<f64> {
+            let ratios = |which: fn(&Limits) -> [f64; 2]| -> Vec<f64> {
                 let limits = own.iter().filter_map(|&index| summary.rows[index].limits);
                 limits.map(|limits| which(&limits)).map(|[rms, bound]| rms / bound).collect()
             };

@@ -1,22 +1,23 @@
 //! The section on inspection: the error of the points of interest.
 
-use super::{
-    distinct,
-    phrases::{self, Unit},
-    results,
-};
 use crate::{
-    Key, Number, RunSummary,
+    content::{
+        conditions::columns,
+        phrases::{self, Unit},
+    },
     document::{Block, Head, Section, Table, Text, text},
+    format::distinct,
+    number::{Key, Number},
     points_of_interest::PoiQuantity,
     run::{Run, Trial},
+    summary::RunSummary,
 };
 
 /// The topic of the numbers.
 const TOPIC: &str = "/metrics/inspection";
 
 /// The section; `None` where no point of interest comes into view.
-pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
+pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let seen = |trial: &Trial| distinct(trial.views().map(|point| trial.point(point).to_owned()));
     if run.trials.iter().all(|trial| trial.views().next().is_none()) {
         return None;
@@ -24,14 +25,14 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let caption = text![
         "Error of each point of interest in the frame of the left camera: the estimated position (by the navigated pose, or by the frame’s fix without navigation) against the true one. Points of other objects than that of the pose are placed by the survey. In view: frames with the point inside both images; occlusion is not considered. With a pose: frames at which the vehicle has a pose; the errors are over these. NEES: 3 for a consistent covariance."
     ];
-    let mut above = results::blank(summary, 1);
+    let mut above = columns::blank(summary, 1);
     above.extend([
         Head::over(2, "frames"),
         Head::over(1, "range (m)"),
         Head::over(3, "error (mm)"),
         Head::over(1, "NEES"),
     ]);
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.push(Head::words("point"));
     below.extend(["in view", "with a pose", "median", "median", "p95", "max", "mean"].map(Head::numbers));
     let mut table = Table { id: "inspection".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
@@ -41,7 +42,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         for (place, name) in names.iter().enumerate() {
             let own = || trial.views().filter(|point| trial.point(point) == name);
             let count = Key::of(trial, TOPIC, format!("count views at the point {name}"));
-            let mut line = results::cells(row);
+            let mut line = columns::cells(row);
             line.push(name.clone().into());
             line.push(Number::count(own().count(), count).into());
             let all = |quantity| own().filter_map(move |point| point.get(quantity)).collect::<Vec<f64>>();
@@ -54,7 +55,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
                 line.push(message(statistic, PoiQuantity::Error, Unit::Millimetres, 1).into());
             }
             line.push(message("mean", PoiQuantity::Nees, Unit::Plain, 1).into());
-            table.line(place == 0 && results::breaks(summary, index), line);
+            table.line(place == 0 && columns::breaks(summary, index), line);
         }
     }
     Some(Section::new("Inspection").with([Block::Table(table)]))
@@ -63,7 +64,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
 /// One sentence for every inspection: the points of interest with the smallest and the largest median error.
 ///
 /// `name` gives the name of the trial at an index.
-pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let inspects = |trial: &Trial| trial.header.configuration.contains("kind = \"inspection\"");
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| inspects(trial));
     let sentence = |(index, trial): (usize, &Trial)| {

@@ -1,16 +1,17 @@
 //! The abstract: the answer to the experiment's question, in numbers.
 
-use super::{answer, phrases};
 use crate::{
-    Number, PAPER_FIT_RMS, Row, RunSummary,
+    content::{findings::answer, phrases},
     document::{Text, bold, code, text},
     format::number,
+    number::Number,
     paired::Comparison,
-    paper,
+    paper::{self, PAPER_FIT_RMS},
     run::{Run, Trial},
+    summary::{Row, RunSummary},
 };
 
-pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
+pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let trials: Vec<&Trial> = run.trials.iter().collect();
     let total = |count: fn(&Row) -> usize| summary.rows.iter().map(count).sum::<usize>();
     let pooled = |group: &str, n: usize| {

@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::phrases::{self, Unit};
 use crate::{
-    Field, Number, ReportError,
+    content::phrases::{self, Unit},
     document::{Block, Cell, Head, Picture, Section, Table, Text, code, text},
+    error::ReportError,
+    field::Field,
     figure::{Marked, draw_picture},
     format::{counted, decimals, short},
+    number::{Key, Number},
     run::{AttemptRow, Frame, Run, Trial},
 };
 
@@ -24,7 +26,7 @@ const SEARCHED: usize = 200_000;
 type Case<'a> = (usize, &'a Frame, &'a AttemptRow);
 
 /// The picture of the best frame, and the section with the worst attempts.
-pub(super) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section), ReportError> {
+pub(crate) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section), ReportError> {
     let worst = worst(run);
     let best = best(run);
     let mut wanted: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
@@ -146,8 +148,7 @@ fn table(run: &Run, worst: &[Case<'_>]) -> Table {
 
 /// The number and the stamp of a frame.
 fn named(trial: &Trial, frame: &Frame) -> (Number, Number) {
-    let key =
-        |what: &str| crate::Key { span: [frame.stamp_ns; 2], ..crate::Key::of(trial, "/referencing/frame", what) };
+    let key = |what: &str| Key { span: [frame.stamp_ns; 2], ..Key::of(trial, "/referencing/frame", what) };
     let stamp =
         Number { text: frame.stamp_ns.to_string(), value: Some(frame.stamp_ns as f64), key: key("stamp").into() };
     (Number::count(frame.number as usize, key("frame")), stamp)
@@ -156,10 +157,7 @@ fn named(trial: &Trial, frame: &Frame) -> (Number, Number) {
 /// The meaning of the marks of a picture and their counts.
 fn marks(trial: &Trial, marked: &Marked) -> Text {
     let count = |what: &str, n: usize| {
-        let key = crate::Key {
-            span: [marked.stamp_ns; 2],
-            ..crate::Key::of(trial, "/referencing/frame", format!("marks {what}"))
-        };
+        let key = Key { span: [marked.stamp_ns; 2], ..Key::of(trial, "/referencing/frame", format!("marks {what}")) };
         Number::count(n, key)
     };
     let [corners, cloud, candidates, identified, used] = marked.counts;

@@ -1,15 +1,14 @@
 //! The section on hypotheses: the tests that the experiment's axes and pairs allow, fixed before its first frame.
 
-use super::{distinct, sentence_case};
 use crate::{
     document::{Block, Section, Text, italic, text},
-    format,
+    format::{self, distinct, sentence_case},
     paired::{ALPHA, Comparison},
     run::Run,
 };
 
 /// The section: the hypotheses, or the statement that the question is answered by estimates and their intervals.
-pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
+pub(crate) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     let mut section = Section::new("Hypotheses");
     let axes = varied(run);
     let Some(first) = comparisons.first() else {

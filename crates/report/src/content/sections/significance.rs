@@ -3,15 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
-    Key, Number,
+    content::phrases,
     document::{Block, Cell, Figure, Head, Section, Span, Table, Text, text},
     figure::{Axis, Chart, Layer, Panel},
     format::decimals,
+    number::{Key, Number},
     paired::{Comparison, MARGIN, MARGIN_RATIO},
     run::{Run, Trial},
 };
 
-pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> {
+pub(crate) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> {
     if comparisons.is_empty() {
         return None;
     }
@@ -48,7 +49,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Option<Section> 
 }
 
 /// The margin of equivalence, in words.
-pub(super) fn margin(comparisons: &[Comparison]) -> String {
+pub(crate) fn margin(comparisons: &[Comparison]) -> String {
     match comparisons.first() {
         Some(first) if first.over_conditions => format!("within a factor of {MARGIN_RATIO}"),
         _ => format!("within {} mm", MARGIN * 1e3),
@@ -67,7 +68,7 @@ fn with_the_first_alone(comparisons: &[Comparison]) -> bool {
 }
 
 /// The sentences on the `max` most significant differences, or one sentence that none is significant.
-pub(super) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Vec<Text> {
+pub(crate) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Vec<Text> {
     let mut sure: Vec<&Comparison> = comparisons.iter().filter(|c| c.better().is_some()).collect();
     sure.sort_by(|a, b| a.holm.total_cmp(&b.holm));
     if sure.is_empty() && !comparisons.is_empty() {
@@ -139,7 +140,7 @@ fn sentence(run: &Run, comparison: &Comparison) -> Text {
 fn key(run: &Run, comparison: &Comparison, what: &str) -> Key {
     let trials: Vec<&Trial> = comparison.logs.iter().map(|&index| &run.trials[index]).collect();
     let over = if comparison.over_conditions { " over conditions" } else { " over attempts" };
-    super::phrases::over(&trials, "/metrics/evaluation", format!("{what} tre_rms{over}"))
+    phrases::over(&trials, "/metrics/evaluation", format!("{what} tre_rms{over}"))
 }
 
 fn table(run: &Run, comparisons: &[Comparison]) -> Table {
@@ -213,7 +214,7 @@ fn holm(run: &Run, comparisons: &[Comparison], own: &Comparison) -> Number {
     let trials: Vec<&Trial> = family.iter().map(|&index| &run.trials[index]).collect();
     let over = if own.over_conditions { "conditions" } else { "attempts" };
     let what = format!("holm tre_rms over {over} in families of {}", own.logs.len());
-    Number::probability(own.holm, super::phrases::over(&trials, "/metrics/evaluation", what))
+    Number::probability(own.holm, phrases::over(&trials, "/metrics/evaluation", what))
 }
 
 /// The forest plot of the intervals; `None` for fewer than two comparisons or more than fit.

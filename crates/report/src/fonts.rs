@@ -40,11 +40,11 @@ impl Font {
 
 fn load(font: Font) -> Loaded {
     let (name, bytes): (&str, &[u8]) = match font {
-        Font::Regular => ("SeafixSerif-Regular", include_bytes!("../../fonts/seafix-serif-regular.ttf")),
-        Font::Italic => ("SeafixSerif-Italic", include_bytes!("../../fonts/seafix-serif-italic.ttf")),
-        Font::Bold => ("SeafixSerif-Bold", include_bytes!("../../fonts/seafix-serif-bold.ttf")),
-        Font::Mono => ("SeafixMono-Regular", include_bytes!("../../fonts/seafix-mono-regular.ttf")),
-        Font::Sans => ("SeafixSans-Regular", include_bytes!("../../fonts/seafix-sans-regular.ttf")),
+        Font::Regular => ("SeafixSerif-Regular", include_bytes!("../fonts/seafix-serif-regular.ttf")),
+        Font::Italic => ("SeafixSerif-Italic", include_bytes!("../fonts/seafix-serif-italic.ttf")),
+        Font::Bold => ("SeafixSerif-Bold", include_bytes!("../fonts/seafix-serif-bold.ttf")),
+        Font::Mono => ("SeafixMono-Regular", include_bytes!("../fonts/seafix-mono-regular.ttf")),
+        Font::Sans => ("SeafixSans-Regular", include_bytes!("../fonts/seafix-sans-regular.ttf")),
     };
     let face = Face::parse(bytes, 0).expect("the embedded fonts are valid");
     let em = f64::from(face.units_per_em());

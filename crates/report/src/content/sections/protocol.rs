@@ -1,12 +1,12 @@
 //! The section on the protocol: metrics, thresholds, trials and statistics, fixed before the run.
 
-use super::BORNE;
 use crate::{
+    content::sections::significance,
     document::{Block, Section, italic, text},
     format::harder,
     paired::{ALPHA, Comparison, SEED},
-    proportion,
-    run::Run,
+    proportion::{self, BORNE},
+    run::{Run, Trial},
 };
 
 /// The sentences on the confidence intervals of a trial's rates.
@@ -24,7 +24,7 @@ fn intervals(run: &Run) -> String {
     message
 }
 
-pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
+pub(crate) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
     let [h, c, p, e] = ["H", "C", "P", "E"].map(italic);
     let mut terms = vec![
         (
@@ -107,7 +107,7 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             ],
         ));
     }
-    let sails = |trial: &crate::run::Trial| trial.sample().any(|frame| frame.navigated.is_some());
+    let sails = |trial: &Trial| trial.sample().any(|frame| frame.navigated.is_some());
     if run.trials.iter().any(sails) {
         terms.push((
             text![italic("amplitude, drift")],
@@ -143,10 +143,10 @@ pub(super) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             if comparisons[0].over_conditions { "the conditions" } else { "blocks of consecutive attempts with a length of ⌈∛n⌉, because neighbouring frames are not independent" },
             comparisons.len(),
             if comparisons.len() == 1 { "" } else { "s" },
-            super::significance::margin(comparisons),
+            significance::margin(comparisons),
         ).replace("⌈∛n⌉", "the cube root of n")]);
     }
-    let frames: usize = run.trials.iter().map(crate::run::Trial::count).sum();
+    let frames: usize = run.trials.iter().map(Trial::count).sum();
     section.say(text![format!("Trials: {}; frames in all: {frames}.", run.trials.len())]);
     section
 }

@@ -1,15 +1,17 @@
 //! The section on navigation: the error of the navigated pose from fix to fix.
 
-use super::{
-    phrases::{self, Unit},
-    results,
-};
 use crate::{
-    Key, Number, RunSummary,
+    content::{
+        conditions::columns,
+        figures::sawtooth,
+        phrases::{self, Unit},
+    },
     document::{Block, Head, Section, Table, Text, text},
     fix_intervals::{drift, fix_intervals},
     navigation_quantity::{Counted, NavigationQuantity},
+    number::{Key, Number},
     run::{Run, Trial},
+    summary::RunSummary,
 };
 
 /// Whether a trial has a navigator.
@@ -18,17 +20,17 @@ fn sails(trial: &Trial) -> bool {
 }
 
 /// The section; `None` where no trial has a navigator.
-pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
+pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     if !run.trials.iter().any(sails) {
         return None;
     }
     let caption = text![
         "Error of the navigated pose relative to the object of the last fix, over all frames with a pose. Fix due: frames at which the policy asked for a fix. Fixes: frames with a fix. Lost: frames without an odometry step. The last three columns show odometry alone from the first fix until it is lost or the dive ends."
     ];
-    let mut above = results::blank(summary, 5);
+    let mut above = columns::blank(summary, 5);
     above.extend([Head::over(4, "position error (mm)"), Head::over(1, "TRE (mm)"), Head::over(1, "NEES")]);
     above.push(Head::over(3, "odometry only: position error (mm)"));
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.extend(["frames", "with pose", "fix due", "fixes", "lost"].map(Head::numbers));
     below.extend(["RMS", "median", "p95", "max"].map(Head::numbers));
     below.extend(["p95", "mean", "median", "p95", "at the end"].map(Head::numbers));
@@ -37,7 +39,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         if !sails(trial) {
             continue;
         }
-        let mut line = results::cells(row);
+        let mut line = columns::cells(row);
         for counted in [Counted::NavigationQuantity, Counted::Navigated, Counted::Tried, Counted::Fix, Counted::Lost] {
             line.push(count(trial, counted).into());
         }
@@ -49,9 +51,9 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
         for name in ["median", "q95", "last"] {
             line.push(statistic(trial, name, NavigationQuantity::AlonePosition, Unit::Millimetres).into());
         }
-        table.line(results::breaks(summary, index), line);
+        table.line(columns::breaks(summary, index), line);
     }
-    let figure = super::figures::sawtooth(run).map(Block::Figure);
+    let figure = sawtooth::figure(run).map(Block::Figure);
     let saw = saw(run, summary).map(Block::Table);
     Some(Section::new("Navigation").with([Block::Table(table)]).with(figure).with(saw))
 }
@@ -61,9 +63,9 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
     let caption = text![
         "Error growth between fixes. A fix interval runs from a fix to the last frame before the next fix, before the pose is lost, or before the dive ends. Amplitude: the largest position error of an interval less the error at its fix. Drift: the length of the change of the error vector over an interval, in the object’s frame; the sum over all intervals is divided by the camera’s true path length and by time."
     ];
-    let mut above = results::blank(summary, 3);
+    let mut above = columns::blank(summary, 3);
     above.extend([Head::over(3, "amplitude (mm)"), Head::over(2, "drift")]);
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.extend(["intervals", "path (m)", "time (s)", "median", "p95", "max", "mm/m", "mm/s"].map(Head::numbers));
     let mut table = Table { id: "saw".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
@@ -78,7 +80,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
             let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated{suffix}"));
             Number::new(value.map(|value| value * unit.scale()), decimals, key)
         };
-        let mut line = results::cells(row);
+        let mut line = columns::cells(row);
         line.push(as_number("count", Some(fix_intervals.len() as f64), (Unit::Plain, 0)).into());
         line.push(
             as_number(
@@ -117,7 +119,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
             )
             .into(),
         );
-        table.line(results::breaks(summary, index), line);
+        table.line(columns::breaks(summary, index), line);
     }
     (!table.lines.is_empty()).then_some(table)
 }
@@ -125,7 +127,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
 /// The sentences on trials with a navigator, one for each.
 ///
 /// `name` gives the name of the trial at an index.
-pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
         let metres = |name: &str, quantity| statistic(trial, name, quantity, Unit::Millimetres);

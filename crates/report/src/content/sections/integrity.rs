@@ -2,17 +2,19 @@
 
 use seafix_log::{Outcome, Region};
 
-use super::{
-    distinct, figures,
-    phrases::{self, Unit},
-    results,
-};
 use crate::{
-    Field, Number, RunSummary,
+    content::{
+        conditions::columns,
+        figures::layout,
+        phrases::{self, Unit},
+    },
     document::{Block, Cell, Figure, Head, Section, Table, Text, text},
+    field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::trimmed,
+    format::{distinct, trimmed},
+    number::Number,
     run::{AttemptRow, Frame, Run, Trial},
+    summary::{Row, RunSummary},
 };
 
 /// Maximum number of marks, each for fixes within their protection level and beyond; more hide each other.
@@ -21,8 +23,8 @@ const MARKS: usize = 1200;
 const SERIES: usize = 7;
 
 /// The section; `None` without ground truth or without protection levels.
-pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
-    let judged = |row: &crate::Row| row.regions.is_some_and(|regions| regions.iter().any(|count| *count > 0));
+pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
+    let judged = |row: &Row| row.regions.is_some_and(|regions| regions.iter().any(|count| *count > 0));
     if !summary.rows.iter().any(judged) {
         return None;
     }
@@ -65,17 +67,17 @@ fn table(run: &Run, summary: &RunSummary) -> Table {
     let caption = text![
         "Integrity: available, misleading and hazardously misleading fixes among n attempts, in % with 95 % intervals. Not available: counts of the fixes whose protection level exceeds the alert limit with an error within the level, of those with an error beyond it, and of fixes without a level. The remaining attempts were rejected."
     ];
-    let mut above = results::blank(summary, 1);
+    let mut above = columns::blank(summary, 1);
     above.extend(COLUMNS[..3].iter().map(|(_, name)| Head::over(3, *name)));
     above.push(Head::over(3, "Not available"));
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.push(Head::numbers("n"));
     below.extend((0..3).flat_map(|_| ["count", "%", "interval"].map(Head::numbers)));
     below.extend(COLUMNS[3..].iter().map(|(_, name)| Head::numbers(*name)));
     let mut table = Table { id: "integrity".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let Some(regions) = row.regions else { continue };
-        let mut line = results::cells(row);
+        let mut line = columns::cells(row);
         line.push(phrases::count(trial, "attempted", row.attempted).into());
         for (place, (region, _)) in COLUMNS.into_iter().enumerate() {
             let (group, k) = (region.name(), regions[region as usize]);
@@ -89,7 +91,7 @@ fn table(run: &Run, summary: &RunSummary) -> Table {
                 line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
             }
         }
-        table.line(results::breaks(summary, index), line);
+        table.line(columns::breaks(summary, index), line);
     }
     table
 }
@@ -114,7 +116,7 @@ impl Mark<'_> {
 fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let mut names = distinct(run.trials.iter().map(|trial| trial.method().join(" + ")));
     let apart = names.len() <= SERIES;
-    let series = |trial: &Trial| if apart { figures::series(&names, &trial.method().join(" + ")) } else { 0 };
+    let series = |trial: &Trial| if apart { layout::series(&names, &trial.method().join(" + ")) } else { 0 };
     let mut marks = Vec::new();
     for trial in &run.trials {
         let series = series(trial);
@@ -203,8 +205,8 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
         _ => format!("Marks: one in {every} fixes with an error within the level, one in {every_beyond} beyond it. "),
     };
     message.extend(text![thinned]);
-    message.extend(figures::caption("", run));
-    figures::figure("stanford", message, &chart, data)
+    message.extend(layout::caption("", run));
+    layout::figure("stanford", message, &chart, data)
 }
 
 /// The number of fixes of all trials in each region of the Stanford diagram.

@@ -15,10 +15,14 @@ use seafix_log::TrialHeader;
 use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{SEARCHES, SOLVERS};
 use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
+use serde::{Deserialize, Serialize};
 
 use seafix_data::{dataset::hex, source::SOURCES};
 
-use crate::{Plan, Trial, manifest::Input, run::Group};
+use crate::{
+    experiment::{Plan, Trial},
+    run::group::Group,
+};
 
 /// The versions of the code outside of components. A change that alters a result for some input raises one;
 /// `tests/versions.rs` fails if a result changed without a new version.
@@ -82,6 +86,16 @@ pub fn components() -> Vec<Vec<Listing>> {
 }
 
 static ALL: LazyLock<Vec<Listing>> = LazyLock::new(|| components().concat());
+
+/// The inputs of one source.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Input {
+    pub(crate) source: String,
+    /// The warnings about them, including skipped pairs.
+    #[serde(default)]
+    pub(crate) warnings: Vec<String>,
+    pub(crate) files: BTreeMap<String, String>,
+}
 
 /// The version of every component and shared part, by `solver kabsch` or `shared geometry`.
 pub(crate) type Versions = BTreeMap<String, u32>;
@@ -195,7 +209,7 @@ pub(crate) fn identity(plan: &Plan, groups: &[Group<'_>], inputs: &[Input], vers
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::open;
+    use crate::run::group::open;
 
     fn plan(text: &str) -> Plan {
         let folder = tempfile::tempdir().unwrap();

@@ -1,20 +1,19 @@
 //! Break-down points: the value of a condition up to which a method keeps its fix rate.
 
-use super::{distinct, figures, phrases};
 use crate::{
-    Key, Number, Row, RunSummary,
+    content::{conditions::axes, phrases},
     document::{Block, Cell, Head, Table, text},
-    format::{harder, headed},
+    format::{distinct, harder, headed},
+    number::{Key, Number},
+    proportion::BORNE,
     run::{Run, Trial},
+    summary::{Row, RunSummary},
 };
-
-/// Minimum fix rate (%) at which a method counts as not broken down; set before the experiments.
-pub(crate) const BORNE: f64 = 95.0;
 
 /// The table of break-down points: one line for every series along every axis whose larger values are harder.
 ///
 /// A sentence replaces it where no series reaches [`BORNE`] anywhere; `None` without such an axis.
-pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
+pub(crate) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     let heads = vec![
         Head::words("series"),
         Head::words("along"),
@@ -30,12 +29,12 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     )];
     let mut table = Table::new("breakdown", caption, heads);
     let mut any = false;
-    for key in figures::keys(summary).into_iter().filter(|key| harder(key)) {
-        let names = distinct(summary.rows.iter().map(|row| figures::name(row, &key)));
+    for key in axes::keys(summary).into_iter().filter(|key| harder(key)) {
+        let names = distinct(summary.rows.iter().map(|row| axes::name(row, &key)));
         for (place, name) in names.iter().enumerate() {
-            let own = summary.rows.iter().zip(&run.trials).filter(|(row, _)| figures::name(row, &key) == *name);
+            let own = summary.rows.iter().zip(&run.trials).filter(|(row, _)| axes::name(row, &key) == *name);
             let mut steps: Vec<(f64, &Row, &Trial)> =
-                own.filter_map(|(row, trial)| Some((figures::on(row, &key)?, row, trial))).collect();
+                own.filter_map(|(row, trial)| Some((axes::on(row, &key)?, row, trial))).collect();
             steps.sort_by(|a, b| a.0.total_cmp(&b.0));
             if steps.len() < 2 {
                 continue;
@@ -52,7 +51,7 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
         true => Block::Table(table),
         false => Block::Paragraph(text![format!(
             "Break-down point: the fix rate is below {BORNE} % at every value of {}, even the smallest.",
-            figures::keys(summary)
+            axes::keys(summary)
                 .iter()
                 .filter(|key| harder(key))
                 .map(|key| headed(key))

@@ -1,14 +1,15 @@
 //! The ablation: the effect of each setting, pooled over all others.
 
-use super::{distinct, phrases};
 use crate::{
-    Key, Number, Row, RunSummary,
+    content::phrases,
     document::{Block, Head, Section, Table, text},
-    format::{decimals, headed},
+    format::{decimals, distinct, headed},
+    number::{Key, Number},
     run::{Run, Trial},
+    summary::{Row, RunSummary},
 };
 
-pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
+pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     let axes = &summary.rows.first()?.axes;
     let mut heads = vec![Head::words("Setting"), Head::words("value"), Head::numbers("trials"), Head::numbers("n")];
     heads.extend(

@@ -2,14 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use super::{
-    phrases::{self, Unit},
-    results,
-};
 use crate::{
-    Field, Key, Number, RunSummary,
+    content::{
+        conditions::columns,
+        phrases::{self, Unit},
+    },
     document::{Block, Head, Section, Table, Text, text},
+    field::Field,
+    number::{Key, Number},
     run::{AttemptRow, Run, Trial},
+    summary::RunSummary,
 };
 
 /// The topic of the counts.
@@ -29,27 +31,27 @@ const GROUPS: [Group; 4] = [
 const ERRORS: [(&str, Field); 2] = [("TRE (mm)", Field::Tre), ("position error (mm)", Field::Position)];
 
 /// The section; `None` where no trial with a complete log searched several objects.
-pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
+pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     if !run.trials.iter().any(|trial| objects(trial).len() > 1) {
         return None;
     }
     let caption = text!["Attempts on each object by outcome, and the errors of the fixes."];
-    let mut above = results::blank(summary, 5);
+    let mut above = columns::blank(summary, 5);
     above.extend(ERRORS.map(|(head, _)| Head::over(2, head)));
-    let mut below = results::heads(summary);
+    let mut below = columns::heads(summary);
     below.push(Head::words("object"));
     below.extend(GROUPS.map(|(name, _)| Head::numbers(phrases::outcome(name))));
     below.extend(ERRORS.iter().flat_map(|_| ["median", "p95"]).map(Head::numbers));
     let mut table = Table { id: "objects".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         for (place, object) in objects(trial).iter().enumerate() {
-            let mut line = results::cells(row);
+            let mut line = columns::cells(row);
             line.push(object.clone().into());
             line.extend(GROUPS.map(|group| count(trial, object, group).into()));
             for (_, field) in ERRORS {
                 line.extend(["median", "q95"].map(|name| error(trial, object, name, field).into()));
             }
-            table.line(place == 0 && results::breaks(summary, index), line);
+            table.line(place == 0 && columns::breaks(summary, index), line);
         }
     }
     Some(Section::new("Objects").with([Block::Table(table)]))
@@ -59,7 +61,7 @@ pub(super) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
 ///
 /// Only experiments that change the objects have them; they show whether a displaced object affects the fixes on
 /// others. `name` gives the name of the trial at an index.
-pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
+pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
     let changes = |trial: &Trial| trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"));
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| changes(trial) && objects(trial).len() > 1);
     let sentence = |(index, trial): (usize, &Trial)| {
@@ -84,7 +86,7 @@ pub(super) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
 /// The result is `None` where no frame has several.
 ///
 /// `name` gives the name of the trial at an index.
-pub(super) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
+pub(crate) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
     let sizes = |trial: &Trial| -> Vec<usize> {
         let mut sizes: Vec<usize> = trial.sample().map(|frame| trial.attempts_of(frame).count()).collect();
         sizes.sort_unstable();

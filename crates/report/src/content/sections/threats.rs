@@ -1,14 +1,14 @@
 //! The section on threats to validity; each item appears only if the logs give cause for it.
 
 use crate::{
-    RunSummary,
     document::{Block, Section, Text, text},
     paired::Comparison,
     proportion,
     run::Run,
+    summary::RunSummary,
 };
 
-pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Section {
+pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Section {
     let mut items: Vec<Text> = Vec::new();
     let headers = || run.trials.iter().map(|trial| &trial.header);
     let truth = run.trials.iter().any(|trial| trial.frames.iter().any(|frame| frame.truth.is_some()));

@@ -2,13 +2,13 @@
 
 use seafix_log::Component;
 
-use super::distinct;
 use crate::{
     document::{Block, Cell, Head, Section, Span, Table, code, italic, sub, sup, text},
+    format::distinct,
     run::{Run, Trial},
 };
 
-pub(super) fn section(run: &Run) -> Section {
+pub(crate) fn section(run: &Run) -> Section {
     let images = run.trials.iter().any(|trial| trial.images);
     let points = run.trials.iter().any(|trial| !trial.images);
     let begin = match (images, points) {

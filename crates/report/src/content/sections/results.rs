@@ -1,23 +1,28 @@
 //! The section with the results: outcomes, errors, figures and reasons of rejection.
 
-use super::{
-    best, breakdown, figures, limits,
-    phrases::{self, Unit},
-    reach,
-};
+use std::collections::BTreeSet;
+
 use crate::{
-    Distribution, Field, PAPER_FIT_RMS, Row, RunSummary,
+    content::{
+        conditions::columns::{blank, breaks, cells, heads},
+        figures,
+        phrases::{self, Unit},
+        sections::{breakdown, limits, reach},
+    },
     document::{Block, Cell, Head, Section, Span, Table, italic, text},
-    format::{headed, number},
+    field::Field,
+    format::number,
     paired::Comparison,
+    paper::PAPER_FIT_RMS,
     run::Run,
+    summary::{Distribution, Row, RunSummary},
 };
 
-pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Section {
+pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Section {
     let mut section = Section::new("Results");
     section.add(Block::Table(outcomes(run, summary)));
     section.add(Block::Table(errors(run, summary, comparisons)));
-    if limits::known(summary) {
+    if summary.has_limits() {
         section.blocks.extend(limits::blocks(run, summary));
     }
     let mut plotted = figures::blocks(run, summary);
@@ -32,40 +37,6 @@ pub(super) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
         None => section.say(text!["No attempt was rejected."]),
     }
     section
-}
-
-/// The heads of the columns that identify a trial.
-pub(super) fn heads(summary: &RunSummary) -> Vec<Head> {
-    let conditions = summary.rows.first().into_iter().flat_map(Row::conditions);
-    let numeric = |key: &str| {
-        summary
-            .rows
-            .iter()
-            .flat_map(Row::conditions)
-            .filter(|axis| axis.key == key)
-            .all(|axis| axis.value.parse::<f64>().is_ok())
-    };
-    [Head::words("Method")]
-        .into_iter()
-        .chain(conditions.map(|axis| Head { numbers: numeric(&axis.key), ..Head::words(headed(&axis.key)) }))
-        .collect()
-}
-
-/// The cells that identify the trial of `row`.
-pub(super) fn cells(row: &Row) -> Vec<Cell> {
-    let conditions = row.conditions().map(|axis| axis.value.clone().into());
-    [row.method().into()].into_iter().chain(conditions).collect()
-}
-
-/// Whether a thin rule separates row `index` from the one above: the first condition changes there.
-pub(super) fn breaks(summary: &RunSummary, index: usize) -> bool {
-    let first = |index: usize| summary.rows[index].conditions().next().map(|axis| &axis.value);
-    index > 0 && first(index) != first(index - 1)
-}
-
-/// Empty heads above the columns that identify a trial and `more` columns beside them.
-pub(super) fn blank(summary: &RunSummary, more: usize) -> Vec<Head> {
-    vec![Head::words(""); heads(summary).len() + more]
 }
 
 fn outcomes(run: &Run, summary: &RunSummary) -> Table {
@@ -207,4 +178,16 @@ fn refusals(run: &Run, summary: &RunSummary) -> Option<Table> {
         table.line(breaks(summary, index), line);
     }
     Some(table)
+}
+
+/// Whether `index` is significantly better than every trial of its group.
+fn best(comparisons: &[Comparison], index: usize) -> bool {
+    let is_of = |c: &&Comparison| !c.over_conditions && !c.between_conditions;
+    let own: Vec<&Comparison> =
+        comparisons.iter().filter(is_of).filter(|c| c.first == index || c.second == index).collect();
+    let Some(condition) = own.first().map(|c| &c.condition) else { return false };
+    // In a large group each trial is compared with the first only, so no trial is known to be the best.
+    let family = comparisons.iter().filter(is_of).filter(|c| c.condition == *condition);
+    let members: BTreeSet<usize> = family.flat_map(|c| [c.first, c.second]).collect();
+    own.len() + 1 == members.len() && own.iter().all(|c| c.better() == Some(index))
 }

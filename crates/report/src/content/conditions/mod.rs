@@ -1,0 +1,5 @@
+//! The conditions of trials: axes, identifying columns, source and camera.
+
+pub(crate) mod axes;
+pub(crate) mod columns;
+pub(crate) mod setup;
