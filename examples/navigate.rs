@@ -2,8 +2,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use seafix::{Localizer, Navigation, Rig};
-use seafix_component::Choice;
+use seafix::{Localizer, Navigation, Rig, component::Choice};
 use seafix_data::source::SOURCES;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -11,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let source = SOURCES.build(&choice)?;
     let sequence = source.open(7, ".".as_ref()).map_err(seafix::Error::from)?;
 
-    let rig = Rig::from(*sequence.rig());
+    let rig = Rig { body_from_camera: sequence.body_from_camera(), ..Rig::from(*sequence.rig()) };
     let localizer = Localizer::new(sequence.site(), &rig)?;
     let navigation_stack = Navigation::default().build()?;
     let mut session = localizer.navigate(&navigation_stack, None)?;

@@ -8,7 +8,7 @@ use seafix_vision::{Descriptor, Detector, Matcher};
 
 use crate::{
     Error, FrameData, FrameResult, Hints, NavigationSession, NavigationStack, Pipeline, PipelineStages, SensorFrame,
-    StereoImages, WorldPrior, images::check_sizes, random, stages::View,
+    StereoImages, WorldPrior, images::check_sizes, pipeline::invalid_setting, random, stages::View,
 };
 
 /// A prior pose of the left camera in the world, with its covariance.
@@ -235,24 +235,23 @@ impl Localizer {
     /// A stack with key frames also recognises those of `map`, the pose graph of an earlier session.
     ///
     /// # Errors
-    /// [`Error::NoWorld`]: an object without a pose in the world.
+    /// [`Error::Setting`]: a pipeline whose target is not `object`. [`Error::NoWorld`]: an object without a pose in the world.
     pub fn navigate<'a>(
         &'a self,
         navigation_stack: &'a NavigationStack,
         map: Option<&PoseGraph>,
     ) -> Result<NavigationSession<'a>, Error> {
+        if self.stages.settings().target != TargetKind::Object {
+            let message = "navigation goes from object to object; use target = \"object\"".to_owned();
+            return Err(invalid_setting("target", message).into());
+        }
         let missing = self.targets.iter().find(|target| target.world_from_object.is_none());
         if let Some(target) = missing {
             return Err(Error::NoWorld { purpose: "navigate", object: target.name.clone() });
         }
-        Ok(NavigationSession::begin(
-            navigation_stack,
-            &self.stages,
-            &self.targets,
-            &self.rig.stereo,
-            self.rig.body_from_camera,
-            map,
-        ))
+        let (rig, mounting) = (&self.rig.stereo, self.rig.body_from_camera);
+        let session = NavigationSession::begin(navigation_stack, &self.stages, &self.targets, rig, mounting, map);
+        Ok(session.with_seed(self.seed))
     }
 
     fn outcomes(&self, result: FrameResult) -> Vec<TargetOutcome> {

@@ -62,6 +62,7 @@ pub enum FrameData {
 pub struct WorldPrior {
     /// The pose.
     pub world_from_camera: Transform<World, Camera>,
-    /// Its covariance.
+    /// The covariance of ξ = (φ, ρ) in `T_true = T · Exp(ξ)`: rotation (rad) first, then translation (m), both along the
+    /// axes of the camera.
     pub covariance: Covariance6<World, Camera>,
 }

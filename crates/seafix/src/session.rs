@@ -71,6 +71,8 @@ pub struct NavigationSession<'a> {
     /// The odometry of [`push`](Self::push); `None` before the first frame.
     odometry: Option<TrialOdometry<'a>>,
     frames: u64,
+    seed: u64,
+    latest: FrameResult,
     /// The time of the first frame (ns).
     began: Option<u64>,
     /// The number of reported changes of the navigator's state.
@@ -150,12 +152,20 @@ impl<'a> NavigationSession<'a> {
             body_from_camera,
             odometry: None,
             frames: 0,
+            seed: 0,
+            latest: FrameResult::default(),
             began: None,
             reported: 0,
             last: None,
             fixed: false,
             odometry_only: None,
         }
+    }
+
+    /// Sets the seed of searches that draw random numbers; the default is 0.
+    #[must_use]
+    pub fn with_seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
     }
 
     /// Sets a `filter` between the odometry and the navigator.
@@ -184,11 +194,19 @@ impl<'a> NavigationSession<'a> {
         let (navigation_stack, rig, mounting) = (self.navigation_stack, self.rig, self.body_from_camera);
         let odometry = self.odometry.get_or_insert_with(|| navigation_stack.begin_odometry(rig, mounting));
         let moved = odometry.advance(frame).map_err(invalid)?;
-        let mut rng = random::of_frame(0, self.frames);
+        let mut rng = random::of_frame(self.seed, self.frames);
         self.frames += 1;
         let cloud = OnceCell::new();
         let make = || cloud.get_or_init(|| self.stages.cloud(&frame.frame_data, rig));
-        self.advance(frame, &moved, make, &mut rng).map(|(_, state)| state).map_err(invalid)
+        let (result, state) = self.advance(frame, &moved, make, &mut rng).map_err(invalid)?;
+        self.latest = result;
+        Ok(state)
+    }
+
+    /// The attempts of the last frame given to [`push`](Self::push), rejected ones with their reasons; empty if none was
+    /// due.
+    pub fn latest(&self) -> &FrameResult {
+        &self.latest
     }
 
     /// Processes the next frame with odometry and cloud that the caller computed.

@@ -53,7 +53,6 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("a_report_grows_with_its_rows_at_most", "plain English"),
     // Fields of `coherence-problem/1` and of the log's schema.
     ("shell_half_m", "coherence-problem/1"),
-    ("shell_half", "the log's schema"),
 ];
 
 /// Keys of unchanged file formats, and file names.

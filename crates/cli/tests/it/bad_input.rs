@@ -519,7 +519,7 @@ fn a_fault_is_reported_where_it_stands() {
              [[navigation.faults]]\nkind = 'off'\nfrom = 3.0\nto = 1.0\n[navigation.pose-graph.settings]\noverlap = 3.0\n\
              recognition = { solver = 'kabch', draws = 0 }\n",
             &[
-                ("min-points = 1", "4:16"),
+                ("min-points = 1", "4:14"),
                 ("confidence = 2", "5:14"),
                 ("box = -1", "7:7"),
                 ("faults[0].to = 1", "11:6"),

@@ -35,6 +35,8 @@ const REMAINING: &[(&str, &[&str])] = &[
             "search/consensus/seeds",
             "site",
             "solve",
+            "solve/covariance",
+            "solve/likelihood",
         ],
     ),
     ("referencing", &["problem_file"]),

@@ -67,7 +67,7 @@ fn what_is_wrong_is_one_line_and_leaves_no_file() {
         (&outside, &[], 3, "clicks.csv:3: `B` at -20, 5"),
         (&marks, &["--base", "A,B"], 2, "separate three ids by commas"),
         (&marks, &["--base", "A,B,X"], 3, "a base point is not marked"),
-        (&marks, &["--reach", "0"], 2, "--reach 0: more than 0"),
+        (&marks, &["--reach", "0"], 2, "invalid --reach 0"),
     ];
     for (marks, more, code, part) in cases {
         let text = model(folder.path(), marks, &[more, &["--out", "site.toml"]].concat(), code).error;

@@ -57,7 +57,9 @@ mod tests {
 
     #[test]
     fn what_does_not_fit_is_named() {
-        assert!(samples("bayer_rggb8", [1, 1], 1, &[1]).unwrap_err().contains("`bayer_rggb8`; mono8"));
+        assert!(
+            samples("bayer_rggb8", [1, 1], 1, &[1]).unwrap_err().contains("`bayer_rggb8` is not supported; give mono8")
+        );
         assert!(samples("mono8", [2, 2], 2, &[1, 2, 3]).unwrap_err().contains("in 3 bytes"));
         assert!(samples("rgb8", [2, 1], 2, &[1, 2]).unwrap_err().contains("rows of 6 bytes 2 apart"));
     }

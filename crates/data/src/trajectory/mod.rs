@@ -257,7 +257,7 @@ mod tests {
         assert!(read("1,0,0,0,0,0,0\n").unwrap_err().starts_with("7 columns in walk:1"));
         assert!(read("1.5,0,0,0,0,0,0,1\n").unwrap_err().contains("not commas"));
         assert!(read("5,0,0,0,1,0,0,0\n5,0,0,0,1,0,0,0\n").unwrap_err().contains("in walk:2: 5; sort the lines"));
-        assert!(read("1 0 0 0 0 1 0 0 0 0 -1 0\n").unwrap_err().contains("no rotation in walk:1"));
+        assert!(read("1 0 0 0 0 1 0 0 0 0 -1 0\n").unwrap_err().contains("not a rotation in walk:1"));
         let header =
             |quaternion: &str| format!("#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], {quaternion}\n");
         let line = "1000000000000,1,2,3,0.1,-0.2,0.3,0.9273618495495704\n";

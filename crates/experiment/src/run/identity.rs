@@ -34,7 +34,7 @@ pub const SHARED: [SharedPart; 8] = [
     // Errors, rates and bounds; the comparison with truth.
     SharedPart { name: "evaluation", version: 1, used: |_| true },
     // The logged quantities and the choice of logged frames.
-    SharedPart { name: "log", version: 1, used: |_| true },
+    SharedPart { name: "log", version: 2, used: |_| true },
     // The order of the stages on a stereo pair.
     SharedPart { name: "front-end", version: 1, used: |used| used.images },
     // The navigator, the pose graph and key frames.
@@ -243,7 +243,7 @@ mod tests {
         ];
         assert_eq!(parts, all);
         let labelled = used(
-            "question = 'why'\n[source]\nname = 'virtual-layouts'\nnamed = true\n[[vary]]\nkey = 'pipeline.solver'\n\
+            "question = 'why'\n[source]\nname = 'virtual-layouts'\nlabelled = true\n[[vary]]\nkey = 'pipeline.solver'\n\
              values = ['kabsch', 'triad']\n",
         );
         assert!(labelled.contains_key("solver kabsch") && labelled.contains_key("solver triad"), "{labelled:?}");

@@ -26,6 +26,16 @@ fn made(experiment: &str) -> (Vec<FrameRecord>, Vec<HashMap<String, String>>) {
     (log.frames, rows)
 }
 
+/// The fields of a line of CSV; a comma within quotes separates none.
+fn fields(line: &str) -> Vec<String> {
+    let mut quoted = false;
+    let separates = |c: char| {
+        quoted ^= c == '"';
+        c == ',' && !quoted
+    };
+    line.split(separates).map(str::to_owned).collect()
+}
+
 /// The log and the rows of the table, which are equal in CSV and Parquet.
 fn run_of(experiment: &str) -> (TrialLog, Vec<HashMap<String, String>>) {
     let folder = TempDir::new().unwrap();
@@ -36,7 +46,7 @@ fn run_of(experiment: &str) -> (TrialLog, Vec<HashMap<String, String>>) {
     run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
     let log = read(&out.join(format!("{}.mcap", plan.trials[0].name))).unwrap();
     let table = fs::read_to_string(out.join("results.csv")).unwrap();
-    let mut lines = table.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let mut lines = table.lines().map(fields);
     let head = lines.next().unwrap();
     let rows: Vec<HashMap<String, String>> = lines.map(|row| head.iter().cloned().zip(row).collect()).collect();
     let parquet = SerializedFileReader::new(File::open(out.join("results.parquet")).unwrap()).unwrap();

@@ -52,8 +52,9 @@ fn rests_on(part: &str) -> &'static [&'static str] {
         "shared" => match part {
             "shared geometry" => &[],
             "shared acceptance" => &["shared geometry", "search", "solver"],
-            "shared simulation" => &["shared geometry"],
-            "shared renderer" => &["shared geometry", "shared simulation"],
+            // The fingerprint of these two is that of a table.
+            "shared simulation" => &["shared geometry", "shared log"],
+            "shared renderer" => &["shared geometry", "shared simulation", "shared log"],
             // These parts are tested in a complete run.
             _ => &[""],
         },

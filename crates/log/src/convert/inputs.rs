@@ -13,7 +13,7 @@ pub(crate) fn inputs_message(frame: &FrameRecord, inputs: &Inputs) -> proto::Inp
     proto::Inputs {
         frame: frame.frame,
         stamp_ns: frame.stamp_ns,
-        prior: prior.as_ref().map(|(pose, covariance)| proto::RoughPose {
+        prior: prior.as_ref().map(|(pose, covariance)| proto::PriorPose {
             world_from_camera: Some(pose_message(pose)),
             covariance: flat(covariance),
         }),
@@ -29,7 +29,7 @@ pub(crate) fn inputs_message(frame: &FrameRecord, inputs: &Inputs) -> proto::Inp
 
 /// The inputs that `message` holds.
 pub(crate) fn inputs_record(message: proto::Inputs) -> Result<Inputs, Malformed> {
-    let prior = |prior: proto::RoughPose| {
+    let prior = |prior: proto::PriorPose| {
         let pose = pose_record(required("prior.world_from_camera", prior.world_from_camera)?)?;
         Ok((pose, matrix("prior.covariance", &prior.covariance)?))
     };
@@ -95,14 +95,14 @@ fn problem_message(problem: &ProblemRecord) -> proto::Problem {
         model: Some(target_message(problem.model.clone())),
         delta: problem.delta,
         object_from_camera: problem.prior.as_ref().map(|(pose, _)| pose_message(pose)),
-        shell_half: problem.prior.map_or(0.0, |(_, half)| half),
+        gate_half: problem.prior.map_or(0.0, |(_, half)| half),
         is_putative: problem.putative.is_some(),
         putative: matches_message(problem.putative.as_deref().unwrap_or_default()),
     }
 }
 
 fn problem_record(message: proto::Problem) -> Result<ProblemRecord, Malformed> {
-    let half = message.shell_half;
+    let half = message.gate_half;
     Ok(ProblemRecord {
         model: target_record(required("problem.model", message.model)?)?,
         delta: message.delta,

@@ -315,7 +315,7 @@ pub struct Inputs {
     #[prost(uint64, tag = "2")]
     pub stamp_ns: u64,
     #[prost(message, optional, tag = "3")]
-    pub prior: ::core::option::Option<RoughPose>,
+    pub prior: ::core::option::Option<PriorPose>,
     /// For each point of the cloud with pixels, in order, the covariance of (u left, v left, u right, v right) (px2):
     /// 4 x 4 numbers.
     #[prost(double, repeated, tag = "4")]
@@ -361,7 +361,7 @@ pub struct ExactPose {
 }
 /// The rough pose that a method may use.
 #[derive(Clone, PartialEq, ::prost::Message)]
-pub struct RoughPose {
+pub struct PriorPose {
     #[prost(message, optional, tag = "1")]
     pub world_from_camera: ::core::option::Option<ExactPose>,
     /// 6 x 6, rotation first.
@@ -386,7 +386,7 @@ pub struct Problem {
     pub object_from_camera: ::core::option::Option<ExactPose>,
     /// Half-size of the shells about the rough pose (m).
     #[prost(double, tag = "4")]
-    pub shell_half: f64,
+    pub gate_half: f64,
     /// Whether only some pairs are to be considered, and which: model, cloud.
     #[prost(bool, tag = "5")]
     pub is_putative: bool,
