@@ -5,7 +5,7 @@ use std::fmt;
 /// An event of one frame, printed as one sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NavigationEvent {
-    /// A stereo pair to which the odometry has no motion.
+    /// A frame whose motion the odometry could not estimate.
     NoMotion {
         /// The reason.
         why: String,

@@ -34,7 +34,7 @@ pub struct Pipeline {
     /// The triangulator of matched pairs. A table without `name` has the settings of `optimal`.
     #[serde(deserialize_with = "read_triangulator")]
     pub triangulator: Choice,
-    /// The gates of Stage 1 ("shells" in the paper).
+    /// The gates of the candidate selection ("shells" in the paper).
     pub gate: Gate,
     /// Whether the search is repeated with larger gates, then without, when it finds nothing. A displaced object is
     /// outside its gates.

@@ -20,8 +20,8 @@ use crate::{
     stages::{Cloud, View},
 };
 
-/// The end of [`Motion::lost`] where the trajectory is broken and begins again. The reason of a skipped frame does not
-/// end so, because the next motion spans that frame.
+/// The suffix of [`Motion::lost`] that marks a break of the trajectory. A skipped frame is no break: the next motion
+/// spans it.
 pub const UNKNOWN_MOTION: &str = "the motion to this frame is unknown";
 
 /// A function that replaces the motion of the odometry, given the time since the first frame (s).

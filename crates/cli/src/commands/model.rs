@@ -36,7 +36,8 @@ pub(crate) struct Model {
     /// The id of the object.
     #[arg(long, default_value = "object")]
     id: String,
-    /// P1, P2 and P3 of the object's frame: origin, the side of -y, the x axis [default: the widest triangle].
+    /// P1, P2 and P3 of the object's frame: P1 is the origin, P3 lies on +x, P2 on the side of -y [default: the widest
+    /// triangle].
     #[arg(long, value_name = "P1,P2,P3", value_delimiter = ',', num_args = 1)]
     base: Vec<String>,
     /// Maximum distance of a mark from its corner (px).

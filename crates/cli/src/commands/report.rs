@@ -16,7 +16,7 @@ pub(crate) struct Report {
     /// The folders of the runs; each gets a report.
     #[arg(required = true)]
     runs: Vec<PathBuf>,
-    /// The folder of the report, or of one folder for each of several runs [default: report/ in the run's folder].
+    /// The folder of the report; with several runs, of one subfolder for each [default: report/ in the run's folder].
     #[arg(long)]
     out: Option<PathBuf>,
     /// Write the page [default: all forms].
