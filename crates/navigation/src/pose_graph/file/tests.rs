@@ -1,4 +1,3 @@
-
 use super::*;
 
 fn pose_graph() -> PoseGraph {

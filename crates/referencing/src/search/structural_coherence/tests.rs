@@ -1,4 +1,3 @@
-
 use rand::SeedableRng;
 use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 

@@ -1,4 +1,3 @@
-
 use nalgebra::{Rotation3, UnitQuaternion};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
