@@ -131,8 +131,6 @@ fn near_quarter(high: u32) -> bool {
 mod tests {
     use super::*;
 
-    /// Regression: a wrong sign of the cosine in the third quarter, and a higher limit of the first quarter, fail this
-    /// test.
     #[test]
     fn the_functions_are_those_of_libm_bit_by_bit() {
         let near = |x: f64| (-40..40_i64).map(move |k| f64::from_bits((x.to_bits() as i64 + k) as u64));

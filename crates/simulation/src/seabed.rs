@@ -282,7 +282,6 @@ fn brightnesses(patch: &Patch, north: &[f64], east: &[f64], out: &mut [f32]) {
 mod tests {
     use super::*;
 
-    /// Regression: exchanging north and east fails this test.
     #[test]
     fn many_places_are_as_bright_as_each() {
         let patch = Seabed::new(40.0, 3).patch([-1.0, -2.0], [1.0, 3.0], |[x, y], normal| (x * y + normal.x) as f32);

@@ -144,7 +144,6 @@ impl Stream {
 mod tests {
     use super::*;
 
-    /// Regression: ignoring the spare number of the pair fails this test.
     #[test]
     fn many_normal_numbers_are_those_generated_one_by_one() {
         let stream = || Stream::new(4, 0, 7, Purpose::LeftImage);

@@ -38,8 +38,6 @@ const EXCEPTIONS: &[(&str, &str)] = &[
     ("eye", "the identity matrix of a camera message"),
     ("shell", "of a command line"),
     ("Shell", "of a command line"),
-    ("ShellName", "of a command line"),
-    ("PowerShell", "of a command line"),
     // Plain English.
     ("look_at", "where a camera points"),
     ("look_up", "in a table"),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Command, ValueEnum};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use seafix_component::Fault;
 
@@ -19,35 +19,13 @@ const PROGRAM: &str = "seafix";
 pub(crate) struct Completions {
     /// The shell.
     #[arg(value_enum)]
-    shell: ShellName,
-}
-
-/// The supported shells.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum ShellName {
-    /// GNU Bourne-again shell.
-    Bash,
-    /// Elvish.
-    Elvish,
-    /// Fish.
-    Fish,
-    /// `PowerShell`.
-    Powershell,
-    /// Z shell.
-    Zsh,
+    shell: Shell,
 }
 
 impl Completions {
     pub(crate) fn execute(&self, mut program: Command) -> Ended {
-        let shell = match self.shell {
-            ShellName::Bash => Shell::Bash,
-            ShellName::Elvish => Shell::Elvish,
-            ShellName::Fish => Shell::Fish,
-            ShellName::Powershell => Shell::PowerShell,
-            ShellName::Zsh => Shell::Zsh,
-        };
         let mut script = Vec::new();
-        clap_complete::generate(shell, &mut program, PROGRAM, &mut script);
+        clap_complete::generate(self.shell, &mut program, PROGRAM, &mut script);
         print(&String::from_utf8_lossy(&script))?;
         Ok(DONE)
     }

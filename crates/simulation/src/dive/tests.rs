@@ -119,7 +119,6 @@ fn depth_is_what_a_ray_meets() {
     assert!(same as f64 >= 0.999 * all as f64, "{same} of {all}");
 }
 
-/// Regression: taking a surface's slope from its own axes fails this test.
 #[test]
 fn rows_have_the_radiance_of_each_pixel() {
     let dive = small().plan(9, 0).unwrap();

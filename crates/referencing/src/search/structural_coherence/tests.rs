@@ -236,8 +236,6 @@ fn literally(scene: &Scene, problem: &Problem<'_>, search: &StructuralCoherence)
 ///
 /// They are compared at every budget up to the end of small searches, and at some budgets of a search whose samples
 /// are long enough for their sampling to count.
-///
-/// Fails with one test too few after a disagreement, and with the sample itself counted twice.
 #[test]
 fn what_is_counted_is_what_would_be_tested_one_by_one() {
     use rand::RngExt;

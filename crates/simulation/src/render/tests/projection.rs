@@ -36,8 +36,7 @@ fn board() -> (SitePlan, Vec<Vector3<f64>>) {
 #[test]
 fn chequer_corners_lie_where_the_equation_has_them() {
     // Regression: a shift of 0.02 px to the right fails this test.
-    // Limits without noise or water, through the usual lens: mean below 0.01 px, RMS below 0.03 px (SIMULATION.md
-    // §10.1).
+    // Limits without noise or water, through the usual lens: mean below 0.01 px, RMS below 0.03 px.
     let (plan, places) = board();
     let scene = scene(&plan);
     let clear = Water { attenuation: 0.0, snow: 0.0, ..Water::default() };

@@ -48,7 +48,7 @@ fn depths_of_the_two_images_agree() {
 
 #[test]
 fn pixels_show_the_body_that_their_ray_meets() {
-    // Away from edges, rasteriser and ray caster agree on the body at every pixel (SIMULATION.md §10.2). Regression:
+    // Away from edges, rasteriser and ray caster agree on the body at every pixel. Regression:
     // giving paint the layer of its plate fails this test.
     let scene = scene(&built_in("drill-centre").unwrap());
     // Paint lies in the plane of its plate, where a ray meets both, so it is searched for separately.
