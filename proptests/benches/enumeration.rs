@@ -139,6 +139,7 @@ impl Planted {
             candidates: &self.candidates,
             tolerance: Tolerance::Fixed(3.0 * 2f64.sqrt() * SIGMA),
             prior: Some(&self.prior),
+            edges: Default::default(),
         };
         let mut times = Vec::new();
         loop {

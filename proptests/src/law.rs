@@ -1,6 +1,6 @@
 //! Execution of laws.
 
-use std::{env, fmt::Debug};
+use std::{env, fmt::Debug, path::Path};
 
 use proptest::{
     strategy::Strategy,
@@ -37,7 +37,11 @@ where
     if config.rng_seed == RngSeed::Random {
         config.rng_seed = RngSeed::Fixed(SEED);
     }
-    config.failure_persistence = Some(Box::new(FileFailurePersistence::Direct("proptest-regressions/laws.txt")));
+    // A program that runs a law elsewhere keeps no failures.
+    let kept = Path::new("proptest-regressions").is_dir().then_some("proptest-regressions/laws.txt");
+    config.failure_persistence = kept.map(|file| Box::new(FileFailurePersistence::Direct(file)) as Box<_>);
+    // Four times the number of cases, the default, leaves large counterexamples.
+    config.max_shrink_iters = 4096;
     config.max_local_rejects = u32::MAX;
     config.max_global_rejects = cases.saturating_mul(16);
     let mut runner = TestRunner::new(config);

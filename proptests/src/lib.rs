@@ -1,7 +1,8 @@
 //! Laws of all components of Seafix.
 //!
-//! `src/` holds the strategies and references of the laws: one idea a file, nothing that is tested. `tests/it/` holds
-//! the laws, one file for each theme; a law's name states it, its doc comment gives number and statement. Laws of
+//! `src/` holds the strategies and references of the laws: one idea a file, nothing that is tested; and the
+//! laws of [solvers](solver_laws) and [searches](search_laws), which other programs run on a component of their own. `tests/it/` holds the laws, one
+//! file for each theme; a law's name states it, its doc comment gives number and statement. Laws of
 //! searches and solvers run over the registries by name, with the defaults and with every value of every switch, so
 //! that a new component is tested as soon as it is listed.
 //!
@@ -16,6 +17,7 @@
 //! first.
 
 pub mod admissible;
+pub mod bent;
 pub mod clutter_patterns;
 pub mod graphs;
 mod law;
@@ -28,7 +30,9 @@ pub mod poses;
 pub mod problems;
 pub mod rigs;
 pub mod scenes;
+pub mod search_laws;
 pub mod searches;
+pub mod solver_laws;
 pub mod variants;
 pub mod views;
 

@@ -126,7 +126,7 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
         let mut here = 0u32;
         for draw in 0..asked.draws {
             let Some(points) = observations(placed, draw, settings.model_sigma) else { continue };
-            let data = Observations { points, rig: Some(&placed.rig) };
+            let data = Observations { points, edges: Vec::new(), rig: Some(&placed.rig) };
             let Ok(pose) = solver.solve(&data) else {
                 cell.refused += 1;
                 continue;
@@ -207,7 +207,7 @@ pub fn bent(placed: &Placed, sigma_px: f64, bound: &Covariance6<Object, Camera>)
 /// second moment of its profile. It is a property of the layout, as the bound is. `None` if it has no value.
 pub fn foreseen(placed: &Placed, settings: &Layout) -> Option<Covariance6<Object, Camera>> {
     let points = observations_of(placed, &placed.exact(settings.sigma_px), settings.model_sigma)?;
-    let data = Observations { points, rig: Some(&placed.rig) };
+    let data = Observations { points, edges: Vec::new(), rig: Some(&placed.rig) };
     StereoReprojection::default().covariance(&data, &placed.object_from_camera).ok()
 }
 
@@ -227,7 +227,7 @@ pub fn alternative(placed: &Placed, sigma_px: f64) -> f64 {
         for (point, place) in exact.iter_mut().zip(&places) {
             point.measured.at = Point::from(centre + turn * (place - centre));
         }
-        let data = Observations { points: exact.clone(), rig: Some(&placed.rig) };
+        let data = Observations { points: exact.clone(), edges: Vec::new(), rig: Some(&placed.rig) };
         let Ok(pose) = solver.solve(&data) else { continue };
         if let Some(chi2) = pixel_chi2(placed, &exact, &pose, sigma_px).filter(|chi2| *chi2 > 1e-6) {
             min = min.min(chi2);
@@ -261,7 +261,7 @@ pub fn paired(solver: &dyn Solver, other: &dyn Solver, settings: &Layout, layout
         let placed = Layout { number, ..settings.clone() }.place(1).expect("the layout can be placed");
         for draw in 0..draws / layouts {
             let Some(points) = observations(&placed, draw, settings.model_sigma) else { continue };
-            let data = Observations { points, rig: Some(&placed.rig) };
+            let data = Observations { points, edges: Vec::new(), rig: Some(&placed.rig) };
             let (Ok(a), Ok(b)) = (solver.solve(&data), other.solve(&data)) else { continue };
             let truth = &placed.object_from_camera;
             let tre = |pose| transfer_rms(pose, truth, &placed.model).expect("there are points").powi(2);

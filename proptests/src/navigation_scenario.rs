@@ -159,7 +159,7 @@ impl Sailing<'_> {
         if points.len() < 4 {
             return None;
         }
-        let (data, solver) = (Observations { points, rig: None }, Mahalanobis::default());
+        let (data, solver) = (Observations { points, edges: Vec::new(), rig: None }, Mahalanobis::default());
         let pose = solver.solve(&data).ok()?;
         let errors = places.into_iter().zip(solver.model_errors(&data, &pose).ok()?);
         let object_pose = ObjectPose::new(pose, solver.covariance(&data, &pose).ok()?);

@@ -33,6 +33,7 @@ impl Planted {
             candidates: &self.candidates,
             tolerance: self.tolerance,
             prior: None,
+            edges: Default::default(),
         }
     }
 }
@@ -65,6 +66,7 @@ impl Listed {
             candidates,
             tolerance: Tolerance::Fixed(file.delta),
             prior: file.prior.as_ref(),
+            edges: Default::default(),
         }
     }
 }

@@ -24,7 +24,7 @@ pub struct Scene {
 impl Scene {
     /// The observations for a solver.
     pub fn observations(&self) -> Observations<'_> {
-        Observations { points: self.points.clone(), rig: self.rig.as_ref() }
+        Observations { points: self.points.clone(), edges: Vec::new(), rig: self.rig.as_ref() }
     }
 
     /// The sum of squared residuals C·H − P (m²).

@@ -33,11 +33,12 @@ impl<T: ?Sized> Variant<T> {
 /// If a listed component cannot be built from its own settings.
 pub fn variants<T: ?Sized>(registry: &Registry<T>, given: &[(&str, i64)]) -> Vec<Variant<T>> {
     let variants_of = |listing: &Listing| {
-        let has = |(key, _): &&(&str, i64)| listing.defaults.contains_key(*key);
+        let has = |(key, _): &&(&str, i64)| listing.table.defaults.contains_key(*key);
         let first =
             given.iter().filter(has).fold(Choice::named(listing.name), |choice, (key, value)| choice.with(key, *value));
         let mut choices = vec![first];
-        for (key, default) in listing.defaults.iter().filter(|(_, default)| default.is_bool() || default.is_str()) {
+        for (key, default) in listing.table.defaults.iter().filter(|(_, default)| default.is_bool() || default.is_str())
+        {
             let values = values_of(registry, listing.name, key, default);
             choices = choices
                 .iter()

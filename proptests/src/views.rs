@@ -3,8 +3,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
 use seafix_referencing::{
-    Acceptance, Candidates, Gate, Mahalanobis, ModelPoint, Outcome, Prior, PriorBound, Problem, RigidConsensus,
-    Tolerance, candidates, compute_fix,
+    Acceptance, Attempt, Candidates, Gate, Mahalanobis, ModelPoint, Outcome, Prior, PriorBound, Problem,
+    RigidConsensus, Tolerance, candidates, compute_fix,
 };
 use seafix_simulation::{Purpose, Stream};
 
@@ -90,20 +90,36 @@ impl View {
 
     /// The answer of the default search and `mahalanobis`, with candidates by the prior pose, or all without one.
     pub fn outcome(&self, delta: f64, acceptance: &Acceptance) -> Outcome {
+        self.attempt(delta, acceptance).outcome
+    }
+
+    /// The attempt with the same method and candidates.
+    pub fn attempt(&self, delta: f64, acceptance: &Acceptance) -> Attempt {
         let Self { model, cloud, prior, .. } = self;
         let candidates = match prior {
             Some(prior) => candidates(model, cloud, Some(prior), &Gate::default(), None),
             None => Candidates::all(model.len(), cloud.len()),
         };
-        self.outcome_of(&candidates, delta, acceptance)
+        self.attempt_of(&candidates, delta, acceptance)
     }
 
-    /// The same for these candidates.
+    /// The outcome for these candidates.
     pub fn outcome_of(&self, candidates: &Candidates, delta: f64, acceptance: &Acceptance) -> Outcome {
+        self.attempt_of(candidates, delta, acceptance).outcome
+    }
+
+    fn attempt_of(&self, candidates: &Candidates, delta: f64, acceptance: &Acceptance) -> Attempt {
         let Self { model, cloud, prior, .. } = self;
-        let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Fixed(delta), prior: prior.as_ref() };
+        let problem = Problem {
+            model,
+            cloud,
+            candidates,
+            tolerance: Tolerance::Fixed(delta),
+            prior: prior.as_ref(),
+            edges: Default::default(),
+        };
         let mut stream = Stream::new(0, 0, 0, Purpose::Search);
         let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
-        compute_fix(&problem, &search, &solver, acceptance, None, stream.rng()).outcome
+        compute_fix(&problem, &search, &solver, acceptance, None, stream.rng())
     }
 }

@@ -29,6 +29,8 @@ fn plural(kind: &str) -> &'static str {
         "matcher" => "matchers",
         "refinement" => "refinements",
         "triangulator" => "triangulators",
+        "segment-detector" => "segment-detectors",
+        "segment-matcher" => "segment-matchers",
         "search" => "searches",
         "solver" => "solvers",
         "odometry" => "odometries",
@@ -60,6 +62,8 @@ pub(crate) fn markdown() -> String {
 mod tests {
     use std::{fs, path::Path};
 
+    use clap::CommandFactory;
+
     /// Compares the part of a page between `begin` and `end` with `fresh`, or writes it there.
     fn holds(page: &str, begin: &str, end: &str, fresh: &str) {
         let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(page);
@@ -80,9 +84,22 @@ mod tests {
     }
 
     #[test]
+    fn the_documentation_lists_the_settings() {
+        let begin = "<!-- settings: `seafix show NAME` -->\n";
+        holds("docs/settings.md", begin, "<!-- end of settings -->", &crate::settings::markdown());
+    }
+
+    #[test]
     fn the_documentation_lists_the_quantities() {
         let begin = "<!-- quantities: `seafix_log::quantities` -->\n";
         holds("docs/quantities.md", begin, "<!-- end of quantities -->", &seafix_log::quantities::markdown());
+    }
+
+    #[test]
+    fn the_documentation_lists_the_commands() {
+        let begin = "<!-- commands: `seafix --help` -->\n";
+        let program = crate::commands::Arguments::command();
+        holds("docs/commands.md", begin, "<!-- end of commands -->", &crate::reference::markdown(&program));
     }
 
     #[test]

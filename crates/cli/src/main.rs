@@ -11,20 +11,15 @@ mod executor;
 mod exit;
 mod ply;
 mod publication;
+#[cfg(test)]
+mod reference;
+mod settings;
 mod signals;
 mod terminal;
 
-/// Position and attitude of an underwater vehicle relative to a known structure, from stereo images.
-#[derive(Debug, Parser)]
-#[command(name = "seafix", version, propagate_version = true)]
-struct Arguments {
-    #[command(subcommand)]
-    command: commands::Command,
-}
-
 fn main() -> ExitCode {
     signals::outgrow_files();
-    match Arguments::parse().command.execute() {
+    match commands::Arguments::parse().command.execute() {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
             for line in &failure.lines {

@@ -1,18 +1,11 @@
 //! Point clouds in the format PLY, for MeshLab, CloudCompare and Open3D.
 
-use std::path::Path;
-
 use seafix_geometry::MeasuredPoint;
 use seafix_vision::Image;
 
-use crate::{atomic_file, exit::Failure};
-
-/// Writes `cloud` as binary PLY: position (m, in the left camera), grey value of the left image,
+/// `cloud` as binary PLY: position (m, in the left camera), grey value of the left image,
 /// and standard deviation of the position (m, √ of the covariance's trace).
-///
-/// # Errors
-/// The file cannot be written; an existing file of its name stays.
-pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Result<(), Failure> {
+pub(crate) fn ply(cloud: &[MeasuredPoint], left: &Image) -> Vec<u8> {
     let mut bytes = format!(
         "ply\nformat binary_little_endian 1.0\ncomment left camera: x right, y down, z forward; metres\n\
          element vertex {}\nproperty double x\nproperty double y\nproperty double z\n\
@@ -27,7 +20,7 @@ pub(crate) fn write(path: &Path, cloud: &[MeasuredPoint], left: &Image) -> Resul
         bytes.extend([grey; 3]);
         bytes.extend((point.position.covariance.trace().sqrt() as f32).to_le_bytes());
     }
-    atomic_file::write(path, bytes)
+    bytes
 }
 
 /// The grey value of the pixel nearest to (u, v).

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{nearest, plain};
+use crate::{suggest::nearest, words::plain};
 
 /// A fault in an input file: description, place, value and remedy.
 ///

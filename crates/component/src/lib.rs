@@ -6,16 +6,17 @@
 //! command-line listings and property tests.
 //!
 //! ```
-//! use seafix_component::{Choice, Component, Registry, entry};
+//! use seafix_component::{Choice, Component, Registry, Settings, entry};
 //! use serde::{Deserialize, Serialize};
 //!
 //! trait Greeting: Send + Sync + std::fmt::Debug {
 //!     fn greet(&self) -> String;
 //! }
 //!
-//! #[derive(Debug, Default, Serialize, Deserialize)]
+//! #[derive(Debug, Default, Serialize, Deserialize, Settings)]
 //! #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 //! struct Hello {
+//!     /// Number of greetings.
 //!     times: usize,
 //! }
 //!
@@ -39,19 +40,29 @@
 //! assert_eq!(unknown.to_string(), "no greeting is called `helo`, did you mean `hello`? There are hello");
 //! ```
 
+extern crate self as seafix_component; // for the paths of `#[derive(Settings)]`
+
+mod border;
 mod choice;
 mod fault;
+mod owned;
 mod registry;
+mod settings;
 mod suggest;
 mod text;
 mod words;
 
+pub use border::{decoded, decoded_file, undecodable};
 pub use choice::Choice;
 pub use fault::{Fault, Part, line_at, line_of, place_at, place_of};
+pub use owned::{LOCK, MARKER, Marker, Ownership, PartialFile, create_real_folder, is_plain_name};
 pub use registry::{
-    BuildError, Component, Entry, Listing, Properties, Registry, SettingsError, each_invalid, in_range, inside,
-    out_of_range, settings, take_out,
+    BuildError, Component, Entry, Listing, Properties, Registry,
+    added::{Added, Construct, NotAdded},
+    each_invalid, in_range, inside, out_of_range, settings, take_out,
 };
+pub use seafix_derive::Settings;
+pub use settings::{Bound, Field, Form, Range, Refusals, Setting, Settings, SettingsError, SettingsTable};
 pub use suggest::{nearest, unknown};
 pub use text::{read_long_text, read_text};
 pub use words::{counted, number, plain};

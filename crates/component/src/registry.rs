@@ -1,16 +1,24 @@
 //! Registries: the components of one kind.
 
+use std::sync::{Arc, PoisonError, RwLock};
+
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::{Choice, Part, nearest, plain, suggest::unknown};
+pub use listing::{Listing, Properties};
 
-/// Properties of a component as (name, value): `("time", "N log N for N candidate pairs")`.
-pub type Properties = &'static [(&'static str, &'static str)];
+use crate::{
+    choice::Choice,
+    fault::Part,
+    registry::added::{Added, NotAdded, is_name},
+    settings::{Settings, SettingsError, SettingsTable},
+    suggest::{nearest, unknown},
+    words::plain,
+};
 
 /// The description and settings of a component.
 ///
 /// The fields of the implementing struct are its settings; `Default` gives their default values.
-pub trait Component: Default + Serialize + DeserializeOwned + 'static {
+pub trait Component: Default + Serialize + DeserializeOwned + Settings + 'static {
     /// The name in experiment files: the method's name in kebab-case.
     const NAME: &'static str;
     /// A one-line description in the field's words.
@@ -98,26 +106,53 @@ impl BuildError {
     }
 }
 
-/// An error in the settings of a component: the dotted key, if one is known, and the message.
-#[derive(Debug)]
-pub struct SettingsError {
-    key: Option<String>,
-    message: String,
-}
-
 /// An entry of a registry; written with [`entry!`](crate::entry).
 #[derive(Debug)]
-pub struct Entry<T: ?Sized> {
+pub struct Entry<T: ?Sized + 'static> {
     name: &'static str,
     summary: &'static str,
     source: &'static str,
     properties: Properties,
     version: u32,
-    defaults: fn() -> toml::Table,
-    build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>,
+    maker: Maker<T>,
+}
+
+/// The defaults and the constructor of a component.
+enum Maker<T: ?Sized + 'static> {
+    /// A struct of the program.
+    Struct { table: fn() -> SettingsTable, build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>> },
+    /// A component that was added while the program ran.
+    Added(&'static Added<T>),
+}
+
+impl<T: ?Sized> std::fmt::Debug for Maker<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(if matches!(self, Self::Struct { .. }) { "Struct" } else { "Added" })
+    }
 }
 
 impl<T: ?Sized> Entry<T> {
+    fn defaults(&self) -> toml::Table {
+        match self.maker {
+            Maker::Struct { table, .. } => table().defaults,
+            Maker::Added(added) => added.defaults.clone(),
+        }
+    }
+
+    fn table(&self) -> SettingsTable {
+        match self.maker {
+            Maker::Struct { table, .. } => table(),
+            Maker::Added(added) => added.table(),
+        }
+    }
+
+    fn build(&self, settings: toml::Table) -> Result<Box<T>, Vec<SettingsError>> {
+        match self.maker {
+            Maker::Struct { build, .. } => build(settings),
+            Maker::Added(added) => added.built(settings),
+        }
+    }
+
     /// The entry of component `C`.
     pub const fn of<C: Component>(build: fn(toml::Table) -> Result<Box<T>, Vec<SettingsError>>) -> Self {
         Self {
@@ -126,8 +161,7 @@ impl<T: ?Sized> Entry<T> {
             source: C::SOURCE,
             properties: C::PROPERTIES,
             version: C::VERSION,
-            defaults: defaults::<C>,
-            build,
+            maker: Maker::Struct { table: table::<C>, build },
         }
     }
 }
@@ -304,40 +338,60 @@ fn without<T: Serialize + DeserializeOwned>(full: &T, message: &str) -> Option<T
     table.try_into().ok()
 }
 
-fn defaults<C: Component>() -> toml::Table {
-    toml::Table::try_from(C::default()).expect("a component's settings are a table of plain values")
+fn table<C: Component>() -> SettingsTable {
+    SettingsTable {
+        form: C::form(),
+        defaults: toml::Table::try_from(C::default()).expect("a component's settings are a table of plain values"),
+        refusals: Arc::new(|given| settings::<C>(given.clone()).err().unwrap_or_default()),
+    }
 }
 
-/// The description of one component in a registry.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Listing {
-    /// The kind: `solver`, `search`, …
-    pub kind: &'static str,
-    /// The name in experiment files.
-    pub name: &'static str,
-    /// The one-line description.
-    pub summary: &'static str,
-    /// The literature source.
-    pub source: &'static str,
-    /// Further properties as (name, value).
-    pub properties: Properties,
-    /// The version of the results.
-    pub version: u32,
-    /// The settings with their default values.
-    pub defaults: toml::Table,
-}
-
-/// All components of one kind, in alphabetical order.
+/// All components of one kind, in alphabetical order, then those added while the program runs.
 #[derive(Debug)]
 pub struct Registry<T: ?Sized + 'static> {
     kind: &'static str,
     entries: &'static [Entry<T>],
+    added: RwLock<Vec<&'static Entry<T>>>,
 }
 
 impl<T: ?Sized> Registry<T> {
     /// A registry of `kind` with these entries.
     pub const fn new(kind: &'static str, entries: &'static [Entry<T>]) -> Self {
-        Self { kind, entries }
+        Self { kind, entries, added: RwLock::new(Vec::new()) }
+    }
+
+    /// Adds a component while the program runs; an added one of the same name is replaced.
+    ///
+    /// The entry is kept for the life of the program, as are those that it replaces.
+    ///
+    /// # Errors
+    /// A name that is not in kebab-case, or that a component of the program has.
+    pub fn add(&self, component: Added<T>) -> Result<(), NotAdded> {
+        if !is_name(&component.name) {
+            return Err(NotAdded::Name { kind: self.kind, name: component.name });
+        }
+        if self.entries.iter().any(|entry| entry.name == component.name) {
+            return Err(NotAdded::Taken { kind: self.kind, name: component.name });
+        }
+        let component: &'static Added<T> = Box::leak(Box::new(component));
+        let entry: &'static Entry<T> = Box::leak(Box::new(Entry {
+            name: &component.name,
+            summary: &component.summary,
+            source: &component.source,
+            properties: &[],
+            version: component.version,
+            maker: Maker::Added(component),
+        }));
+        let mut added = self.added.write().unwrap_or_else(PoisonError::into_inner);
+        added.retain(|other| other.name != entry.name);
+        added.push(entry);
+        Ok(())
+    }
+
+    /// All entries: those of the program, then those added.
+    fn all(&self) -> Vec<&'static Entry<T>> {
+        let added = self.added.read().unwrap_or_else(PoisonError::into_inner);
+        self.entries.iter().chain(added.iter().copied()).collect()
     }
 
     /// The kind of its components, in the singular: `solver`.
@@ -347,12 +401,12 @@ impl<T: ?Sized> Registry<T> {
 
     /// The names, in the order of the list.
     pub fn names(&self) -> impl Iterator<Item = &'static str> + use<T> {
-        self.entries.iter().map(|entry| entry.name)
+        self.all().into_iter().map(|entry| entry.name)
     }
 
     /// The descriptions of all components, in the order of the list.
     pub fn listings(&self) -> Vec<Listing> {
-        self.entries
+        self.all()
             .iter()
             .map(|entry| Listing {
                 kind: self.kind,
@@ -361,7 +415,7 @@ impl<T: ?Sized> Registry<T> {
                 source: entry.source,
                 properties: entry.properties,
                 version: entry.version,
-                defaults: (entry.defaults)(),
+                table: entry.table(),
             })
             .collect()
     }
@@ -373,7 +427,7 @@ impl<T: ?Sized> Registry<T> {
     /// wrong type or range.
     pub fn build(&self, choice: &Choice) -> Result<Box<T>, BuildError> {
         let entry = self.find(&choice.name)?;
-        (entry.build)(choice.settings.clone()).map_err(|errors| {
+        entry.build(choice.settings.clone()).map_err(|errors| {
             let first = errors.into_iter().next().expect("a rejected table has at least one error");
             self.fault(entry, first)
         })
@@ -389,7 +443,7 @@ impl<T: ?Sized> Registry<T> {
                 std::iter::once(error).chain(settings).collect()
             }
             Ok(entry) => {
-                let errors = (entry.build)(choice.settings.clone()).err().unwrap_or_default();
+                let errors = entry.build(choice.settings.clone()).err().unwrap_or_default();
                 errors.into_iter().map(|error| self.fault(entry, error)).collect()
             }
         }
@@ -400,8 +454,8 @@ impl<T: ?Sized> Registry<T> {
         let Some(key) = key else { return BuildError::BadValue { kind, name, key: None, message } };
         let words: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         let nested = words.split_first().filter(|_| key.contains('.') && message.starts_with("unknown field"));
-        if !key.contains(['.', '[']) && !(entry.defaults)().contains_key(&key) {
-            let hint = unknown(&key, &(entry.defaults)().keys().map(String::as_str).collect::<Vec<_>>());
+        if !key.contains(['.', '[']) && !entry.defaults().contains_key(&key) {
+            let hint = unknown(&key, &entry.defaults().keys().map(String::as_str).collect::<Vec<_>>());
             return BuildError::UnknownKey { kind, name, key, hint };
         }
         if let Some((word, known)) = nested {
@@ -421,13 +475,13 @@ impl<T: ?Sized> Registry<T> {
     /// As [`build`](Self::build).
     pub fn resolve(&self, choice: &Choice) -> Result<Choice, BuildError> {
         self.build(choice)?;
-        let mut settings = (self.find(&choice.name)?.defaults)();
+        let mut settings = self.find(&choice.name)?.defaults();
         settings.extend(choice.settings.clone());
         Ok(Choice { name: choice.name.clone(), settings })
     }
 
     fn find(&self, name: &str) -> Result<&'static Entry<T>, BuildError> {
-        self.entries.iter().find(|entry| entry.name == name).ok_or_else(|| BuildError::UnknownName {
+        self.all().into_iter().find(|entry| entry.name == name).ok_or_else(|| BuildError::UnknownName {
             kind: self.kind,
             name: name.to_owned(),
             near: nearest(name, self.names()),
@@ -436,5 +490,7 @@ impl<T: ?Sized> Registry<T> {
     }
 }
 
+pub(crate) mod added;
+mod listing;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use std::{io::Read, path::Path};
 
-use crate::Fault;
+use crate::fault::Fault;
 
 /// The text of a file of at most 64 MiB: UTF-8, with an optional byte order mark and LF or CRLF line ends.
 ///
@@ -31,9 +31,45 @@ pub fn read_long_text(path: &Path, limit: u64) -> Result<String, Fault> {
             .value(format!("more than {limit} bytes"))
             .remedy(format!("at most {limit} bytes are read")));
     }
-    let text = String::from_utf8(bytes).map_err(|error| {
-        let at = error.utf8_error().valid_up_to();
-        Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy("save the file as UTF-8")
-    })?;
+    let text = decoded(bytes, path)?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(&text).replace("\r\n", "\n"))
+}
+
+/// The text of bytes in UTF-8, or in UTF-16 with the byte order mark that spreadsheets write.
+fn decoded(bytes: Vec<u8>, path: &Path) -> Result<String, Fault> {
+    let word: fn([u8; 2]) -> u16 = match bytes[..] {
+        [0xFF, 0xFE, ..] => u16::from_le_bytes,
+        [0xFE, 0xFF, ..] => u16::from_be_bytes,
+        _ => {
+            return String::from_utf8(bytes).map_err(|error| {
+                let at = error.utf8_error().valid_up_to();
+                Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy("save the file as UTF-8")
+            });
+        }
+    };
+    let words = bytes.chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
+    let text: Option<String> = char::decode_utf16(words).map(Result::ok).collect();
+    text.filter(|_| bytes.len().is_multiple_of(2)).ok_or_else(|| {
+        Fault::new("not UTF-16", path).value(format!("{} bytes", bytes.len())).remedy("save the file as UTF-8")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_of_a_spreadsheet_is_read_in_utf_16() {
+        let words: Vec<u16> = "\u{feff}id;größe\r\n".encode_utf16().collect();
+        for bytes in [
+            words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>(),
+            words.iter().flat_map(|word| word.to_be_bytes()).collect(),
+        ] {
+            let file = Path::new("a.csv");
+            assert_eq!(decoded(bytes.clone(), file).unwrap(), "\u{feff}id;größe\r\n");
+            assert!(
+                decoded(bytes[..bytes.len() - 1].to_vec(), file).unwrap_err().to_string().starts_with("not UTF-16")
+            );
+        }
+    }
 }

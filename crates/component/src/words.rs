@@ -1,6 +1,6 @@
 //! Wording of messages: counts, numbers and type names.
 
-use crate::nearest;
+use crate::suggest::nearest;
 
 /// A count with its noun: `1 point`, `2 points`.
 ///

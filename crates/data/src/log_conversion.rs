@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Quaternion, UnitQuaternion};
+use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 use seafix_evaluation::{Solved, alert_limit};
 use seafix_geometry::{
     Covariance6, Frame, MeasuredPoint, Object, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint,
@@ -15,7 +16,7 @@ use seafix_navigation::{Device, Reading};
 use seafix_referencing::{ModelPoint, Prior, PriorBound, Site, Target, problem_file::CoherenceProblem};
 use seafix_vision::Image;
 
-use crate::source::{FrameData, Hints, SensorFrame, TrueAnswer, Truth, WorldPrior};
+use crate::sequence::{TrueAnswer, Truth};
 
 /// The log's record of a rigid motion.
 pub fn pose<A: Frame, B: Frame>(pose: &Transform<A, B>) -> ExactPose {

@@ -68,8 +68,8 @@ pub fn transfer_bound(
 
 /// The relative nonlinearity of the projection within the bound.
 ///
-/// It is the RMS of the whitened pixel residual that J ξ leaves, relative to that of J ξ, over poses at √6 standard
-/// deviations along twelve directions that span the bound. A small value (0.1) means that the bound's Gaussian
+/// It is the RMS of the nonlinear remainder π(T Exp(ξ)) − π(T) − J ξ of the pixels π, divided by the RMS of J ξ, both
+/// whitened, over twelve ξ: √6 times each column of the bound's Cholesky factor, with both signs. A small value (0.1) means that the bound's Gaussian
 /// describes the poses nearby; it does not exclude a distant local minimum. `None` if one of these poses does not see a
 /// point.
 ///

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Point, Transform};
 
-use crate::{attitude_error, transfer_rms};
+use crate::fix::{attitude_error, transfer_rms};
 
 /// The criterion of a correct pose.
 ///

@@ -9,6 +9,7 @@ use std::{
 };
 
 use seafix_component::{Fault, read_text};
+use seafix_log::unchanged;
 use serde::Deserialize;
 
 use crate::run::manifest;
@@ -308,6 +309,7 @@ struct Table {
 impl Table {
     fn open(folder: &Path) -> Result<Self, Fault> {
         let file = folder.join("results.csv");
+        unchanged(&file).map_err(|error| Fault::new(error.to_string(), &file))?;
         let input = File::open(&file)
             .map_err(|error| Fault::new(format!("cannot read ({error})"), &file).remedy("name the folder of a run"))?;
         let (input, starts) = (BufReader::new(input), BTreeMap::new());

@@ -6,7 +6,7 @@ use std::{
 };
 
 use hmac_sha256::Hash as Sha256;
-use seafix_component::{BuildError, Choice, Fault, Part, inside, read_text, take_out};
+use seafix_component::{BuildError, Choice, Fault, Part, Settings, inside, is_plain_name, read_text, take_out};
 use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
@@ -22,11 +22,12 @@ use crate::{
     logging::Logging,
     navigation::Navigation,
     parse::{self, Read, Texts},
+    published::Published,
     sweep::{self, Axis, AxisValue, Cell},
 };
 
 /// An experiment file: a question, a source, a pipeline, and the settings that vary.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// The question, an English sentence.
@@ -48,6 +49,9 @@ pub struct Experiment {
     /// The content of the logs.
     #[serde(default, skip_serializing_if = "Logging::is_default")]
     pub log: Logging,
+    /// Figures of the literature beside which the report sets its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub published: Vec<Published>,
     /// The axes of the grid; each point of the grid is a trial.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub vary: Vec<Axis>,
@@ -77,6 +81,45 @@ impl Experiment {
         source.chain(pipeline).chain(navigation).collect()
     }
 
+    /// The invalid settings outside the tables of the pipeline and of components: dotted path, fault and remedy.
+    fn invalid_itself(&self) -> Vec<(String, &'static str, String)> {
+        let mut invalid = Vec::new();
+        if self.question.trim().is_empty() {
+            let remedy = "state the question of the experiment in one sentence";
+            invalid.push(("question".to_owned(), "no question", remedy.to_owned()));
+        }
+        for (index, of) in self.published.iter().enumerate() {
+            let Some((key, what, remedy)) = of.invalid() else { continue };
+            invalid.push((format!("published.{index}.{key}"), what, remedy));
+        }
+        if self.seed > i64::MAX as u64 - u64::from(self.repetitions) {
+            let remedy = "give at most 2^63 - 1, the limit of TOML";
+            invalid.push(("seed".to_owned(), "a seed too large", remedy.to_owned()));
+        }
+        if self.repetitions == 0 {
+            invalid.push(("repetitions".to_owned(), "no repetition", "give 1 or more".to_owned()));
+        }
+        if self.repetitions > 1 && self.vary.iter().any(|axis| axis.key == "seed") {
+            let remedy = "remove `repetitions` or the axis `seed`";
+            invalid.push(("repetitions".to_owned(), "repetitions beside an axis `seed`", remedy.to_owned()));
+        }
+        invalid
+    }
+
+    /// The dotted paths of all invalid settings, with messages `FAULT; REMEDY`.
+    pub(crate) fn refused(&self) -> Vec<(String, String)> {
+        let itself = self.invalid_itself().into_iter().map(|(path, what, remedy)| (path, format!("{what}; {remedy}")));
+        let axes = sweep::check(&self.vary, |path, _, what| Fault::new(what, Path::new(&path.join("."))));
+        let axes = axes.into_iter().map(|fault| {
+            let path = fault.file.to_string_lossy().into_owned();
+            // The remedy of a range concerns all of its numbers, and is no range of one.
+            let message = if fault.remedy.is_empty() { fault.what.replace("; give", ":") } else { fault.remedy };
+            (path, message)
+        });
+        let settings = self.invalid().into_iter().map(|invalid| (invalid.path.join("."), invalid.message));
+        itself.chain(axes).chain(settings).collect()
+    }
+
     /// The experiment for a data set: the default pipeline on all of its frames.
     pub fn of_dataset(folder: &Path, name: &str) -> Self {
         Self {
@@ -87,6 +130,7 @@ impl Experiment {
             pipeline: Pipeline::default(),
             navigation: None,
             log: Logging::default(),
+            published: Vec::new(),
             vary: Vec::new(),
         }
     }
@@ -206,11 +250,14 @@ impl Plan {
     /// # Errors
     /// All faults of the file, with their lines, and of the settings.
     pub fn read(path: &Path, settings: &[String]) -> Result<Self, Vec<Fault>> {
-        let name = path.file_stem().map_or_else(|| "run".to_owned(), |stem| stem.to_string_lossy().into_owned());
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        // The name becomes that of a folder.
+        let name = name.filter(|name| is_plain_name(name)).unwrap_or_else(|| "run".to_owned());
         if path.is_dir() {
             // The canonical path has a name even for `.`; messages keep the path as given.
             let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-            let name = real.file_name().map_or(name, |name| name.to_string_lossy().into_owned());
+            let own = real.file_name().map(|name| name.to_string_lossy().into_owned());
+            let name = own.filter(|name| is_plain_name(name)).unwrap_or(name);
             let experiment = changed(Experiment::of_dataset(path, &name), settings)?;
             return Self::resolve(experiment, &name, Path::new(""), path, &Texts::of(path, ""), settings);
         }
@@ -248,24 +295,17 @@ impl Plan {
         let mut faults = sweep::check(&experiment.vary, |path, part, what| texts.fault(path, part, what));
         let invalid = experiment.invalid();
         faults.extend(invalid.iter().map(|invalid| invalid.fault(&experiment, &Vec::new(), texts)));
-        if experiment.question.trim().is_empty() {
-            faults.push(
-                fault(&["question"], "no question").remedy("state the question of the experiment in one sentence"),
-            );
-        }
-        if experiment.seed > i64::MAX as u64 - u64::from(experiment.repetitions) {
-            faults.push(fault(&["seed"], "a seed too large").remedy("give at most 2^63 - 1, the limit of TOML"));
-        }
-        if experiment.repetitions == 0 {
-            faults.push(fault(&["repetitions"], "no repetition").remedy("give 1 or more"));
-        }
-        if experiment.repetitions > 1 && experiment.vary.iter().any(|axis| axis.key == "seed") {
-            let remedy = "remove `repetitions` or the axis `seed`";
-            faults.push(fault(&["repetitions"], "repetitions beside an axis `seed`").remedy(remedy));
+        for (path, what, remedy) in experiment.invalid_itself() {
+            faults.push(fault(&path.split('.').collect::<Vec<_>>(), what).remedy(remedy));
         }
         if !faults.is_empty() {
             faults.extend(experiment.faults_of_axes(&invalid, folder, texts));
             return Err(faults);
+        }
+        if sweep::size(&experiment.vary, experiment.repetitions).is_none() {
+            let key = if experiment.repetitions as usize > sweep::MAX_TRIALS { "repetitions" } else { "vary" };
+            let remedy = format!("an experiment has at most {}; divide it into several", sweep::MAX_TRIALS);
+            return Err(vec![fault(&[key], "too many trials").remedy(remedy)]);
         }
         let grid = sweep::grid(&experiment.axes());
         let trials = trials(&experiment, grid, folder, texts)?;

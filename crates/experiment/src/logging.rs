@@ -1,10 +1,11 @@
 //! Settings for the content of logs.
 
+use seafix_component::Settings;
 use seafix_log::GreyImage;
 use serde::{Deserialize, Serialize};
 
 /// The content of a log for each frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields)]
 pub struct Logging {
     /// The form of the images.
@@ -12,7 +13,7 @@ pub struct Logging {
 }
 
 /// The form of logged images, which make up most of a log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum ImagesLogged {
     /// Full images, on which any method can be replayed.

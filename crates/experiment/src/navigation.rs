@@ -1,13 +1,13 @@
 //! The `[navigation]` table of an experiment: the library's settings, and faults of the odometry.
 
 use seafix::{Keyframes, NavigationStack, PipelineError, invalid_setting};
-use seafix_component::Choice;
+use seafix_component::{Choice, Settings};
 use serde::{Deserialize, Serialize};
 
 use crate::odometry_fault::OdometryFault;
 
 /// The settings of navigation between fixes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Navigation {
     /// The odometry that moves the last fix from frame to frame.

@@ -1,6 +1,7 @@
 //! Simulated failures of an odometry, applied between odometry and navigator.
 
 use nalgebra::Vector3;
+use seafix_component::Settings;
 use seafix_geometry::{Transform, so3};
 use seafix_navigation::RelativeMotion;
 use seafix_simulation::{Purpose, Stream, sensors::FaultKind};
@@ -11,7 +12,7 @@ const SLOW: u64 = 5;
 
 /// A temporary failure of the odometry, named as in PX4's failure injection. Motions are missing (`off`, `slow`,
 /// `intermittent`) or wrong (`stuck`, `garbage`, `wrong`, `delayed`), with unchanged covariance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct OdometryFault {
     /// The kind of failure.

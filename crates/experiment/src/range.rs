@@ -1,5 +1,6 @@
 //! Number ranges in equal steps or ratios.
 
+use seafix_component::{Form, Settings};
 use serde::{Deserialize, Serialize};
 
 /// Numbers from one end to the other, both included.
@@ -8,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// let range: seafix_experiment::Range = toml::from_str("from = 1\nto = 5\nstep = 2").unwrap();
 /// assert_eq!(range.even().collect::<Vec<_>>(), [1.into(), 3.into(), 5.into()]);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
     /// The first number.
@@ -17,14 +18,15 @@ pub struct Range {
     pub to: Number,
     /// The number of values, 2 to 10000.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[setting(form = Count)]
     pub count: Option<usize>,
-    /// The step between values, as an alternative to `count`.
+    /// The step from number to number, as an alternative to `count`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step: Option<Number>,
 }
 
 /// A number in TOML.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(untagged)]
 pub enum Number {
     /// An integer. A range with integer ends and integer steps has integer values.
@@ -48,6 +50,15 @@ impl Number {
 
 /// The maximum number of values.
 const MAX: usize = 10_000;
+
+/// The form of a number of values.
+struct Count;
+
+impl Settings for Count {
+    fn form() -> Form {
+        Form::Integer { min: 2, max: MAX as i64 }
+    }
+}
 
 /// The fraction of a step that counts as rounding.
 const ROUNDING: f64 = 1e-9;

@@ -6,9 +6,9 @@ use seafix_data::{
     log_conversion::{self, model, rows3, rows6},
     source::Sequence,
 };
-use seafix_geometry::{MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
+use seafix_geometry::{LensModel, MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
-    Alternative, Axis, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, Inputs, Integrity,
+    Alternative, Axis, BestPose, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, Inputs, Integrity,
     NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome as Logged, Pair, PixelPair, PriorRecord,
     RigRecord, SharedStages, TargetModel, TargetRecord, TargetTimes, TrialHeader,
 };
@@ -136,6 +136,13 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
     record.optimal = Some(answer.optimal);
     record.consensus_bound = answer.consensus_bound.map(|n| n as u64);
     record.nfa = answer.nfa;
+    record.p_absent = answer.p_absent;
+    record.p_wrong = answer.p_wrong;
+    record.best = answer.best.as_ref().map(|best| BestPose {
+        object_from_camera: best.object_from_camera.rows(),
+        covariance: best.covariance.map(|covariance| rows6(&covariance.matrix)),
+        pairs: pairs(&best.pairs),
+    });
     record.pair_tests = answer.pair_tests;
     record.pairs = pairs(&answer.identified);
     record.evaluation.identified = Some(answer.identified.len() as u32);
@@ -164,7 +171,8 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
         Outcome::Rejected(_) => record.outcome = Logged::Rejected,
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
-    let details = answer.outcome.explanation().into_iter().chain(attempt.joint.clone());
+    let remedy = answer.outcome.remedy().map(str::to_owned);
+    let details = answer.outcome.explanation().into_iter().chain(remedy).chain(attempt.joint.clone());
     record.explanation = details.collect::<Vec<_>>().join("; ");
     record
 }
@@ -280,6 +288,7 @@ fn camera(camera: &Pinhole) -> CameraRecord {
         size: camera.size(),
         matrix: [[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]],
         distortion: camera.distortion().shortest().to_vec(),
+        equidistant: camera.distortion().model() == LensModel::Equidistant,
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix_component::{Choice, Fault};
-use seafix_log::Reader;
+use seafix_component::{Choice, Fault, is_plain_name};
+use seafix_log::{Reader, unchanged};
 
 use seafix::Pipeline;
 
@@ -62,8 +62,13 @@ impl Replay {
             };
             return Err(vec![Fault::new("a folder, not the log of a trial", log).remedy(remedy)]);
         }
-        let reader = Reader::open(log).map_err(|error| fault(&error.to_string()))?;
+        let reader = unchanged(log).and_then(|()| Reader::open(log)).map_err(|error| fault(&error.to_string()))?;
         let header = reader.header().clone();
+        // The name becomes that of a file.
+        if !is_plain_name(&header.trial) || header.trial.starts_with('.') {
+            let invalid = Fault::new("a log whose trial has no valid file name", log).value(&header.trial);
+            return Err(vec![invalid.remedy("make its run again")]);
+        }
         let logged: Experiment = toml::from_str(&header.configuration)
             .map_err(|error| fault(&format!("its configuration is of another version ({})", error.message())))?;
         let mut changed: Experiment = sweep::changed(&logged, &self.settings, "pipeline.acceptance.confidence=0.999")?;

@@ -1,15 +1,15 @@
 //! Parameter sweeps: axes, their grid, and changed settings.
 
-use std::path::Path;
+use std::{collections::HashSet, path::Path};
 
 use seafix::Pipeline;
-use seafix_component::{Fault, Part};
+use seafix_component::{Fault, Part, Settings};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::range::Range;
 
 /// An axis `[[vary]]` of the grid; exactly one of its lists of values is given.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Axis {
     /// The setting as a dotted path: `source.distance`, `pipeline.solver`. With `cases` and `zip` it is only the name
@@ -34,7 +34,7 @@ pub struct Axis {
 }
 
 /// A named set of settings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
     /// The name in tables.
@@ -159,6 +159,16 @@ pub(crate) fn written(axes: &[Axis], cell: &[AxisValue], path: &[String], part: 
 
 /// A point of the grid: one value on each axis, in the order of the axes.
 pub(crate) type Cell = Vec<AxisValue>;
+
+/// The number of points of the grid, of an experiment that is repeated; `None` beyond [`MAX_TRIALS`].
+pub(crate) fn size(axes: &[Axis], repetitions: u32) -> Option<usize> {
+    let lengths = axes.iter().map(|axis| axis.places().len()).chain([repetitions as usize]);
+    lengths.into_iter().try_fold(1_usize, usize::checked_mul).filter(|size| *size <= MAX_TRIALS)
+}
+
+/// The maximum number of trials of an experiment. Each occupies some kilobytes, so that all fit into some hundred
+/// megabytes.
+pub(crate) const MAX_TRIALS: usize = 50_000;
 
 /// All points of the grid, with the last axis fastest; one empty point without axes.
 pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
@@ -306,6 +316,7 @@ fn twice(axis: &Axis) -> Vec<(Vec<String>, String)> {
     fn plain(value: &toml::Value) -> toml::Value {
         match value {
             toml::Value::Integer(full) => (*full as f64).into(),
+            toml::Value::Float(zero) if *zero == 0.0 => 0.0.into(),
             toml::Value::Array(list) => toml::Value::Array(list.iter().map(plain).collect()),
             toml::Value::Table(table) => match table.get("name") {
                 Some(name) if table.len() == 1 => name.clone(),
@@ -314,14 +325,16 @@ fn twice(axis: &Axis) -> Vec<(Vec<String>, String)> {
             other => other.clone(),
         }
     }
+    if !axis.is_bounded() {
+        return Vec::new();
+    }
     let places = axis.places();
-    let same = |one: &AxisValue, other: &AxisValue| {
-        let values = |place: &AxisValue| -> toml::Table {
-            place.set.iter().map(|(key, value)| (key.clone(), plain(value))).collect()
-        };
-        values(one) == values(other)
+    let mut known = HashSet::new();
+    let values = |place: &AxisValue| -> String {
+        let values: toml::Table = place.set.iter().map(|(key, value)| (key.clone(), plain(value))).collect();
+        values.to_string()
     };
-    let again = (1..places.len()).filter(|&k| places[..k].iter().any(|place| same(place, &places[k])));
+    let again = (0..places.len()).filter(|&k| !known.insert(values(&places[k])));
     let reported = again.filter_map(|k| {
         let place = &places[k];
         let (key, _) = place.set.first()?;

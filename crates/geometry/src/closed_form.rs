@@ -2,7 +2,12 @@
 
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 
-use crate::{Camera, Pixel, Point, StereoPixels, StereoRig, Triangulation, UncertainPixels, Untriangulable};
+use crate::{
+    frame::{Camera, Point},
+    measured::UncertainPixels,
+    pinhole::Pixel,
+    stereo::{StereoPixels, StereoRig, Triangulation, Untriangulable},
+};
 
 /// Step of the numerical derivatives (px).
 const STEP: f64 = 1e-3;
@@ -86,7 +91,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
-    use crate::{Pinhole, Transform};
+    use crate::{pinhole::Pinhole, transform::Transform};
 
     /// A rig with rotated cameras, one in front of the other, and lens distortion.
     fn rig() -> StereoRig {

@@ -4,7 +4,11 @@ use std::marker::PhantomData;
 
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 
-use crate::{Frame, Point, Transform, so3::skew};
+use crate::{
+    frame::{Frame, Point},
+    so3::skew,
+    transform::Transform,
+};
 
 /// The covariance of a pose estimate `a_from_b`.
 ///

@@ -53,7 +53,7 @@ fn coefficients(theta: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Camera, Transform};
+    use crate::{frame::Camera, transform::Transform};
 
     #[test]
     fn it_is_the_slope_of_the_logarithm() {

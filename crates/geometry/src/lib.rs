@@ -20,21 +20,25 @@
 
 mod closed_form;
 mod covariance;
+mod distortion;
 mod frame;
 mod jacobian;
 mod measured;
 mod pinhole;
 pub mod row_vector;
+mod segment;
 pub mod so3;
 mod stereo;
 mod transform;
 mod triad;
 
 pub use covariance::{Covariance6, UncertainPoint};
+pub use distortion::{Distortion, LensModel};
 pub use frame::{Body, Camera, Frame, Object, Point, RightCamera, Site, World};
 pub use jacobian::right_jacobian_inverse;
 pub use measured::{MeasuredPoint, UncertainPixels};
-pub use pinhole::{BadCamera, Distortion, Pinhole, Pixel};
+pub use pinhole::{BadCamera, Pinhole, Pixel};
+pub use segment::{MeasuredLine, NormalOffset, StereoSegments, UncertainSegment, across};
 pub use stereo::{BadRig, StereoPixels, StereoRig, Triangulation, Untriangulable};
 pub use transform::{NotRigid, Transform};
 pub use triad::{Collinear, triad};

@@ -2,7 +2,7 @@
 
 use nalgebra::Matrix4;
 
-use crate::{Camera, StereoPixels, UncertainPoint};
+use crate::{covariance::UncertainPoint, frame::Camera, stereo::StereoPixels};
 
 /// The two pixels of a point, with their covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]

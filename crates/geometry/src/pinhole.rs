@@ -1,8 +1,11 @@
-//! The pinhole camera with Brown–Conrady lens distortion.
+//! The pinhole camera with lens distortion.
 
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 
-use crate::{Frame, Point};
+use crate::{
+    distortion::Distortion,
+    frame::{Frame, Point},
+};
 
 /// A position in an image (px); the centre of the first pixel is (0, 0), u to the right, v down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,77 +23,9 @@ impl Pixel {
     }
 }
 
-/// Brown–Conrady lens distortion, `plumb_bob`: k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
+/// A camera: image size, focal lengths and principal point (px), lens distortion.
 ///
-/// It acts on normalised coordinates (x, y) = (X/Z, Y/Z) with r² = x² + y²: x' = x·ρ + 2 p1 x y + p2 (r² + 2x²), y' =
-/// y·ρ + p1 (r² + 2y²) + 2 p2 x y, ρ = (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶).
-///
-/// Source: Brown, *Decentering distortion of lenses*, 1966; the order of the coefficients is OpenCV's.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Distortion {
-    coefficients: [f64; 8],
-}
-
-impl Distortion {
-    /// The coefficients in the order k1 k2 p1 p2 k3 k4 k5 k6; absent ones are zero.
-    pub fn coefficients(&self) -> &[f64; 8] {
-        &self.coefficients
-    }
-
-    /// The coefficients as the shortest list of a calibration file: 0, 4, 5 or 8 numbers.
-    pub fn shortest(&self) -> &[f64] {
-        let used = self.coefficients.iter().rposition(|&k| k != 0.0).map_or(0, |last| last + 1);
-        let length = [0, 4, 5, 8].into_iter().find(|&length| length >= used).unwrap_or(8);
-        &self.coefficients[..length]
-    }
-
-    /// The factor ρ(r²) and its derivative dρ/d(r²).
-    fn radial(&self, r2: f64) -> (f64, f64) {
-        let [k1, k2, _, _, k3, k4, k5, k6] = self.coefficients;
-        let numerator = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        let denominator = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
-        let d_numerator = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
-        let d_denominator = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
-        let rho = numerator / denominator;
-        (rho, (d_numerator - rho * d_denominator) / denominator)
-    }
-
-    /// The distorted position of `n`, with the Jacobian of the map.
-    fn distort(&self, n: &Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
-        let [_, _, p1, p2, ..] = self.coefficients;
-        let (x, y) = (n.x, n.y);
-        let r2 = x * x + y * y;
-        let (rho, d) = self.radial(r2);
-        let place = Vector2::new(
-            x * rho + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * rho + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        );
-        let cross = 2.0 * d * x * y + 2.0 * p1 * x + 2.0 * p2 * y;
-        let jacobian = Matrix2::new(
-            rho + 2.0 * d * x * x + 2.0 * p1 * y + 6.0 * p2 * x,
-            cross,
-            cross,
-            rho + 2.0 * d * y * y + 6.0 * p1 * y + 2.0 * p2 * x,
-        );
-        (place, jacobian)
-    }
-
-    /// The normalised radius up to which the radial map r·ρ(r²) increases; beyond it the lens model folds back.
-    fn monotone_radius(&self) -> f64 {
-        const FAR: f64 = 10.0; // 84 degrees off the axis
-        if *self == Self::default() {
-            return f64::INFINITY;
-        }
-        let slope = |r: f64| {
-            let (rho, d) = self.radial(r * r);
-            rho + 2.0 * d * r * r
-        };
-        let steps = 2000;
-        (1..=steps).map(|i| FAR * f64::from(i) / f64::from(steps)).find(|r| !(slope(*r) > 0.0)).unwrap_or(f64::INFINITY)
-    }
-}
-
-/// A pinhole camera: image size, focal lengths and principal point (px), lens distortion.
+/// Its field of view is less than 180°, also with an equidistant lens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pinhole {
     size: [u32; 2],
@@ -127,8 +62,16 @@ pub enum BadCamera {
         limit: u32,
     },
     /// A number of distortion coefficients that fits no known model.
-    #[error("distortion has {0} numbers; plumb_bob has 0, 4 (k1 k2 p1 p2), 5 (+ k3) or 8 (+ k4 k5 k6)")]
+    #[error(
+        "distortion has {0} numbers; plumb_bob has 0, 4 (k1 k2 p1 p2), 5 (+ k3), 8 (+ k4 k5 k6) or 12 (+ s1 s2 s3 s4)"
+    )]
     DistortionLength(usize),
+    /// A number of coefficients that an equidistant lens does not have.
+    #[error("distortion has {0} numbers; an equidistant lens has 4, k1 k2 k3 k4")]
+    EquidistantLength(usize),
+    /// A tilted sensor, the last two of fourteen coefficients.
+    #[error("distortion has a tilted sensor, τx = {0}, τy = {1}; calibrate without CALIB_TILTED_MODEL")]
+    Tilted(f64, f64),
     /// A distortion coefficient that is not finite.
     #[error("distortion[{index}] = {value}; give finite numbers")]
     DistortionValue {
@@ -142,11 +85,45 @@ pub enum BadCamera {
 impl Pinhole {
     /// A camera with this image size, fx, fy, cx, cy (px) and lens distortion.
     ///
-    /// The distortion has 0, 4, 5 or 8 coefficients.
+    /// The distortion has 0, 4, 5, 8 or 12 coefficients, or 14 whose last two are zero.
     ///
     /// # Errors
     /// A [`BadCamera`] that names the invalid number.
     pub fn new(size: [u32; 2], focal: [f64; 2], principal: [f64; 2], distortion: &[f64]) -> Result<Self, BadCamera> {
+        let distortion = match distortion {
+            [rest @ .., tx, ty] if rest.len() == 12 && tx.is_finite() && ty.is_finite() => {
+                if [*tx, *ty] != [0.0; 2] {
+                    return Err(BadCamera::Tilted(*tx, *ty));
+                }
+                rest
+            }
+            all => all,
+        };
+        if ![0, 4, 5, 8, 12].contains(&distortion.len()) {
+            return Err(BadCamera::DistortionLength(distortion.len()));
+        }
+        let coefficients = finite(distortion)?;
+        Self::build(size, focal, principal, Distortion::pinhole(coefficients))
+    }
+
+    /// A camera with an equidistant lens, k1 k2 k3 k4; without coefficients they are zero.
+    ///
+    /// # Errors
+    /// A [`BadCamera`] that names the invalid number.
+    pub fn equidistant(
+        size: [u32; 2],
+        focal: [f64; 2],
+        principal: [f64; 2],
+        distortion: &[f64],
+    ) -> Result<Self, BadCamera> {
+        if ![0, 4].contains(&distortion.len()) {
+            return Err(BadCamera::EquidistantLength(distortion.len()));
+        }
+        let [k1, k2, k3, k4, ..] = finite(distortion)?;
+        Self::build(size, focal, principal, Distortion::equidistant([k1, k2, k3, k4]))
+    }
+
+    fn build(size: [u32; 2], focal: [f64; 2], principal: [f64; 2], distortion: Distortion) -> Result<Self, BadCamera> {
         if size[0] == 0 || size[1] == 0 {
             return Err(BadCamera::Size(size[0], size[1]));
         }
@@ -160,19 +137,13 @@ impl Pinhole {
                 return Err(BadCamera::PrincipalPoint { name, value, limit });
             }
         }
-        if ![0, 4, 5, 8].contains(&distortion.len()) {
-            return Err(BadCamera::DistortionLength(distortion.len()));
-        }
-        let mut coefficients = [0.0; 8];
-        for (index, &value) in distortion.iter().enumerate() {
-            if !value.is_finite() {
-                return Err(BadCamera::DistortionValue { index, value });
-            }
-            coefficients[index] = value;
-        }
-        let distortion = Distortion { coefficients };
         let monotone_radius = distortion.monotone_radius();
         Ok(Self { size, fx: focal[0], fy: focal[1], cx: principal[0], cy: principal[1], distortion, monotone_radius })
+    }
+
+    /// The camera with its principal point moved by `offset` (px).
+    pub(crate) fn with_principal_moved(&self, offset: &Vector2<f64>) -> Self {
+        Self { cx: self.cx + offset.x, cy: self.cy + offset.y, ..*self }
     }
 
     /// Width and height of the image.
@@ -225,7 +196,7 @@ impl Pinhole {
     /// Newton's iteration on the distortion; it ends when the step falls below 1e-15.
     pub fn normalize(&self, pixel: &Pixel) -> Option<Vector2<f64>> {
         let target = Vector2::new((pixel.u - self.cx) / self.fx, (pixel.v - self.cy) / self.fy);
-        let mut n = target;
+        let mut n = self.distortion.start(&target);
         for _ in 0..50 {
             let (place, jacobian) = self.distortion.distort(&n);
             let step = jacobian.try_inverse()? * (target - place);
@@ -248,10 +219,22 @@ impl Pinhole {
     }
 }
 
+/// The coefficients, filled up with zeros.
+fn finite(distortion: &[f64]) -> Result<[f64; 12], BadCamera> {
+    let mut coefficients = [0.0; 12];
+    for (index, &value) in distortion.iter().enumerate() {
+        if !value.is_finite() {
+            return Err(BadCamera::DistortionValue { index, value });
+        }
+        coefficients[index] = value;
+    }
+    Ok(coefficients)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Camera;
+    use crate::frame::Camera;
 
     fn camera(distortion: &[f64]) -> Pinhole {
         Pinhole::new([640, 480], [533.4, 533.5], [342.5, 234.7], distortion).unwrap()

@@ -9,7 +9,11 @@ use std::{marker::PhantomData, ops::Mul};
 
 use nalgebra::{Matrix4, RowVector4};
 
-use crate::{Body, Collinear, Frame, Object, Point, Transform, World, triad};
+use crate::{
+    frame::{Body, Frame, Object, Point, World},
+    transform::Transform,
+    triad::{Collinear, triad},
+};
 
 /// The matrix `H_{A,B}`: it maps row vectors of `A` to row vectors of `B`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,14 @@
 //! Stereo rigs with arbitrary extrinsics, and triangulation by maximum likelihood.
 
-use nalgebra::{Matrix3, Matrix4, Matrix4x3, UnitQuaternion, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, Matrix4x3, UnitQuaternion, Vector2, Vector3, Vector4};
 
-use crate::{Camera, Pinhole, Pixel, Point, RightCamera, Transform, UncertainPixels, so3::skew};
+use crate::{
+    frame::{Camera, Point, RightCamera},
+    measured::UncertainPixels,
+    pinhole::{Pinhole, Pixel},
+    so3::skew,
+    transform::Transform,
+};
 
 /// The pixels of one point in both cameras of a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,6 +100,25 @@ impl StereoRig {
         Self::new(self.left, self.right, right_from_left).expect("the baseline is unchanged")
     }
 
+    /// The direction in the right image along which a nearer point moves away from the left camera: the unit vector
+    /// of the right camera's own displacement, (1, 0) for a right camera that is exactly to the right.
+    ///
+    /// A pixel error of both images in this direction alone is an error of the disparity. Zero if one camera is
+    /// exactly in front of the other.
+    pub fn disparity_direction(&self) -> Vector2<f64> {
+        let across = -self.right_from_left.translation().xy();
+        across.try_normalize(1e-12).unwrap_or_else(Vector2::zeros)
+    }
+
+    /// The rig with the right camera's principal point moved by `pixels` along [`disparity_direction`]: every
+    /// disparity grows by as much.
+    ///
+    /// [`disparity_direction`]: Self::disparity_direction
+    pub fn with_range_offset(&self, pixels: f64) -> Self {
+        let right = self.right.with_principal_moved(&(self.disparity_direction() * pixels));
+        Self { right, ..*self }
+    }
+
     /// The left camera.
     pub fn left(&self) -> &Pinhole {
         &self.left
@@ -143,7 +168,7 @@ impl StereoRig {
     /// Whether the cameras are identical, without distortion and parallel.
     fn is_parallel(&self) -> bool {
         let turn = crate::so3::angle(&self.right_from_left.rotation());
-        turn < 1e-12 && self.left == self.right && self.left.distortion().shortest().is_empty()
+        turn < 1e-12 && self.left == self.right && self.left.distortion().is_none()
     }
 
     /// The projections of `point` into both cameras, inside the images or not; `None` if one camera cannot see it.

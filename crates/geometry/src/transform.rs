@@ -4,7 +4,10 @@ use std::{fmt, marker::PhantomData, ops::Mul};
 
 use nalgebra::{Isometry3, Matrix3, Matrix4, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::{Frame, Point, so3};
+use crate::{
+    frame::{Frame, Point},
+    so3,
+};
 
 /// A rigid transform: it maps coordinates in frame `B` to coordinates in frame `A`, `p_a = a_from_b * p_b`.
 ///
@@ -245,7 +248,7 @@ impl<A, B> fmt::Debug for Transform<A, B> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Camera, Object};
+    use crate::frame::{Camera, Object};
 
     #[test]
     fn a_transform_prints_its_translation_and_its_rotation_vector() {

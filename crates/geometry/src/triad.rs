@@ -2,7 +2,10 @@
 
 use nalgebra::Matrix3;
 
-use crate::{Frame, Point, Transform};
+use crate::{
+    frame::{Frame, Point},
+    transform::Transform,
+};
 
 /// Three points that define no frame: they are collinear or two of them coincide.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

@@ -3,8 +3,10 @@
 use std::{collections::BTreeMap, path::Path};
 
 use seafix_component::{Fault, line_of};
-use seafix_geometry::{Body, Camera, NotRigid, Pinhole, StereoRig, Transform};
+use seafix_geometry::{BadCamera, Body, Camera, LensModel, NotRigid, Pinhole, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
+
+use crate::units::doubtful_baseline;
 
 /// The supported versions of the format. Data sets are written in the second; those with sensor readings in the third.
 pub const FORMATS: [&str; 3] = ["seafix-dataset/1", "seafix-dataset/1.1", "seafix-dataset/1.2"];
@@ -103,12 +105,58 @@ pub struct CameraNumbers {
     pub cx: f64,
     /// Principal point, row (px).
     pub cy: f64,
-    /// The plumb-bob coefficients k1 k2 p1 p2 k3 k4 k5 k6: 0, 4, 5 or 8 numbers.
+    /// The lens model.
+    #[serde(default, skip_serializing_if = "Model::is_pinhole")]
+    pub model: Model,
+    /// The coefficients, k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 of a pinhole (0, 4, 5, 8 or 12 numbers), k1 k2 k3 k4 of an
+    /// equidistant lens.
     #[serde(default)]
     pub distortion: Vec<f64>,
     /// The port in front of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub port: Option<PortNumbers>,
+}
+
+/// The lens model of a camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Model {
+    /// A perspective lens with Brown–Conrady distortion (`plumb_bob`, `rational_polynomial`).
+    #[default]
+    Pinhole,
+    /// An equidistant lens (Kannala–Brandt, OpenCV's `fisheye`).
+    Equidistant,
+}
+
+impl Model {
+    /// The model of a lens.
+    pub fn of(lens: LensModel) -> Self {
+        match lens {
+            LensModel::Pinhole => Self::Pinhole,
+            LensModel::Equidistant => Self::Equidistant,
+        }
+    }
+
+    fn is_pinhole(&self) -> bool {
+        *self == Self::Pinhole
+    }
+
+    /// The camera of this model.
+    ///
+    /// # Errors
+    /// The invalid number.
+    pub fn camera(
+        self,
+        size: [u32; 2],
+        focal: [f64; 2],
+        principal: [f64; 2],
+        distortion: &[f64],
+    ) -> Result<Pinhole, BadCamera> {
+        match self {
+            Self::Pinhole => Pinhole::new(size, focal, principal, distortion),
+            Self::Equidistant => Pinhole::equidistant(size, focal, principal, distortion),
+        }
+    }
 }
 
 /// The dome or flat port in front of a camera.
@@ -243,7 +291,8 @@ impl CameraNumbers {
     pub fn of(camera: &Pinhole, port: Option<PortNumbers>) -> Self {
         let ([fx, fy], [cx, cy]) = (camera.focal(), camera.principal());
         let distortion = camera.distortion().shortest().to_vec();
-        Self { size: camera.size(), fx, fy, cx, cy, distortion, port }
+        let model = Model::of(camera.distortion().model());
+        Self { size: camera.size(), fx, fy, cx, cy, model, distortion, port }
     }
 }
 
@@ -259,17 +308,21 @@ impl RigNumbers {
     }
 
     /// Builds the rig. An error is the path of the faulty key below `rig` and the message.
-    fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
+    pub(crate) fn build(&self) -> Result<StereoRig, (Vec<&'static str>, String)> {
         let camera = |side: &'static str, c: &CameraNumbers| {
             if let Some(port) = &c.port {
                 port.calibrated_in_water().map_err(|what| (vec![side, "port"], what))?;
             }
-            Pinhole::new(c.size, [c.fx, c.fy], [c.cx, c.cy], &c.distortion)
+            c.model
+                .camera(c.size, [c.fx, c.fy], [c.cx, c.cy], &c.distortion)
                 .map_err(|error| (vec![side], error.to_string()))
         };
         let (left, right) = (camera("left", &self.left)?, camera("right", &self.right)?);
         let right_from_left = Transform::from_rows(&self.right_from_left)
             .map_err(|error| (vec!["right_from_left"], error.to_string()))?;
+        if let Some((what, remedy)) = doubtful_baseline(right_from_left.translation().norm()) {
+            return Err((vec!["right_from_left"], format!("{what}; {remedy}")));
+        }
         StereoRig::new(left, right, right_from_left).map_err(|error| (vec!["right_from_left"], error.to_string()))
     }
 }

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use seafix_component::{Fault, read_text};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 
-use crate::dataset::Description;
+use crate::{
+    calibration::{self, Given},
+    dataset::Description,
+};
 
 /// A stereo rig with its pose in the vehicle and the bit depth of its images.
 #[derive(Debug, Clone)]
@@ -23,13 +26,18 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Reads the `[rig]` table of a data set description (`seafix-dataset/1`): the file, or its folder.
+    /// Reads the `[rig]` table of a data set description (`seafix-dataset/1`), the file or its folder, or the stereo
+    /// calibration of another program ([`calibration`](crate::calibration)).
     ///
     /// # Errors
     /// A file that cannot be read, or its first invalid value.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self, Fault> {
         let path = path.as_ref();
         let file = if path.is_dir() { path.join("dataset.toml") } else { path.to_owned() };
+        if calibration::is_foreign(&file) {
+            let stereo = calibration::read(std::slice::from_ref(&file), Given::default())?.rig;
+            return Ok(Self { file: Some(file), ..Self::from(stereo) });
+        }
         let source = read_text(&file)?;
         let description: Description =
             toml::from_str(&source).map_err(|error| Fault::in_toml(&file, &source, &error))?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::{CameraRecord, FrameRecord, TargetRecord, TrialHeader};
+use crate::record::{CameraRecord, FrameRecord, TargetRecord, TrialHeader};
 
 /// What is wrong with `header`.
 pub(crate) fn header(header: &TrialHeader) -> Result<(), String> {
@@ -11,8 +11,8 @@ pub(crate) fn header(header: &TrialHeader) -> Result<(), String> {
         if *width == 0 || *height == 0 {
             return Err(format!("the {name} camera has a size of {width} x {height} px"));
         }
-        if distortion.len() > 8 {
-            return Err(format!("the {name} camera has {} distortion coefficients; at most 8", distortion.len()));
+        if distortion.len() > 12 {
+            return Err(format!("the {name} camera has {} distortion coefficients; at most 12", distortion.len()));
         }
     }
     let mut ids = BTreeSet::new();

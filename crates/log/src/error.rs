@@ -18,7 +18,7 @@ pub enum LogError {
         remedy: &'static str,
     },
     /// The MCAP library refused to write.
-    #[error("cannot write {}: {message}; the log so far is in that file and is not complete", .path.display())]
+    #[error("cannot write {}: {message}; the log is not complete, run again", .path.display())]
     Write {
         /// The file.
         path: PathBuf,
@@ -63,6 +63,12 @@ pub enum LogError {
         path: PathBuf,
         /// What the reader found, and where.
         what: String,
+    },
+    /// The bytes are not those whose hash the manifest of the run has.
+    #[error("{} is not the file that its run has written: its SHA-256 differs from that in manifest.json; make the run again, or remove the manifest to read the file as it is", .path.display())]
+    Changed {
+        /// The file.
+        path: PathBuf,
     },
     /// Nothing of a damaged file can be saved.
     #[error("no message in it is readable: {}: {what}; copy it again from its source, or run the trial again", .path.display())]

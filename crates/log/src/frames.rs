@@ -5,8 +5,11 @@ use std::path::Path;
 use prost::bytes::Bytes;
 
 use crate::{
-    Entry, FrameRecord, LogError, Recording, TrialHeader, convert,
+    convert,
+    error::LogError,
     read::{Message, Pending, foreign},
+    record::{FrameRecord, TrialHeader},
+    recording::{Entry, Recording},
     topic,
 };
 
@@ -45,7 +48,8 @@ impl Frames {
                 first = index + 1;
             }
         }
-        if first < recording.entries().len() {
+        // The header is repeated at the end.
+        if recording.entries()[first..].iter().any(|entry| name(entry) != topic::HEADER) {
             return Err(LogError::Foreign { path: path.to_owned(), what: "its last frame is not closed".to_owned() });
         }
         Ok(Self { recording, header, frames })

@@ -2,13 +2,20 @@
 
 use std::path::Path;
 
-use crate::{LogError, Reader, Totals, Writer, convert, read::Message, topic};
+use crate::{
+    convert,
+    error::LogError,
+    read::{Message, Reader},
+    record::Totals,
+    topic,
+    write::Writer,
+};
 
 /// Writes the log of a whole trial to `to` from logs of successive frames of it, each with its totals.
 ///
 /// Messages are copied as they are, totals added up part by part, and the header is written once. Nothing but the
 /// rounding of those sums tells where one part ends and the next begins. `go_on` is asked before each part; when it
-/// says no, `false` is returned and `to` + `.partial` is left.
+/// says no, `false` is returned and nothing is left.
 ///
 /// # Errors
 /// [`LogError`]: a part that cannot be read, is damaged or is of another trial, or a log that cannot be written.
@@ -49,10 +56,13 @@ pub fn join_lacking(
             for message in messages {
                 match &message.topic[..] {
                     topic::TOTALS => totals.merge(&convert::totals_record(message.decode(path, "Totals")?)),
-                    // The last of what stands before the first frame.
+                    // The last message before the first frame; a recovered log may lack it.
                     topic::MODEL => begun = true,
-                    _ if !begun => {}
-                    topic => writer.copy(topic, message.log_time, &message.data)?,
+                    topic if !begun && !topic::is_of_frame(topic) => {}
+                    topic => {
+                        begun = true;
+                        writer.copy(topic, message.log_time, &message.data)?;
+                    }
                 }
             }
             Ok(())

@@ -4,7 +4,9 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, Limits};
 
-use crate::GreyImage;
+use seafix_component::decoded;
+
+use crate::record::GreyImage;
 
 /// No image of a log has more pixels than this.
 const LIMIT: u64 = 64 << 20;
@@ -42,6 +44,10 @@ fn encode_grey([width, height]: [u32; 2], depth: BitDepth, filter: Filter, data:
 
 /// The 8-bit grey image in a PNG; its declared size is checked before anything is decoded.
 pub(crate) fn decode(bytes: &[u8]) -> Result<GreyImage, String> {
+    decoded(|| decode_grey(bytes), |message| message)
+}
+
+fn decode_grey(bytes: &[u8]) -> Result<GreyImage, String> {
     let mut decoder =
         Decoder::new_with_limits(Cursor::new(bytes), Limits { bytes: usize::try_from(LIMIT).unwrap_or(usize::MAX) });
     let header = decoder.read_header_info().map_err(|error| error.to_string())?;

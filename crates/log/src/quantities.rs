@@ -4,7 +4,7 @@
 //! `docs/quantities.md` follow from [`QUANTITIES`]. A new quantity is a field of a message in `proto/`, a field of its record
 //! in `record/`, and a line here.
 
-use crate::{FrameRecord, Integrity, NavigationRecord, PointOfInterest, TargetRecord};
+use crate::record::{FrameRecord, Integrity, NavigationRecord, PointOfInterest, TargetRecord};
 
 /// The value of a quantity in one row; `None` where it is unknown.
 #[derive(Debug, Clone, PartialEq)]
@@ -141,6 +141,8 @@ quantities! {
     OUTCOME: Target Text "outcome" "" "/referencing/result" "The outcome: fix, ambiguous, rejected or degenerate." = |r: &TargetRecord| r.outcome.to_string();
     REASON: Target Text "reason" "" "/referencing/result" "The reason of an outcome without a fix, one word." = |r: &TargetRecord| r.reason.clone();
     EXPLANATION: Target Text "explanation" "" "/referencing/result" "The reason in a sentence with its numbers." = |r: &TargetRecord| r.explanation.clone();
+    P_ABSENT: Target Real "p_absent" "" "/referencing/result" "The probability that the object is absent." = |r: &TargetRecord| r.p_absent;
+    P_WRONG: Target Real "p_wrong" "" "/referencing/result" "The probability that the pose is not the object's: absence and other poses together." = |r: &TargetRecord| r.p_wrong;
     WRONG: Target Flag "wrong" "" "/metrics/evaluation" "A fix whose TRE exceeds the alert limit." = |r: &TargetRecord| r.evaluation.wrong;
     WRONG_PAIRS: Target Flag "wrong_pairs" "" "/metrics/evaluation" "A fix that rests on a false pair." = |r: &TargetRecord| r.evaluation.wrong_pairs;
     VISIBLE: Target Integer "visible" "" "/metrics/evaluation" "The number of model points that both cameras truly see." = |r: &TargetRecord| count(r.evaluation.visible);

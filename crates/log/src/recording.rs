@@ -11,7 +11,13 @@ use std::{
 
 use mcap::records::{self, Record};
 
-use crate::{LogError, read::looks_like, recover::chunk, topic};
+use crate::{
+    chunk::{chunk, limit},
+    error::LogError,
+    parse::parse_record,
+    read::looks_like,
+    topic,
+};
 
 /// A channel of a recording: its topic, and what its messages are said to be.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -23,7 +29,7 @@ pub struct Topic {
     /// How the schema is written: `ros2msg`, `ros2idl`, `protobuf`.
     pub schema_encoding: String,
     /// The schema.
-    pub definition: Vec<u8>,
+    pub definition: Arc<[u8]>,
     /// How its messages are written: `cdr`, `protobuf`.
     pub encoding: String,
 }
@@ -86,6 +92,7 @@ impl Recording {
             size,
             wanted,
             schemas: HashMap::new(),
+            declared: 0,
             channels: HashMap::new(),
             topics: Vec::new(),
             entries: Vec::new(),
@@ -200,7 +207,7 @@ fn records_of(
         }
         error => LogError::Damaged { path: path.to_owned(), what: format!("{error}, in the record at byte {offset}") },
     };
-    match mcap::parse_record(head[0], body).map_err(damaged)? {
+    match parse_record(head[0], body).map_err(damaged)? {
         Record::Chunk { .. } => chunk(head, body, size).map_err(damaged),
         record => Ok(vec![record.into_owned()]),
     }
@@ -211,7 +218,9 @@ struct Walk<'a, W> {
     path: &'a Path,
     size: u64,
     wanted: W,
-    schemas: HashMap<u16, (records::SchemaHeader, Vec<u8>)>,
+    schemas: HashMap<u16, (records::SchemaHeader, Arc<[u8]>)>,
+    /// The size of all schemas and topics (bytes).
+    declared: usize,
     /// Index of a channel's topic, and whether its messages are wanted.
     channels: HashMap<u16, (usize, bool)>,
     topics: Vec<Topic>,
@@ -240,7 +249,7 @@ impl<W: Fn(&Topic) -> bool> Walk<'_, W> {
                 self.is_protected |= end.data_section_crc != 0;
                 return self.to_the_footer(input, at + 9 + body.len() as u64);
             }
-            match mcap::parse_record(head[0], &body) {
+            match parse_record(head[0], &body) {
                 Ok(Record::Chunk { header, .. }) => self.is_protected &= header.uncompressed_crc != 0,
                 Ok(Record::Message { .. }) => self.is_protected = false,
                 _ => {}
@@ -301,10 +310,21 @@ impl<W: Fn(&Topic) -> bool> Walk<'_, W> {
         }
     }
 
+    /// Counts the bytes of a declaration.
+    fn declare(&mut self, bytes: usize) -> Result<(), LogError> {
+        self.declared += bytes;
+        if self.declared > limit(self.size) {
+            let what = format!("its schemas and topics have more than {} bytes", self.declared);
+            return Err(LogError::TooLarge { path: self.path.to_owned(), what });
+        }
+        Ok(())
+    }
+
     fn take(&mut self, record: Record<'_>, offset: u64, place: u32) -> Result<(), LogError> {
         match record {
             Record::Schema { header, data } => {
-                self.schemas.insert(header.id, (header, data.into_owned()));
+                self.declare(data.len())?;
+                self.schemas.insert(header.id, (header, data.into()));
             }
             Record::Channel(channel) => {
                 let schema = self.schemas.get(&channel.schema_id);
@@ -312,9 +332,10 @@ impl<W: Fn(&Topic) -> bool> Walk<'_, W> {
                     name: channel.topic,
                     schema: schema.map_or_else(String::new, |(header, _)| header.name.clone()),
                     schema_encoding: schema.map_or_else(String::new, |(header, _)| header.encoding.clone()),
-                    definition: schema.map_or_else(Vec::new, |(_, definition)| definition.clone()),
+                    definition: schema.map_or_else(|| [].into(), |(_, definition)| Arc::clone(definition)),
                     encoding: channel.message_encoding,
                 };
+                self.declare(topic.name.len())?;
                 // Writers may declare a channel again in every chunk.
                 let (index, wanted) = (self.topics.len(), (self.wanted)(&topic));
                 if let hash_map::Entry::Vacant(place) = self.channels.entry(channel.id) {

@@ -111,6 +111,11 @@ pub(crate) const OF_FRAMES: [(&str, SchemaOf); 18] = [
     (FRAME, proto::Frame::schema),
 ];
 
+/// Whether only frames have messages on this topic; the transforms are also among the records before the first frame.
+pub(crate) fn is_of_frame(topic: &str) -> bool {
+    topic != TF && OF_FRAMES.iter().any(|(name, _)| *name == topic)
+}
+
 /// The metadata record of a log that was saved of one that was not whole.
 pub(crate) const RECOVERED: &str = "recovered";
 

@@ -3,8 +3,9 @@
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 
 use crate::{
-    ConsiderStates, RelativeMotion,
+    consider_states::ConsiderStates,
     correlated_error::{CorrelatedSensitivities, carried},
+    odometry_trajectory::RelativeMotion,
 };
 
 /// The camera's pose relative to an object, with its covariance.

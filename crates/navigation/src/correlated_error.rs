@@ -3,7 +3,7 @@
 use nalgebra::{Matrix6, SMatrix, SVector, Vector4};
 use seafix_geometry::{Camera, Covariance6, Transform};
 
-use crate::RelativeMotion;
+use crate::odometry_trajectory::RelativeMotion;
 
 /// The maximum number of correlated errors.
 pub(crate) const CORRELATED: usize = 10;

@@ -39,6 +39,7 @@ mod fusion;
 mod icp;
 mod navigated;
 mod navigator;
+mod odometries;
 mod odometry;
 mod odometry_trajectory;
 mod policy;
@@ -56,7 +57,8 @@ pub use fusion::{Contradiction, FUSIONS, Fuse, Fusion, Intersect, Replace};
 pub use icp::{Distance, Icp};
 pub use navigated::{Navigated, ObjectPlacement};
 pub use navigator::{Displacement, Event, Navigator, State, StateChange};
-pub use odometry::{NotAfter, ODOMETRIES, Odometry, OdometrySession, StereoPair};
+pub use odometries::ODOMETRIES;
+pub use odometry::{NotAfter, Odometry, OdometrySession, RangeOffset, StereoPair};
 pub use odometry_trajectory::{Lost, OdometryOutcome, OdometryTrajectory, RelativeMotion, Segment, Side, Waypoint};
 pub use policy::{EveryFrame, InView, Interval, POLICIES, Policy, ProtectionLevel, Situation, Travelled};
 pub use pose_graph::{

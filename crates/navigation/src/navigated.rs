@@ -2,7 +2,11 @@
 
 use seafix_geometry::{Covariance6, Object, Transform, World};
 
-use crate::{ConsiderStates, ObjectPose, RelativeMotion, by_world};
+use crate::{
+    chain::{ObjectPose, by_world},
+    consider_states::ConsiderStates,
+    odometry_trajectory::RelativeMotion,
+};
 
 /// The camera's pose relative to one object of the site.
 ///

@@ -5,8 +5,9 @@ use std::fmt;
 use seafix_geometry::{Covariance6, Object, Transform, so3};
 
 use crate::{
-    Navigated, ObjectPlacement, RelativeMotion,
     fusion::{Contradiction, Fusion},
+    navigated::{Navigated, ObjectPlacement},
+    odometry_trajectory::RelativeMotion,
     policy::{Policy, Situation},
 };
 

@@ -1,10 +1,12 @@
 //! The interface of all odometries.
 
-use seafix_component::{Registry, entry};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_vision::{Image, Threads};
 
-use crate::{DvlGyro, Icp, OdometryOutcome, OdometryTrajectory, Reading, Stereo, Waypoint};
+use crate::{
+    odometry_trajectory::{OdometryOutcome, OdometryTrajectory, Waypoint},
+    reading::Reading,
+};
 
 /// The two images of one instant.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +29,22 @@ pub struct NotAfter {
     pub stamp_ns: u64,
     /// The previous stamp (ns).
     pub before_ns: u64,
+}
+
+/// A constant error of a rig's disparities, as motion reveals it.
+///
+/// It displaces every point by z² δ/(f b) along its depth z. Causes are a principal point or a rotation of a camera
+/// about its vertical axis that changed since the calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RangeOffset {
+    /// The offset δ of the given rig (px): [`StereoRig::with_range_offset`] with this value corrects it.
+    pub pixels: f64,
+    /// Its standard deviation (px).
+    pub sigma: f64,
+    /// The number of windows of key frames that determine it.
+    pub windows: usize,
+    /// Whether the session has corrected it.
+    pub corrected: bool,
 }
 
 /// The last stamp of a sequence, to check that stamps increase.
@@ -88,8 +106,9 @@ pub trait OdometrySession: Send {
 
     /// The trajectory up to now; later pairs may still refine poses and outcomes.
     fn trajectory(&self) -> OdometryTrajectory;
-}
 
-/// All odometries.
-pub static ODOMETRIES: Registry<dyn Odometry> =
-    Registry::new("odometry", &[entry!(DvlGyro), entry!(Icp), entry!(Stereo)]);
+    /// The error of the rig's disparities that the motion reveals; `None` if it reveals none.
+    fn range_offset(&self) -> Option<RangeOffset> {
+        None
+    }
+}

@@ -2,7 +2,7 @@
 
 use seafix_geometry::{Camera, Covariance6, Transform, World};
 
-use crate::{CorrelatedError, Device};
+use crate::{correlated_error::CorrelatedError, reading::Device};
 
 /// The result of an odometry.
 #[derive(Debug, Clone, Default)]

@@ -2,7 +2,7 @@
 
 use seafix_vision::Image;
 
-use crate::{Lost, Side};
+use crate::odometry_trajectory::{Lost, Side};
 
 /// Minimum standard deviation of the brightness (grey levels); below it an image holds only noise and rounding.
 const MIN_VARIATION: f64 = 1.0;

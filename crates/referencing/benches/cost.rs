@@ -25,7 +25,7 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 
 fn main() {
     let rig = rig();
-    let data = Observations { points: points(&rig, 13), rig: Some(&rig) };
+    let data = Observations { points: points(&rig, 13), edges: Vec::new(), rig: Some(&rig) };
     let choices = choices();
     let solvers: Vec<_> = choices.iter().map(|(_, choice)| SOLVERS.build(choice).expect("in range")).collect();
     // The child process under valgrind: `calls` calls of one solver.

@@ -12,7 +12,7 @@ use seafix_referencing::{Observations, SOLVERS};
 
 fn solvers(criterion: &mut Criterion) {
     let rig = rig();
-    let data = Observations { points: points(&rig, 13), rig: Some(&rig) };
+    let data = Observations { points: points(&rig, 13), edges: Vec::new(), rig: Some(&rig) };
     let mut group = criterion.benchmark_group("solver");
     for (name, choice) in choices() {
         let solver = SOLVERS.build(&choice).expect("the settings are in range");

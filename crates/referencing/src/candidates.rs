@@ -1,22 +1,21 @@
 //! Stage 1: the cloud points that the prior allows for each model point.
 
-use std::{cell::RefCell, collections::VecDeque};
-
 use nalgebra::Matrix3;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::{Camera, MeasuredPoint, Point};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
-    ModelPoint, Prior, PriorBound,
+    chi_square::chi_square,
     lanes::{LANES, ones_of, packed},
+    problem::{Prior, PriorBound},
+    site::model::ModelPoint,
 };
 
 /// The gate about the predicted position of a model point under a Gaussian prior.
 ///
 /// It is written in TOML as `gate = { chi-square = 0.99 }` or `gate = { box = 0.25 }`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gate {
     /// The paper's shell: a box of this half-size (m) along the camera's axes.
@@ -200,26 +199,6 @@ impl Ellipsoid {
     }
 }
 
-/// The quantile of χ² with `dof` degrees of freedom.
-///
-/// Bisection computes it, and few arguments recur: each thread caches the last ones.
-pub(crate) fn chi_square(dof: usize, confidence: f64) -> f64 {
-    const REMEMBERED: usize = 64;
-    thread_local! {
-        static KNOWN: RefCell<VecDeque<(usize, f64, f64)>> = const { RefCell::new(VecDeque::new()) };
-    }
-    let same = |&&(n, c, _): &&(usize, f64, f64)| n == dof && c == confidence;
-    if let Some((_, _, known)) = KNOWN.with_borrow(|known| known.iter().find(same).copied()) {
-        return known;
-    }
-    let quantile = ChiSquared::new(dof as f64).expect("degrees of freedom are positive").inverse_cdf(confidence);
-    KNOWN.with_borrow_mut(|known| {
-        known.truncate(REMEMBERED - 1);
-        known.push_front((dof, confidence, quantile));
-    });
-    quantile
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,8 +279,9 @@ mod tests {
 
     #[test]
     fn a_gate_is_written_in_toml() {
-        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Debug, PartialEq, Serialize, Deserialize, Settings)]
         struct Stage {
+            /// The gate.
             gate: Gate,
         }
         let read: Stage = toml::from_str("gate = { chi-square = 0.95 }").unwrap();

@@ -43,6 +43,7 @@
 //!     candidates: &candidates,
 //!     tolerance: Tolerance::Sigmas(4.0),
 //!     prior: None,
+//!     edges: Default::default(),
 //! };
 //! let (search, solver, acceptance) = (MaximumClique::default(), Kabsch::default(), Acceptance::default());
 //! let mut rng = ChaCha8Rng::seed_from_u64(0);
@@ -54,7 +55,11 @@
 
 mod a_contrario;
 mod accept;
+mod alternative;
 mod candidates;
+mod chi_square;
+mod edge_candidates;
+mod edge_coherence;
 mod joint;
 mod lanes;
 mod observations;
@@ -64,24 +69,29 @@ pub mod problem_file;
 mod search;
 mod site;
 mod solve;
+mod space_line;
 
 pub use a_contrario::{expected_sets_as_good, nfa};
 pub use accept::{
-    Acceptance, Alternative, Attempt, Fix, Integrity, Outcome, Protection, Redundancy, RejectionReason, compute_fix,
-    judge, judge_labelled, rms_apart, search_with_expanding_gates, wider,
+    Acceptance, Alternative, Attempt, BestPose, Consistency, Fix, Integrity, MaxPWrong, Outcome, Protection,
+    Redundancy, RejectionReason, compute_fix, judge, judge_labelled, rms_apart, search_with_expanding_gates, wider,
 };
 pub use candidates::{Candidates, Gate, candidates};
+pub use edge_candidates::edge_candidates;
 pub use joint::{
     Gathered, JointFix, JointFixes, Member, ObjectObservations, Placement, RelativePose, Unadded, Unjoined, gather,
     joint_fix, joint_fixes,
 };
-pub use observations::{Observation, Observations};
-pub use problem::{Correspondence, Prior, PriorBound, Problem, Tolerance};
+pub use observations::{EdgeObservation, Observation, Observations};
+pub use problem::{Correspondence, Edges, Prior, PriorBound, Problem, Tolerance};
 pub use search::{
-    Explanation, Identification, MaximumClique, Posterior, PosteriorProbabilities, Rejected, RepeatedPattern,
-    RigidConsensus, SEARCHES, Samples, Search, StructuralCoherence, StructuredClutter,
+    Explanation, Identification, MaximumClique, Posterior, PosteriorProbabilities, Rejected, RigidConsensus, SEARCHES,
+    Samples, Search, StructuralCoherence, StructuredClutter,
 };
-pub use site::{BoundingBox, Congruence, Interest, ModelPoint, NoWorld, Site, SiteObject, Target, TargetKind};
+pub use site::{
+    BoundingBox, Congruence, End, Interest, ModelEdge, ModelPoint, NoWorld, Site, SiteObject, Target, TargetKind,
+    site_settings,
+};
 pub use solve::{
     AlternativePose, Choose, Degenerate, Kabsch, Mahalanobis, SOLVERS, ScaleError, Solver, StereoReprojection, Triad,
 };

@@ -1,9 +1,14 @@
 //! The input of a solver.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_geometry::{Camera, MeasuredPoint, Object, Point, StereoRig, Transform, UncertainPixels, UncertainPoint};
+use seafix_geometry::{
+    Camera, MeasuredLine, MeasuredPoint, Object, Point, StereoRig, Transform, UncertainPixels, UncertainPoint,
+};
 
-use crate::{Correspondence, ModelPoint};
+use crate::{
+    problem::Correspondence,
+    site::{edge::ModelEdge, model::ModelPoint},
+};
 
 /// An identified point: its measurement and its model coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,11 +56,33 @@ impl Observation {
     }
 }
 
-/// The identified points of one target, with the stereo rig if there is one.
+/// An identified edge: its measurement and its model ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeObservation {
+    /// The measured line, camera frame.
+    pub measured: MeasuredLine,
+    /// The ends of the model edge, object frame.
+    pub model: [Point<Object>; 2],
+    /// The standard deviation of each coordinate of both ends (m); ends and points at one place share one error.
+    pub model_sigmas: [f64; 2],
+}
+
+impl EdgeObservation {
+    /// Whether every coordinate and standard deviation is finite.
+    pub fn is_finite(&self) -> bool {
+        let ends = self.measured.ends.iter().flat_map(|end| end.coords.iter());
+        let model = self.model.iter().flat_map(|end| end.coords.iter());
+        ends.chain(model).chain(&self.model_sigmas).all(|x| x.is_finite())
+    }
+}
+
+/// The identified points and edges of one target, with the stereo rig if there is one.
 #[derive(Debug, Clone)]
 pub struct Observations<'a> {
     /// The points, in the order of the model.
     pub points: Vec<Observation>,
+    /// The edges, in the order of the model.
+    pub edges: Vec<EdgeObservation>,
     /// The stereo rig.
     pub rig: Option<&'a StereoRig>,
 }
@@ -76,7 +103,28 @@ impl<'a> Observations<'a> {
             let (known, seen) = (&model[pair.model], &cloud[pair.cloud]);
             Observation { measured: seen.position, pixels: seen.pixels, model: known.at, model_sigma: known.sigma }
         });
-        Self { points: points.collect(), rig }
+        Self { points: points.collect(), edges: Vec::new(), rig }
+    }
+
+    /// The observations with these identified edges in addition; a pair is (model edge, measured line).
+    ///
+    /// # Panics
+    ///
+    /// If an index of a pair is out of range.
+    #[must_use]
+    pub fn with_edges(
+        mut self,
+        pairs: &[Correspondence],
+        edges: &[ModelEdge],
+        model: &[ModelPoint],
+        lines: &[MeasuredLine],
+    ) -> Self {
+        self.edges.extend(pairs.iter().map(|pair| EdgeObservation {
+            measured: lines[pair.cloud],
+            model: edges[pair.model].places(model),
+            model_sigmas: edges[pair.model].sigmas(model),
+        }));
+        self
     }
 
     /// The residual C·H − P of each point (m).

@@ -4,7 +4,11 @@ use std::cmp::Ordering;
 
 use nalgebra::Vector3;
 
-use crate::{Correspondence, Problem, search::NEEDED, site::diameter};
+use crate::{
+    problem::{Correspondence, Problem},
+    search::limits::NEEDED,
+    site::target::diameter,
+};
 
 /// Groups of candidates that no set of the object can span, each with its clutter density.
 ///

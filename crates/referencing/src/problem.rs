@@ -1,11 +1,16 @@
 //! The input of a search.
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
-use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Transform};
+use seafix_component::{Settings, in_range};
+use seafix_geometry::{Camera, Covariance6, MeasuredLine, MeasuredPoint, Object, Transform};
 use serde::{Deserialize, Serialize};
 
-use crate::{Candidates, ModelPoint};
+use crate::{
+    candidates::Candidates,
+    edge_coherence::{edges_agree, point_agrees},
+    site::{edge::ModelEdge, model::ModelPoint},
+    space_line::SpaceLine,
+};
 
 /// The prior: the camera's pose before the fix, with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,13 +36,13 @@ pub enum PriorBound {
 /// The tolerance of structural coherence: the largest difference of two distances in model and cloud.
 ///
 /// It is written in TOML as `tolerance = { sigmas = 3.0 }` or `tolerance = { fixed = 0.05 }`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Tolerance {
-    /// The paper's Δ (m), equal for all pairs.
+    /// The paper's Δ (m), equal for all pairs; for comparison with its results.
     Fixed(f64),
-    /// Δ_ij = k·√(nᵀ(Σ_i + Σ_j)n + σ_i² + σ_j²): k standard deviations of the distance, with its direction n in the
-    /// cloud and the model's σ.
+    /// A multiple k of the distance's standard deviation: Δ_ij = k·√(nᵀ(Σ_i + Σ_j)n + σ_i² + σ_j²), with the direction n
+    /// of the distance in the cloud and the model's σ.
     Sigmas(f64),
 }
 
@@ -67,7 +72,25 @@ pub struct Correspondence {
     pub cloud: usize,
 }
 
-/// The input of one search: model, cloud, candidates, tolerance and prior.
+/// The edges of a problem: those of the model, the measured lines, and the candidates; empty without edges.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Edges<'a> {
+    /// The edges of the target; their ends index the problem's model points.
+    pub model: &'a [ModelEdge],
+    /// The measured lines.
+    pub lines: &'a [MeasuredLine],
+    /// For each model edge, the lines that may correspond to it, ascending; empty for an edge out of view.
+    pub candidates: &'a [Vec<usize>],
+}
+
+impl Edges<'_> {
+    /// The number of model edges with a candidate.
+    pub fn with_candidates(&self) -> usize {
+        self.candidates.iter().filter(|list| !list.is_empty()).count()
+    }
+}
+
+/// The input of one search: model, cloud, candidates, tolerance, prior and edges.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
     /// The feature points of the target.
@@ -80,6 +103,8 @@ pub struct Problem<'a> {
     pub tolerance: Tolerance,
     /// The prior, if one is known; it bounds the complete pose as well as the candidates.
     pub prior: Option<&'a Prior>,
+    /// The edges.
+    pub edges: Edges<'a>,
 }
 
 impl Problem<'_> {
@@ -114,6 +139,33 @@ impl Problem<'_> {
     /// distances in model and cloud of at most Δ (closed).
     pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {
         a.model != b.model && a.cloud != b.cloud && self.agrees(a, b, self.measured(a.cloud, b.cloud))
+    }
+
+    /// Structural coherence of two pairs of edges: different edges and lines, whose angle and shortest distance agree.
+    pub fn coherent_edges(&self, a: Correspondence, b: Correspondence) -> bool {
+        let ends = |pair: Correspondence| self.edges.model[pair.model].places(self.model).map(|end| end.coords);
+        let line = |pair: Correspondence| SpaceLine::of(&self.edges.lines[pair.cloud]);
+        let (Some(one), Some(other)) = (line(a), line(b)) else { return false };
+        a.model != b.model
+            && a.cloud != b.cloud
+            && edges_agree([&ends(a), &ends(b)], [&one, &other], self.sigmas()).is_some()
+    }
+
+    /// Structural coherence of a pair of points and a pair of edges: the distance of the point from the line agrees.
+    pub fn coherent_point_edge(&self, point: Correspondence, edge: Correspondence) -> bool {
+        let Some(line) = SpaceLine::of(&self.edges.lines[edge.cloud]) else { return false };
+        let ends = self.edges.model[edge.model].places(self.model).map(|end| end.coords);
+        let seen = &self.cloud[point.cloud].position;
+        let model = (&self.model[point.model].at.coords, &ends);
+        point_agrees(model, (&seen.at.coords, &seen.covariance), &line, self.sigmas())
+    }
+
+    /// The number of standard deviations of the tolerance; three for a fixed one.
+    fn sigmas(&self) -> f64 {
+        match self.tolerance {
+            Tolerance::Sigmas(sigmas) => sigmas,
+            Tolerance::Fixed(_) => 3.0,
+        }
     }
 
     /// The distance test of structural coherence, for different points with a known measured distance (m).

@@ -14,7 +14,7 @@ use crate::{
     run::{Run, Trial},
     summary::RunSummary,
     terminal::wrapped,
-    write::write,
+    write::{claim, write},
 };
 
 /// The result of a comparison of runs.
@@ -73,11 +73,8 @@ pub fn compare(
     let comparisons = paired::comparisons(&run, &summary);
     let page = out.map(|folder| {
         let document = content::document(&run, &summary, false)?;
-        write(
-            folder,
-            "compare.html",
-            print::html(&document, Forms { latex: false, pdf: false, ..Forms::ALL }).as_bytes(),
-        )
+        claim(folder, "comparison", PAGE)?;
+        write(folder, PAGE, print::html(&document, Forms { latex: false, pdf: false, ..Forms::ALL }).as_bytes())
     });
     Ok(Compared {
         table: {
@@ -91,6 +88,9 @@ pub fn compare(
         differ: comparisons.iter().any(|comparison| comparison.better().is_some()),
     })
 }
+
+/// The file name of the page.
+const PAGE: &str = "compare.html";
 
 /// The names of the folders, or their paths if two names are equal.
 fn names(folders: &[PathBuf]) -> Vec<String> {
@@ -140,8 +140,9 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
     both("cameras", |trial| {
         let rig = &trial.header.rig;
         let side = |camera: &seafix_log::CameraRecord| {
+            let lens = if camera.equidistant { "equidistant " } else { "" };
             format!(
-                "{} × {} px, f = {} px, {:?}",
+                "{} × {} px, f = {} px, {lens}{:?}",
                 camera.size[0], camera.size[1], camera.matrix[0][0], camera.distortion
             )
         };

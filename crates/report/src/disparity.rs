@@ -56,5 +56,6 @@ fn rig(record: &RigRecord) -> Option<StereoRig> {
 
 fn camera(record: &CameraRecord) -> Option<Pinhole> {
     let k = record.matrix;
-    Pinhole::new(record.size, [k[0][0], k[1][1]], [k[0][2], k[1][2]], &record.distortion).ok()
+    let new = if record.equidistant { Pinhole::equidistant } else { Pinhole::new };
+    new(record.size, [k[0][0], k[1][1]], [k[0][2], k[1][2]], &record.distortion).ok()
 }

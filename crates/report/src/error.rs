@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use seafix_component::Fault;
 use seafix_log::LogError;
 
 /// The reason why a report, a summary or a comparison cannot be made.
@@ -21,13 +22,16 @@ pub enum ReportError {
         known: &'static str,
     },
     /// The output folder has other files and no report.
-    #[error("cannot write a report to {}: it holds `{other}` and no report; choose a new folder, or empty this one", .folder.display())]
+    #[error("cannot write a report to {}: it holds `{other}`, which no report here has written; choose a new folder, or move it away", .folder.display())]
     Foreign {
         /// The output folder.
         folder: PathBuf,
         /// The name of the first file or folder in it.
         other: String,
     },
+    /// An output folder that cannot be used.
+    #[error(transparent)]
+    Folder(#[from] Fault),
     /// A log of a finished run is missing.
     #[error("cannot report the run of {}: its log {log} is missing, and the report would lack a trial; restore the log, or run the experiment again", .path.display())]
     Gone {

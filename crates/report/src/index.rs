@@ -5,19 +5,38 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{content, error::ReportError, print, run::Run, summary::RunSummary, write::write};
+use crate::{
+    content,
+    error::ReportError,
+    print,
+    run::Run,
+    summary::RunSummary,
+    write::{claim, write},
+};
 
 /// The file name of the page.
 const NAME: &str = "README.md";
 
+/// The kind of the folder of several reports.
+const KIND: &str = "reports";
+
+/// Claims `folder` for the page of all reports, before anything is written into it.
+///
+/// # Errors
+/// [`ReportError`] when the folder is not empty and has no marker, or cannot be written.
+pub fn claim_index(folder: &Path) -> Result<(), ReportError> {
+    claim(folder, KIND, NAME)
+}
+
 /// Writes the page `README.md` with the findings of all reports into `folder`.
 ///
 /// It states the version of the program and lists the findings in the given order. The reports must be in subfolders of
-/// `folder` already.
+/// `folder` already, which [`claim_index`] has claimed.
 ///
 /// # Errors
-/// [`ReportError`] when the file cannot be written.
+/// [`ReportError`] when the folder is not claimed, or the file cannot be written.
 pub fn index<'a>(findings: impl IntoIterator<Item = &'a str>, folder: &Path) -> Result<PathBuf, ReportError> {
+    claim_index(folder)?;
     write(folder, NAME, text(findings).as_bytes())
 }
 

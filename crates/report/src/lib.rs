@@ -6,6 +6,24 @@
 //! has a key that identifies its source in the logs; [`verify`] computes each number again from its key.
 //!
 //! The content of a report (module `content`) is a data structure (`document`) that printers (`print`) render.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), seafix_report::ReportError> {
+//! let run = std::path::Path::new("runs/virtual-direct"); // written by `seafix run`
+//! let summary = seafix_report::summary(run)?;
+//! for row in &summary.rows {
+//!     println!("{}: {} fixes of {} attempts, {} wrong", row.trial, row.found + row.wrong, row.attempted, row.wrong);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! A folder without logs is an error with its path:
+//!
+//! ```
+//! let error = seafix_report::summary("no-such-run".as_ref()).unwrap_err();
+//! assert!(error.to_string().contains("no-such-run"));
+//! ```
 
 mod compare;
 mod content;
@@ -23,11 +41,11 @@ mod lever;
 mod navigation_quantity;
 mod number;
 mod paired;
-mod paper;
 mod place;
 mod points_of_interest;
 mod print;
 mod proportion;
+mod published;
 mod run;
 mod summary;
 mod terminal;
@@ -37,8 +55,7 @@ mod write;
 pub use compare::{Compared, compare};
 pub use error::ReportError;
 pub use forms::Forms;
-pub use index::{index, index_holds};
-pub use paper::PAPER_FIT_RMS;
+pub use index::{claim_index, index, index_holds};
 pub use summary::{Distribution, Limits, Row, RunSummary, StageTimeSummary};
 pub use verify::{Mismatch, Verified, verify};
 pub use write::{Report, report};

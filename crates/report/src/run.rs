@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use seafix_evaluation::lever_arm_error;
 use seafix_log::{
     ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader,
+    unchanged,
 };
 
 use crate::{
@@ -116,8 +117,15 @@ pub(crate) struct AttemptRow {
 }
 
 impl Run {
-    /// Reads every `*.mcap` in `folder`.
+    /// Reads every `*.mcap` in `folder`, and checks it against the manifest.
     pub(crate) fn read(folder: &Path) -> Result<Self, ReportError> {
+        let run = Self::read_as_it_is(folder)?;
+        run.trials.par_iter().try_for_each(|trial| unchanged(&trial.path))?;
+        Ok(run)
+    }
+
+    /// Reads every `*.mcap` in `folder`, changed or not.
+    pub(crate) fn read_as_it_is(folder: &Path) -> Result<Self, ReportError> {
         let io = |source| ReportError::Io { doing: "read", path: folder.to_owned(), source };
         if folder.is_file() {
             return Err(ReportError::NoLogs(folder.to_owned()));

@@ -9,6 +9,7 @@ use seafix_log::{Axis, Outcome, Region, SharedStages, Totals};
 use crate::{
     field::Field,
     format, paired,
+    published::Published,
     run::{AttemptRow, Run, Trial},
 };
 
@@ -19,6 +20,8 @@ pub struct RunSummary {
     pub run: String,
     /// The question of the experiment.
     pub question: String,
+    /// The sentences on published figures that the experiment states for comparison.
+    pub published: Vec<String>,
     /// The results of the trials, sorted by trial name.
     pub rows: Vec<Row>,
     /// The sentences on logs that were recovered from incomplete ones.
@@ -205,6 +208,7 @@ impl RunSummary {
         Self {
             run: header.run.clone(),
             question: header.question.clone(),
+            published: Published::of(run).iter().map(Published::sentence).collect(),
             rows: run.trials.par_iter().map(Row::of).collect(),
             lacking: run.trials.iter().filter_map(Trial::lacking).collect(),
         }

@@ -4,7 +4,6 @@ use std::fmt;
 
 use crate::{
     format,
-    paper::PAPER_FIT_RMS,
     summary::{Distribution, Row, RunSummary},
 };
 
@@ -65,15 +64,6 @@ impl fmt::Display for RunSummary {
             let total = format::number(row.times.total_ms, 1);
             results.row(names[index].iter().cloned().chain(counts).chain(errors).chain(timed.then_some(total)));
         }
-        let paper = format!("{:.0}–{:.0}", PAPER_FIT_RMS[0] * 1e3, PAPER_FIT_RMS[1] * 1e3);
-        let blank = |n| std::iter::repeat_n(String::new(), n);
-        results.row(
-            ["the paper".to_owned()]
-                .into_iter()
-                .chain(blank(heads.len() + 4))
-                .chain([paper])
-                .chain(blank(3 + usize::from(timed))),
-        );
         results.write(f)?;
         let max = f.width();
         let message = |text: &str| wrapped(text, max, 0);
@@ -81,6 +71,9 @@ impl fmt::Display for RunSummary {
             "frames: with a fix/all; n: attempts; medians over the fixes of fit RMS (the paper’s measure), target registration error (TRE), camera position error and attitude error.",
         );
         writeln!(f, "{note}")?;
+        for sentence in &self.published {
+            writeln!(f, "{}", message(sentence))?;
+        }
 
         if self.rows.iter().any(|row| row.limits.is_some()) {
             writeln!(f)?;

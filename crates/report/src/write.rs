@@ -6,6 +6,7 @@ use std::{
 };
 
 use rayon::prelude::*;
+use seafix_component::{MARKER, Marker, Ownership, PartialFile, create_real_folder};
 
 use crate::{
     content,
@@ -41,25 +42,18 @@ pub(crate) type File = (String, Vec<u8>);
 /// Writes the report on the logs in `run_dir` to `folder`.
 ///
 /// The files are the report in the selected forms, `figures/` as SVG and PDF, `tables/` as CSV and JSON with every
-/// plotted number, pictures as JPEG, `run.bib`, and the table for the terminal as `summary.txt`. Stale files of an
-/// earlier report are removed from `figures/` and `tables/`.
+/// plotted number, pictures as JPEG, `run.bib`, and the table for the terminal as `summary.txt`. The marker
+/// `.seafix-run` lists them; files that the marker of an earlier report lists are replaced or removed.
 ///
 /// # Errors
-/// [`ReportError`] when the run has no log, a log cannot be read, the folder holds other files and no report, or a file
-/// cannot be written.
+/// [`ReportError`] when the run has no log, a log cannot be read, the folder is not empty and has no marker of a report,
+/// or a file cannot be written.
 pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, ReportError> {
     let run = Run::read(run_dir)?;
-    if let Some(other) = foreign(folder) {
-        return Err(ReportError::Foreign { folder: folder.to_owned(), other });
-    }
+    let earlier = earlier(folder)?;
     let summary = RunSummary::of(&run);
     let files = files(&run, &summary, forms)?;
-    for path in strays(folder, &files) {
-        fs::remove_file(&path).map_err(|source| ReportError::Io { doing: "write", path, source })?;
-    }
-    for (name, bytes) in &files {
-        write(folder, name, bytes)?;
-    }
+    replace(folder, earlier, &run.header().run, &files)?;
     let page = files.iter().map(|(name, _)| name).find(|name| name.starts_with("report."));
     let page = page.map_or_else(|| folder.to_owned(), |name| folder.join(name));
     let findings = index::section(&run, &summary, folder);
@@ -135,32 +129,51 @@ fn figures(document: &Document) -> Vec<File> {
     figures.par_iter().flat_map_iter(figure).chain(tables.par_iter().flat_map_iter(table)).collect()
 }
 
-/// The stale files of an earlier report in `folder`, which are not in `files`.
-///
-/// Only `figures/` and `tables/` are searched.
-pub(crate) fn strays(folder: &Path, files: &[File]) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for part in ["figures", "tables"] {
-        let Ok(entries) = fs::read_dir(folder.join(part)) else { continue };
-        for entry in entries.flatten() {
-            let name = format!("{part}/{}", entry.file_name().to_string_lossy());
-            let ours = [".svg", ".pdf", ".csv", ".json", ".partial"].iter().any(|end| name.ends_with(end));
-            if ours && !files.iter().any(|(known, _)| *known == name) {
-                found.push(entry.path());
-            }
-        }
+/// The kind of a report's folder.
+const KIND: &str = "report";
+
+/// The marker of the earlier report in `folder`, if there is one.
+fn earlier(folder: &Path) -> Result<Option<Marker>, ReportError> {
+    match Ownership::of(folder, KIND)? {
+        Ownership::Free => Ok(None),
+        Ownership::Ours(marker) => Ok(Some(marker)),
+        Ownership::Foreign(other) => Err(ReportError::Foreign { folder: folder.to_owned(), other }),
     }
-    found.sort();
-    found
 }
 
-/// The first entry of a folder that has other files and no report.
-fn foreign(folder: &Path) -> Option<String> {
-    let names = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.file_name());
-    let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
-    names.sort();
-    let report = |name: &String| PAPERS.iter().any(|paper| name.strip_suffix(".partial").unwrap_or(name) == *paper);
-    if names.iter().any(report) { None } else { names.into_iter().next() }
+/// Claims `folder` for one file of our own, before anything is written into it.
+pub(crate) fn claim(folder: &Path, kind: &str, name: &str) -> Result<(), ReportError> {
+    let io = |source| ReportError::Io { doing: "write", path: folder.join(MARKER), source };
+    match Ownership::of(folder, kind)? {
+        Ownership::Ours(_) => Ok(()),
+        Ownership::Free => {
+            let marker = Marker::new(kind, "", [name.to_owned()]);
+            fs::create_dir_all(folder).and_then(|()| marker.write(folder)).map_err(io)
+        }
+        Ownership::Foreign(other) => Err(ReportError::Foreign { folder: folder.to_owned(), other }),
+    }
+}
+
+/// Writes the files of a report, and removes those of an earlier one.
+fn replace(folder: &Path, earlier: Option<Marker>, identity: &str, files: &[File]) -> Result<(), ReportError> {
+    let marker = Marker::new(KIND, identity, files.iter().map(|(name, _)| name.clone()));
+    let earlier = earlier.unwrap_or_else(|| Marker::new(KIND, identity, []));
+    if let Some((name, _)) = files.iter().find(|(name, _)| !earlier.owns(name) && folder.join(name).exists()) {
+        return Err(ReportError::Foreign { folder: folder.to_owned(), other: name.clone() });
+    }
+    let mark = |marker: &Marker| {
+        let io = |source| ReportError::Io { doing: "write", path: folder.join(MARKER), source };
+        fs::create_dir_all(folder).and_then(|()| marker.write(folder)).map_err(io)
+    };
+    // An interrupted report owns the files of both.
+    let both = marker.clone().and(&earlier);
+    mark(&both)?;
+    both.tidy(folder)?;
+    for (name, bytes) in files {
+        write(folder, name, bytes)?;
+    }
+    earlier.without(&marker).clear(folder, "")?;
+    mark(&marker)
 }
 
 /// All files below `folder` that are not in the report's `files`.
@@ -170,7 +183,7 @@ pub(crate) fn strangers(folder: &Path, files: &[File]) -> Vec<PathBuf> {
         for path in fs::read_dir(&next).into_iter().flatten().flatten().map(|entry| entry.path()) {
             if path.is_dir() && !path.is_symlink() {
                 folders.push(path);
-            } else if !files.iter().any(|(known, _)| folder.join(known) == path) {
+            } else if path != folder.join(MARKER) && !files.iter().any(|(known, _)| folder.join(known) == path) {
                 found.push(path);
             }
         }
@@ -181,10 +194,9 @@ pub(crate) fn strangers(folder: &Path, files: &[File]) -> Vec<PathBuf> {
 
 /// Writes a file atomically: a partial file is renamed once it is complete.
 pub(crate) fn write(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, ReportError> {
-    let (path, partial) = (folder.join(name), folder.join(format!("{name}.partial")));
+    let path = folder.join(name);
     let io = |source| ReportError::Io { doing: "write", path: path.clone(), source };
-    fs::create_dir_all(path.parent().unwrap_or(folder)).map_err(io)?;
-    fs::write(&partial, bytes).map_err(io)?;
-    fs::rename(&partial, &path).map_err(io)?;
+    create_real_folder(path.parent().unwrap_or(folder)).map_err(io)?;
+    PartialFile::write(&path, bytes).map_err(io)?;
     Ok(path)
 }

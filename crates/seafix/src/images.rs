@@ -6,7 +6,7 @@ use seafix_geometry::StereoRig;
 use seafix_io::{ImageLimits, Rig, read_image};
 use seafix_vision::Image;
 
-use crate::{Error, FrameData};
+use crate::{error::Error, sensor_frame::FrameData};
 
 /// A stereo pair: the left and the right image of one instant.
 #[derive(Debug, Clone)]

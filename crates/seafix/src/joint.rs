@@ -8,7 +8,10 @@ use seafix_referencing::{
     TargetKind, gather, joint_fixes,
 };
 
-use crate::{FrameResult, PipelineStages, TargetAttempt, times::milliseconds};
+use crate::{
+    stages::{FrameResult, PipelineStages, TargetAttempt},
+    times::milliseconds,
+};
 
 impl PipelineStages {
     /// The number of preceding frames that take part in a joint fix.

@@ -1,6 +1,6 @@
 //! Key frames of a run: added, recognised and stored for another run.
 
-use seafix_component::{Part, each_invalid};
+use seafix_component::{Part, Settings, each_invalid};
 use seafix_geometry::StereoRig;
 use seafix_navigation::{
     Displacement, Navigated, Navigator, PoseEstimate, PoseGraph, PoseGraphSettings, Recognition, RelativeMotion,
@@ -11,14 +11,14 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEM
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    PipelineError, SensorFrame,
     event::NavigationEvent,
-    pipeline::{faults, invalid_setting, resolve},
-    session::places,
+    pipeline::{PipelineError, faults, invalid_setting, resolve},
+    places::places,
+    sensor_frame::SensorFrame,
 };
 
 /// The settings of the key frames of a run.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Keyframes {
     /// Whether the pose graph is written to the run's folder, as `<trial>.pose-graph`.

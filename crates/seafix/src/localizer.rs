@@ -7,8 +7,14 @@ use seafix_referencing::{Outcome, Search, Site, Solver, Target, TargetKind};
 use seafix_vision::{Descriptor, Detector, Matcher};
 
 use crate::{
-    Error, FrameData, FrameResult, Hints, NavigationSession, NavigationStack, Pipeline, PipelineStages, SensorFrame,
-    StereoImages, WorldPrior, images::check_sizes, pipeline::invalid_setting, random, stages::View,
+    error::Error,
+    images::{StereoImages, check_sizes},
+    navigation::NavigationStack,
+    pipeline::{Pipeline, invalid_setting},
+    random,
+    sensor_frame::{FrameData, Hints, SensorFrame, WorldPrior},
+    session::NavigationSession,
+    stages::{FrameResult, PipelineStages, View},
 };
 
 /// A prior pose of the left camera in the world, with its covariance.
@@ -218,9 +224,10 @@ impl Localizer {
     /// The complete result for one frame: key points, cloud, candidates and outcomes.
     pub fn process(&self, frame: &SensorFrame) -> FrameResult {
         let rig = &self.rig.stereo;
-        let cloud = self.stages.cloud(&frame.frame_data, rig);
-        let view = View { sensor_frame: frame, cloud: &cloud, targets: &self.targets, rig };
         let priors = frame.prior_pose(&self.targets);
+        let regions = self.stages.regions(&self.targets, &[&priors], rig);
+        let cloud = self.stages.cloud(&frame.frame_data, rig, &self.targets, &regions);
+        let view = View { sensor_frame: frame, cloud: &cloud, targets: &self.targets, rig };
         let mut rng = random::of_frame(self.seed, frame.stamp_ns);
         let mut result = self.stages.fix_from(view, &priors, None, &mut rng);
         if self.stages.settings().target == TargetKind::Joint {
@@ -255,7 +262,7 @@ impl Localizer {
     }
 
     fn outcomes(&self, result: FrameResult) -> Vec<TargetOutcome> {
-        let outcome = |attempt: crate::TargetAttempt| TargetOutcome {
+        let outcome = |attempt: crate::stages::TargetAttempt| TargetOutcome {
             name: self.targets[attempt.target].name.clone(),
             outcome: attempt.answer.outcome,
         };

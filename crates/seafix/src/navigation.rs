@@ -1,18 +1,18 @@
 //! Settings of the navigation between fixes: odometry, policy and fusion.
 
-use seafix_component::Choice;
+use seafix_component::{Choice, Settings};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_navigation::{FUSIONS, Fusion, ODOMETRIES, Odometry, POLICIES, Policy};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Keyframes, PipelineError,
+    keyframe_mapper::Keyframes,
     odometry_session::TrialOdometry,
-    pipeline::{build, faults, resolve},
+    pipeline::{PipelineError, build, faults, resolve},
 };
 
 /// The settings of navigation from fix to fix.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Navigation {
     /// The odometry that moves the last fix from frame to frame.

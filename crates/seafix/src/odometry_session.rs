@@ -3,10 +3,13 @@
 use std::time::Instant;
 
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
-use seafix_navigation::{Odometry, OdometryOutcome, OdometrySession, StereoPair, Waypoint};
+use seafix_navigation::{Odometry, OdometryOutcome, OdometrySession, RangeOffset, StereoPair, Waypoint};
 use seafix_vision::Threads;
 
-use crate::{FrameData, SensorFrame, times::milliseconds};
+use crate::{
+    sensor_frame::{FrameData, SensorFrame},
+    times::milliseconds,
+};
 
 /// An odometry at work on a sequence of frames. It is independent of fixes, so that trials with the same odometry share
 /// it.
@@ -38,6 +41,11 @@ impl<'a> TrialOdometry<'a> {
         sensor_frame.readings.iter().for_each(|reading| self.0.sense(reading));
         let followed = self.0.advance(&pair).map_err(|error| error.to_string())?;
         Ok(OdometryResult { followed, latest: self.0.latest(), ms: milliseconds(start) })
+    }
+
+    /// The error of the rig's disparities that the motion has revealed; `None` if it has revealed none.
+    pub fn range_offset(&self) -> Option<RangeOffset> {
+        self.0.range_offset()
     }
 }
 

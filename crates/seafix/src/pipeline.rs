@@ -1,17 +1,18 @@
 //! Settings of the pipeline from a sensor frame to fixes, and the components built from them.
 
-use seafix_component::{BuildError, Choice, Part, Registry, each_invalid, in_range, out_of_range};
+use seafix_component::{BuildError, Choice, Part, Registry, Settings, each_invalid, in_range, out_of_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, InvalidStage, LOCATORS, MATCHERS, REFINEMENTS, StageChoices,
-    TRIANGULATORS, read_refinement, read_triangulator,
+    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, InvalidStage, LOCATORS, LineChoices, LineFrontEnd, LineRules,
+    MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, StageChoices, TRIANGULATORS,
+    read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
-use crate::PipelineStages;
+use crate::stages::PipelineStages;
 
 /// The settings of the pipeline from a sensor frame to a fix.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Pipeline {
     /// The target of a search: each object in view, each object followed by a joint fix, or the complete site.
@@ -34,6 +35,16 @@ pub struct Pipeline {
     /// The triangulator of matched pairs. A table without `name` has the settings of `optimal`.
     #[serde(deserialize_with = "read_triangulator")]
     pub triangulator: Choice,
+    /// Whether straight edges of the model are identified beside its points; a site without edges has none.
+    pub edges: UseOfEdges,
+    /// The detector of straight segments.
+    pub segment_detector: Choice,
+    /// The fit of a segment over its length.
+    pub segment_fit: SegmentFit,
+    /// The matcher of left and right segments.
+    pub segment_matcher: Choice,
+    /// The triangulation of matched segments.
+    pub lines: LineRules,
     /// The gates of the candidate selection ("shells" in the paper).
     pub gate: Gate,
     /// Whether the search is repeated with larger gates, then without, when it finds nothing. A displaced object is
@@ -61,6 +72,11 @@ impl Default for Pipeline {
             matcher: Choice::named("epipolar-band"),
             refinement: Choice::named("direct"),
             triangulator: Choice::named("optimal"),
+            edges: UseOfEdges::On,
+            segment_detector: Choice::named("a-contrario"),
+            segment_fit: SegmentFit::default(),
+            segment_matcher: Choice::named("overlap-profile"),
+            lines: LineRules::default(),
             gate: Gate::default(),
             expand_gates: false,
             tolerance: Tolerance::Sigmas(3.0),
@@ -69,6 +85,17 @@ impl Default for Pipeline {
             acceptance: Acceptance::default(),
         }
     }
+}
+
+/// The use of straight edges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
+#[serde(rename_all = "kebab-case")]
+pub enum UseOfEdges {
+    /// Edges are measured and identified where the site has some.
+    #[default]
+    On,
+    /// Points alone.
+    Off,
 }
 
 /// An invalid pipeline setting.
@@ -101,6 +128,8 @@ impl Pipeline {
             locator: resolve(&LOCATORS, &self.locator)?,
             refinement: resolve(&REFINEMENTS, &self.refinement)?,
             triangulator: resolve(&TRIANGULATORS, &self.triangulator)?,
+            segment_detector: resolve(&SEGMENT_DETECTORS, &self.segment_detector)?,
+            segment_matcher: resolve(&SEGMENT_MATCHERS, &self.segment_matcher)?,
             search: resolve(&SEARCHES, &self.search)?,
             solver: resolve(&SOLVERS, &self.solver)?,
             ..self.clone()
@@ -120,6 +149,12 @@ impl Pipeline {
         all.extend(faults(&MATCHERS, &self.matcher));
         all.extend(faults(&REFINEMENTS, &self.refinement));
         all.extend(faults(&TRIANGULATORS, &self.triangulator));
+        all.extend(faults(&SEGMENT_DETECTORS, &self.segment_detector));
+        all.extend(faults(&SEGMENT_MATCHERS, &self.segment_matcher));
+        let fit = each_invalid(&self.segment_fit, SegmentFit::check);
+        all.extend(fit.into_iter().map(|message| invalid_setting("segment-fit", message)));
+        let lines = each_invalid(&self.lines, LineRules::check);
+        all.extend(lines.into_iter().map(|message| invalid_setting("lines", message)));
         all.extend(faults(&SEARCHES, &self.search));
         all.extend(faults(&SOLVERS, &self.solver));
         all.extend(each_invalid(&self.gate, Gate::check).into_iter().map(|message| invalid_setting("gate", message)));
@@ -168,6 +203,24 @@ impl Pipeline {
         })
     }
 
+    /// The stages from two images to measured lines.
+    ///
+    /// # Errors
+    /// The first invalid setting.
+    pub fn line_front_end(&self) -> Result<LineFrontEnd, PipelineError> {
+        self.segment_fit.check().map_err(|message| invalid_setting("segment-fit", message))?;
+        self.lines.check().map_err(|message| invalid_setting("lines", message))?;
+        let choices = LineChoices {
+            segment_detector: &self.segment_detector,
+            segment_fit: &self.segment_fit,
+            segment_matcher: &self.segment_matcher,
+            lines: &self.lines,
+            // One error of the camera model affects points and lines.
+            calibration_px: build(&TRIANGULATORS, &self.triangulator)?.rules().calibration_px,
+        };
+        LineFrontEnd::build(&choices).map_err(|InvalidStage { stage, error, .. }| invalid(stage, &error))
+    }
+
     /// Builds all components.
     ///
     /// # Errors
@@ -178,7 +231,7 @@ impl Pipeline {
         self.acceptance.check().map_err(|message| invalid_setting("acceptance", message))?;
         self.window_fits()?;
         let (search, solver) = (build(&SEARCHES, &self.search)?, build(&SOLVERS, &self.solver)?);
-        Ok(PipelineStages::new(self.front_end()?, search, solver, self.clone()))
+        Ok(PipelineStages::new(self.front_end()?, self.line_front_end()?, search, solver, self.clone()))
     }
 }
 

@@ -3,21 +3,25 @@
 use std::cell::OnceCell;
 
 use rand::Rng;
-use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_navigation::{
-    ConsiderStates, Event, Navigated, Navigator, ObjectPlacement, ObjectPose, OdometryOutcome as Followed, PoseGraph,
+    ConsiderStates, Event, Navigated, Navigator, ObjectPose, OdometryOutcome as Followed, PoseGraph, RangeOffset,
     RelativeMotion, State,
 };
 use seafix_referencing::{Outcome, Prior, PriorBound, Target};
+use seafix_vision::Regions;
 
+use crate::places::places;
 use crate::{
-    Error, FrameData, FrameResult, NavigationStack, PipelineStages, SensorFrame,
+    error::Error,
     event::NavigationEvent,
     images::check_sizes,
     keyframe_mapper::KeyframeMapper,
+    navigation::NavigationStack,
     odometry_session::{OdometryResult, TrialOdometry, stereo_pair},
     random,
-    stages::{Cloud, View},
+    sensor_frame::{FrameData, SensorFrame},
+    stages::{Cloud, FrameResult, PipelineStages, View},
 };
 
 /// The suffix of [`Motion::lost`] that marks a break of the trajectory. A skipped frame is no break: the next motion
@@ -88,11 +92,13 @@ pub struct NavigationSession<'a> {
 /// The state of a navigation session after a frame.
 #[derive(Debug, Clone)]
 pub struct NavigationState {
-    /// The source of the pose: the prior, a fix, or dead reckoning since a fix.
+    /// The basis of the pose: the prior, a search for a due fix, a fix, or dead reckoning since a fix.
     pub state: State,
     /// Whether a fix was due.
     pub due: bool,
-    /// The pose relative to the object of the last fix; `None` before the first fix and for a frame without motion.
+    /// The pose relative to the object of the last fix.
+    ///
+    /// `None` for a skipped frame, and from the start or a break on until the next fix or recognised key frame.
     pub pose: Option<Navigated>,
     /// The first fix moved to this frame by odometry alone; `None` before it and after a gap of the odometry.
     pub odometry_only: Option<Navigated>,
@@ -197,10 +203,20 @@ impl<'a> NavigationSession<'a> {
         let mut rng = random::of_frame(self.seed, self.frames);
         self.frames += 1;
         let cloud = OnceCell::new();
-        let make = || cloud.get_or_init(|| self.stages.cloud(&frame.frame_data, rig));
+        let make = |regions: &[Regions; 2]| {
+            cloud.get_or_init(|| self.stages.cloud(&frame.frame_data, rig, self.targets, regions))
+        };
         let (result, state) = self.advance(frame, &moved, make, &mut rng).map_err(invalid)?;
         self.latest = result;
         Ok(state)
+    }
+
+    /// The error of the rig's disparities that the motion has revealed; `None` if it has revealed none.
+    ///
+    /// The odometry corrects it in its own rig, unless its setting `correct-range-offset` is false. Fixes use the rig as
+    /// given: build the localizer with [`StereoRig::with_range_offset`] to correct them too.
+    pub fn range_offset(&self) -> Option<RangeOffset> {
+        self.odometry.as_ref()?.range_offset()
     }
 
     /// The attempts of the last frame given to [`push`](Self::push), rejected ones with their reasons; empty if none was
@@ -211,7 +227,8 @@ impl<'a> NavigationSession<'a> {
 
     /// Processes the next frame with odometry and cloud that the caller computed.
     ///
-    /// The odometry result `moved` moves the pose. The closure `cloud` is called only if a fix is due.
+    /// The odometry result `moved` moves the pose. The closure `cloud` is called only if a fix is due, with the regions
+    /// of both images where the targets are expected.
     ///
     /// # Errors
     /// The cause as a sentence: the frame is no stereo pair.
@@ -219,7 +236,7 @@ impl<'a> NavigationSession<'a> {
         &mut self,
         sensor_frame: &'b SensorFrame,
         moved: &OdometryResult,
-        cloud: impl FnOnce() -> &'b Cloud,
+        cloud: impl FnOnce(&[Regions; 2]) -> &'b Cloud,
         rng: &mut dyn Rng,
     ) -> Result<(FrameResult, NavigationState), String> {
         let pair = stereo_pair(sensor_frame)?;
@@ -240,7 +257,10 @@ impl<'a> NavigationSession<'a> {
             }
         };
         let frame_result = match here && due {
-            true => self.search_targets(sensor_frame, cloud(), &priors, &prior_pose, rng),
+            true => {
+                let regions = self.stages.regions(self.targets, &[&priors, &prior_pose], self.rig);
+                self.search_targets(sensor_frame, cloud(&regions), &priors, &prior_pose, rng)
+            }
             false => FrameResult::default(),
         };
         let taken = self.fix(&frame_result, &mut events);
@@ -324,13 +344,14 @@ impl<'a> NavigationSession<'a> {
             let Outcome::Fix(fix) = &attempt.answer.outcome else { continue };
             let target = &self.targets[attempt.target];
             let object = target.name.clone();
-            let sensitivities = match self.stages.model_errors(fix, target, &frame_result.cloud, self.rig) {
-                Ok(sensitivities) => sensitivities,
-                Err(why) => {
-                    events.push(NavigationEvent::FixUnused { object, why: why.to_string() });
-                    continue;
-                }
-            };
+            let sensitivities =
+                match self.stages.model_errors(fix, target, (&frame_result.cloud, &frame_result.lines), self.rig) {
+                    Ok(sensitivities) => sensitivities,
+                    Err(why) => {
+                        events.push(NavigationEvent::FixUnused { object, why: why.to_string() });
+                        continue;
+                    }
+                };
             let object_pose = ObjectPose::new(fix.object_from_camera, fix.covariance)
                 .with_consider_states(ConsiderStates::of_model(attempt.target, sensitivities));
             let fix = Navigated { object: attempt.target, object_pose };
@@ -378,13 +399,4 @@ impl<'a> NavigationSession<'a> {
         }));
         self.reported = changes.len();
     }
-}
-
-/// The surveyed poses of the targets in the world.
-pub fn places(targets: &[Target]) -> Vec<ObjectPlacement> {
-    let place = |target: &Target| ObjectPlacement {
-        world_from_object: target.world_from_object.expect("checked when the source was opened"),
-        covariance: target.survey.unwrap_or_else(|| Covariance6::<_, Object>::new(nalgebra::Matrix6::zeros())),
-    };
-    targets.iter().map(place).collect()
 }

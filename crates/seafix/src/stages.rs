@@ -3,24 +3,27 @@
 use std::{sync::Arc, time::Instant};
 
 use rand::Rng;
-use seafix_geometry::{MeasuredPoint, StereoRig};
+use seafix_geometry::{MeasuredLine, MeasuredPoint, StereoRig};
 use seafix_navigation::Sensitivity;
 use seafix_referencing::{
-    Candidates, Correspondence, Degenerate, Fix, Gathered, Identification, ModelPoint, Observations, Outcome, Prior,
-    PriorBound, Problem, Rejected, Search, Solver, Target, Tolerance, candidates, judge, judge_labelled,
+    Candidates, Correspondence, Degenerate, Edges, Fix, Gathered, Identification, Observations, Outcome, Prior,
+    Problem, Rejected, Search, Solver, Target, Tolerance, candidates, edge_candidates, judge, judge_labelled,
     problem_file::CoherenceProblem, search_with_expanding_gates,
 };
-use seafix_vision::{FrontEnd, FrontEndOutput, Keypoint};
+use seafix_vision::{FrontEnd, FrontEndOutput, Image, Keypoint, LineFrontEnd, LineOutput, Regions};
 
 use crate::{
-    FrameData, FrameTimes, Hints, Pipeline, SensorFrame, TargetTimes,
-    times::{milliseconds, timed},
+    in_view::{edges_in_view, in_view, regions, visible},
+    pipeline::{Pipeline, UseOfEdges},
+    sensor_frame::{FrameData, Hints, SensorFrame},
+    times::{FrameTimes, TargetTimes, milliseconds, timed},
 };
 
 /// A pipeline whose components are built and ready.
 #[derive(Debug)]
 pub struct PipelineStages {
     pub(crate) front_end: FrontEnd,
+    line_front_end: LineFrontEnd,
     pub(crate) search: Box<dyn Search>,
     pub(crate) solver: Box<dyn Solver>,
     settings: Pipeline,
@@ -33,6 +36,8 @@ pub struct FrameResult {
     pub keypoints: Arc<[Keypoint]>,
     /// The triangulated points, in the camera's frame.
     pub cloud: Arc<[MeasuredPoint]>,
+    /// The measured straight edges, in the camera's frame.
+    pub lines: Arc<[MeasuredLine]>,
     /// One attempt for each target in view.
     pub attempts: Vec<TargetAttempt>,
     /// The points that a joint fix takes from objects without a fix of their own.
@@ -70,12 +75,14 @@ impl TargetAttempt {
     }
 }
 
-/// The cloud of one frame. It depends on the front end alone, so that trials with the same front end share it.
+/// The cloud of one frame. It depends on the front end, and on the priors of the targets if the front end is guided;
+/// trials that agree in these share it.
 #[derive(Debug)]
 pub struct Cloud {
     /// The key points of the left image.
     keypoints: Arc<[Keypoint]>,
     points: Arc<[MeasuredPoint]>,
+    lines: Arc<[MeasuredLine]>,
     times: FrameTimes,
     /// The duration of all stages together (ms).
     total_ms: f64,
@@ -86,6 +93,8 @@ pub struct Cloud {
 #[derive(Debug, Clone)]
 pub struct Sought {
     candidates: Candidates,
+    /// The candidates of each edge; empty without edges.
+    edges: Vec<Vec<usize>>,
     found: Result<Identification, Rejected>,
     /// The durations of candidate selection and search (ms).
     spent: [f64; 2],
@@ -106,8 +115,14 @@ pub struct View<'a> {
 
 impl PipelineStages {
     /// A pipeline with these components.
-    pub fn new(front_end: FrontEnd, search: Box<dyn Search>, solver: Box<dyn Solver>, settings: Pipeline) -> Self {
-        Self { front_end, search, solver, settings }
+    pub fn new(
+        front_end: FrontEnd,
+        line_front_end: LineFrontEnd,
+        search: Box<dyn Search>,
+        solver: Box<dyn Solver>,
+        settings: Pipeline,
+    ) -> Self {
+        Self { front_end, line_front_end, search, solver, settings }
     }
 
     /// Whether the solver requires the points' pixels.
@@ -129,8 +144,9 @@ impl PipelineStages {
         rig: &StereoRig,
         rng: &mut dyn Rng,
     ) -> FrameResult {
-        let cloud = &self.cloud(&sensor_frame.frame_data, rig);
-        self.fix_from(View { sensor_frame, cloud, targets, rig }, &sensor_frame.prior_pose(targets), None, rng)
+        let priors = sensor_frame.prior_pose(targets);
+        let cloud = &self.cloud(&sensor_frame.frame_data, rig, targets, &self.regions(targets, &[&priors], rig));
+        self.fix_from(View { sensor_frame, cloud, targets, rig }, &priors, None, rng)
     }
 
     /// Computes fixes from a cloud and from a prior pose relative to each target.
@@ -151,9 +167,9 @@ impl PipelineStages {
                 Some(attempt)
             })
             .collect();
-        let Cloud { keypoints, points, times, .. } = view.cloud;
-        let (keypoints, cloud) = (Arc::clone(keypoints), Arc::clone(points));
-        FrameResult { keypoints, cloud, attempts, gathered: Gathered::default(), times: *times }
+        let Cloud { keypoints, points, lines, times, .. } = view.cloud;
+        let (keypoints, cloud, lines) = (Arc::clone(keypoints), Arc::clone(points), Arc::clone(lines));
+        FrameResult { keypoints, cloud, lines, attempts, gathered: Gathered::default(), times: *times }
     }
 
     /// Repeats the search, with other priors, for the targets without a fix.
@@ -176,32 +192,54 @@ impl PipelineStages {
         &self,
         fix: &Fix,
         target: &Target,
-        cloud: &[MeasuredPoint],
+        (cloud, lines): (&[MeasuredPoint], &[MeasuredLine]),
         rig: &StereoRig,
     ) -> Result<Vec<(usize, Sensitivity)>, Degenerate> {
         let data = Observations::of(&fix.pairs, &target.points, cloud, Some(rig));
+        let data = data.with_edges(&fix.edges, &target.edges, &target.points, lines);
         let sensitivities = self.solver.model_errors(&data, &fix.object_from_camera)?;
         Ok(fix.pairs.iter().map(|pair| pair.model).zip(sensitivities).collect())
     }
 
     /// Whether enough points of `target` may be in view for a fix; true without a prior.
     pub fn shows(target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
-        in_view(target, prior.as_ref(), rig).is_some()
+        in_view(&target.points, prior.as_ref(), rig).is_some()
+    }
+
+    /// Whether the cloud depends on where the targets are expected.
+    pub fn is_guided(&self) -> bool {
+        self.front_end.detector.is_guided()
+    }
+
+    /// The regions of both images where the points of the targets are expected, for lists of the targets' priors.
+    ///
+    /// They are empty for a front end that does not use them, and for targets without a prior.
+    pub fn regions(&self, targets: &[Target], priors: &[&[Option<Prior>]], rig: &StereoRig) -> [Regions; 2] {
+        if !self.is_guided() {
+            return [Regions::NONE; 2];
+        }
+        let known = priors.iter().flat_map(|priors| targets.iter().zip(priors.iter()));
+        regions(known.filter_map(|(target, prior)| Some((&target.points[..], prior.as_ref()?))), rig)
     }
 
     /// The cloud of a frame's measurements: the front end's result, or the given points.
-    pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig) -> Cloud {
+    ///
+    /// The `regions` are those where the targets are expected ([`PipelineStages::regions`]).
+    ///
+    /// Straight edges are measured if a target has some.
+    pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig, targets: &[Target], regions: &[Regions; 2]) -> Cloud {
         let (left, right) = match frame_data {
             FrameData::Points(cloud) => {
                 let times = FrameTimes::default();
-                return Cloud { keypoints: Arc::default(), points: cloud[..].into(), times, total_ms: 0.0 };
+                let (keypoints, lines) = (Arc::default(), Arc::default());
+                return Cloud { keypoints, points: cloud[..].into(), lines, times, total_ms: 0.0 };
             }
             FrameData::Stereo(left, right) => (left, right),
         };
         let start = Instant::now();
         // Frames are processed in parallel. A single thread within a frame keeps the durations comparable.
         let mut output = FrontEndOutput::default();
-        self.front_end.run(left, right, rig, &mut output);
+        self.front_end.run_guided([left, right], rig, regions, &mut output);
         let times = FrameTimes {
             detect_ms: Some(output.times.filter_ms + output.times.detect_ms),
             locate_ms: Some(output.times.locate_ms),
@@ -211,7 +249,20 @@ impl PipelineStages {
             triangulate_ms: Some(output.times.triangulate_ms),
         };
         let (keypoints, points) = (output.keypoints()[0].into(), output.cloud[..].into());
-        Cloud { keypoints, points, times, total_ms: milliseconds(start) }
+        let [l, r] = output.filtered();
+        let wanted = self.settings.edges == UseOfEdges::On && targets.iter().any(|target| !target.edges.is_empty());
+        let lines = match wanted {
+            true => self.lines([l.unwrap_or(left), r.unwrap_or(right)], rig),
+            false => Arc::default(),
+        };
+        Cloud { keypoints, points, lines, times, total_ms: milliseconds(start) }
+    }
+
+    /// The measured lines of a pair of images.
+    fn lines(&self, images: [&Image; 2], rig: &StereoRig) -> Arc<[MeasuredLine]> {
+        let mut output = LineOutput::default();
+        self.line_front_end.run(images, rig, &mut output);
+        output.lines.into()
     }
 
     /// Stages 1 and 2 for every target in view, in order.
@@ -225,26 +276,53 @@ impl PipelineStages {
         match &view.sensor_frame.hints {
             Hints::Names(_) => None,
             Hints::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
-            Hints::Nothing => {
-                Some(self.seek_near(target, &view.cloud.points, prior, &in_view(target, prior, view.rig)?, rng))
-            }
+            Hints::Nothing => self.seek_near(target, view, prior, false, rng),
         }
     }
 
-    /// The candidates for the points that may be in view, and the search among them.
+    /// The candidates for the points and edges that may be in view, and the search among them.
+    ///
+    /// `None` if too few may be in view, unless the attempt is `forced`.
     fn seek_near(
         &self,
         target: &Target,
-        cloud: &[MeasuredPoint],
+        view: View<'_>,
         prior: Option<&Prior>,
-        in_view: &[bool],
+        forced: bool,
         rng: &mut dyn Rng,
-    ) -> Sought {
+    ) -> Option<Sought> {
         let Pipeline { gate, tolerance, .. } = &self.settings;
-        let (candidates, stage1) = timed(|| candidates(&target.points, cloud, prior, gate, Some(in_view)));
-        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let Cloud { points: cloud, lines, .. } = view.cloud;
+        let (points, started) = (&target.points, Instant::now());
+        let uses_lines = !lines.is_empty() && !target.edges.is_empty();
+        let of_edges = if uses_lines { edges_in_view(target, prior, view.rig) } else { Vec::new() };
+        let shown = of_edges.iter().filter(|shown| **shown).count();
+        let of_points = match in_view(points, prior, view.rig) {
+            Some(mask) => mask,
+            None if forced => vec![true; points.len()],
+            None => {
+                let mask = prior.map(|prior| visible(points, prior, view.rig))?;
+                let seen = mask.iter().filter(|seen| **seen).count();
+                // Three edges can show that two of them are right.
+                (shown >= 3 || (seen > 0 && shown >= 2)).then_some(mask)?
+            }
+        };
+        let candidates = candidates(points, cloud, prior, gate, Some(&of_points));
+        let edges = match uses_lines {
+            true => edge_candidates(&target.edges, points, lines, prior, gate, Some(&of_edges)),
+            false => Vec::new(),
+        };
+        let stage1 = milliseconds(started);
+        let problem = Problem {
+            model: points,
+            cloud,
+            candidates: &candidates,
+            tolerance: *tolerance,
+            prior,
+            edges: edges_of(target, lines, &edges),
+        };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
-        Sought { candidates, found, spent: [stage1, stage2] }
+        Some(Sought { candidates, edges, found, spent: [stage1, stage2] })
     }
 
     /// Stages 1 and 2 of a problem with candidates, tolerance and prior pose of its own.
@@ -256,7 +334,7 @@ impl PipelineStages {
         };
         let posed = posed(target, problem, &candidates);
         let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
-        Sought { candidates, found, spent: [stage1, stage2] }
+        Sought { candidates, edges: Vec::new(), found, spent: [stage1, stage2] }
     }
 
     /// The attempt on one target; `None` if it is out of view. `sought` is an earlier result of Stages 1 and 2.
@@ -290,13 +368,16 @@ impl PipelineStages {
     ) -> TargetAttempt {
         let started = Instant::now();
         let View { cloud, targets, rig, .. } = view;
-        let (target, cloud) = (&targets[index], &cloud.points);
+        let (target, lines, cloud) = (&targets[index], &cloud.lines, &cloud.points);
         let Pipeline { tolerance, acceptance, expand_gates, .. } = &self.settings;
         let points = &target.points;
         let before: f64 = sought.spent.iter().sum();
         let mut times = [0.0; 3];
-        let mut judged = |Sought { candidates, found, spent: [stage1, stage2] }: Sought, prior: Option<&Prior>| {
-            let problem = Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let mut judged = |sought: Sought, prior: Option<&Prior>| {
+            let Sought { candidates, edges, found, spent: [stage1, stage2] } = sought;
+            let edges = edges_of(target, lines, &edges);
+            let problem =
+                Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior, edges };
             let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, acceptance, Some(rig)));
             times.iter_mut().zip([stage1, stage2, solution]).for_each(|(sum, spent)| *sum += spent);
             (candidates, answer)
@@ -305,8 +386,8 @@ impl PipelineStages {
         if *expand_gates {
             let mut wider = Candidates::default();
             answer = search_with_expanding_gates(answer, prior, |prior| {
-                let in_view = in_view(target, prior, rig).unwrap_or_else(|| vec![true; points.len()]);
-                let (listed, answer) = judged(self.seek_near(target, cloud, prior, &in_view, rng), prior);
+                let sought = self.seek_near(target, view, prior, true, rng).expect("a forced attempt");
+                let (listed, answer) = judged(sought, prior);
                 wider = listed;
                 answer
             });
@@ -335,14 +416,21 @@ impl PipelineStages {
         let candidates = Candidates::from_pairs(target.points.len(), places);
         let Pipeline { tolerance, acceptance, .. } = &self.settings;
         let cloud = &view.cloud.points;
-        let problem = Problem { model: &target.points, cloud, candidates: &candidates, tolerance: *tolerance, prior };
+        let problem = Problem {
+            model: &target.points,
+            cloud,
+            candidates: &candidates,
+            tolerance: *tolerance,
+            prior,
+            edges: Default::default(),
+        };
         let (answer, solution) = timed(|| judge_labelled(&problem, pairs, &*self.solver, acceptance, Some(view.rig)));
         Some(TargetAttempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
     }
 
     /// The answer to a problem with candidates, tolerance and prior pose of its own.
     fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> TargetAttempt {
-        let Sought { candidates, found, spent: [stage1, stage2] } = sought;
+        let Sought { candidates, found, spent: [stage1, stage2], .. } = sought;
         let posed = posed(target, problem, &candidates);
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
         let times = [stage1, stage2, solution];
@@ -350,10 +438,18 @@ impl PipelineStages {
     }
 }
 
+/// The edges of a problem; none without candidates.
+fn edges_of<'a>(target: &'a Target, lines: &'a [MeasuredLine], candidates: &'a [Vec<usize>]) -> Edges<'a> {
+    match candidates.is_empty() {
+        true => Edges::default(),
+        false => Edges { model: &target.edges, lines, candidates },
+    }
+}
+
 /// The input of the search for a problem with tolerance and prior pose of its own.
 fn posed<'a>(target: &'a Target, problem: &'a CoherenceProblem, candidates: &'a Candidates) -> Problem<'a> {
     let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
-    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior }
+    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior, edges: Default::default() }
 }
 
 /// The pairs that the labels of the cloud points state, in the order of the model. A target of one object takes the
@@ -365,35 +461,4 @@ fn labelled(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Corr
     // The first of two points with the same label is taken.
     pairs.dedup_by_key(|pair| pair.model);
     pairs
-}
-
-/// The points of `target` that may be in view: predicted in both images, or outside by at most three standard
-/// deviations of the prediction, and not seen from behind. `None` if fewer than three are predicted inside,
-/// so that no fix is attempted. Without a prior, every point may be in view.
-fn in_view(target: &Target, prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
-    /// The minimum cosine between normal and line of sight; below it a point is seen from behind.
-    const BACK: f64 = -0.2;
-    let Some(prior) = prior else { return Some(vec![true; target.points.len()]) };
-    let camera_from_object = prior.object_from_camera.inverse();
-    let faces = |point: &ModelPoint| {
-        point.normal.is_none_or(|normal| {
-            let ray = prior.object_from_camera.translation() - point.at.coords;
-            normal.normalize().dot(&ray.normalize()) > BACK
-        })
-    };
-    let inside = |point: &ModelPoint| faces(point) && rig.sees(&(camera_from_object * point.at), 0.0).is_some();
-    // This cheap test rejects most targets of a large site before any covariance is computed.
-    if target.points.iter().filter(|point| inside(point)).take(3).count() < 3 {
-        return None;
-    }
-    let focal = rig.left().focal()[0];
-    let near = |point: &ModelPoint| {
-        let at = camera_from_object * point.at;
-        let spread = match &prior.bound {
-            PriorBound::Gaussian(covariance) => covariance.of_point(&at).trace().sqrt(),
-            PriorBound::Box(half) => *half,
-        };
-        rig.sees(&at, -3.0 * focal * spread / at.coords.z).is_some()
-    };
-    Some(target.points.iter().map(|point| inside(point) || faces(point) && near(point)).collect())
 }

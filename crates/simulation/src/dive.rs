@@ -1,6 +1,7 @@
 //! A dive over the virtual site: settings, plan and frames.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use seafix_component::Settings;
 use seafix_geometry::{
     BadCamera, BadRig, Camera, MeasuredPoint, Object, Pinhole, StereoPixels, StereoRig, Transform, World, so3,
 };
@@ -28,7 +29,7 @@ const VIEW_TRIALS: usize = 100;
 const CLEARANCE: f64 = 0.4;
 
 /// The settings of a dive over the virtual site.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Dive {
     /// Number of frames, from 1 to 1 000 000; consecutive frames view consecutive objects. The default is ten of each
@@ -83,7 +84,7 @@ impl Default for Dive {
 
 /// Two equal cameras side by side with parallel axes. The defaults are the paper's virtual camera; the paper gives no
 /// baseline.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct VirtualRig {
     /// Width and height of the images (px), from 16 to 8192 each.
@@ -215,6 +216,9 @@ impl Dive {
         within("prior-attitude-deg", self.prior_attitude_deg, 0.0, 45.0, "give degrees, from 0 to 45")?;
         within("model-sigma", self.model_sigma, 0.0, 0.1, "give metres, from 0 to 0.1")?;
         within("survey-sigma", self.survey_sigma, 0.0, 0.2, "give metres, from 0 to 0.2")?;
+        if !(self.rig.focal > 0.0 && self.rig.focal.is_finite()) {
+            fail("rig.focal", self.rig.focal, "give a positive number of pixels")?;
+        }
         within("rig.baseline", self.rig.baseline, 1e-3, 5.0, "give metres, from 0.001 to 5")?;
         for n in self.rig.size {
             within("rig.size", f64::from(n), 16.0, 8192.0, "give pixels, from 16 to 8192")?;
@@ -223,6 +227,8 @@ impl Dive {
         within("sensor.noise", self.sensor.noise, 0.0, 255.0, "give grey levels, from 0 to 255")?;
         within("sensor.white", self.sensor.white, 0.0, 1e6, "give a grey level, zero or more")?;
         within("points.sigma-px", self.points.sigma_px, 0.0, 20.0, "give pixels, from 0 to 20")?;
+        let max = PointNoise::MAX_CLUTTER as f64;
+        within("points.clutter", self.points.clutter as f64, 0.0, max, "give a number of points, from 0 to 100000")?;
         within("points.found", self.points.found, 0.0, 1.0, "give a fraction, from 0 to 1")
     }
 }

@@ -1,6 +1,7 @@
 //! Layouts of points before a stereo rig, without a scene, for the Monte Carlo of solvers.
 
 use nalgebra::{Matrix3, Vector3};
+use seafix_component::Settings;
 use seafix_geometry::{
     Camera, MeasuredPoint, Object, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint,
 };
@@ -12,7 +13,7 @@ use crate::{
 };
 
 /// The distribution of the points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Shape {
     /// Spread: over the central 70 % of width and height of the common field of view, with depths within ±10 %.
@@ -23,7 +24,7 @@ pub enum Shape {
 }
 
 /// A layout of model points before a rig, with its measurement noise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Layout {
     /// Distribution of the points.

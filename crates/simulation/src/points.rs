@@ -1,5 +1,6 @@
 //! One view as noisy points: a detector's measurements without the image.
 
+use seafix_component::Settings;
 use seafix_geometry::{
     Camera, MeasuredPoint, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint, World,
 };
@@ -12,15 +13,20 @@ use crate::{
 
 /// Measurement noise of points. The default follows the paper's figures, σ_d = √2·σ_px = 0.28 px; rendered images are
 /// less noisy.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointNoise {
     /// Standard deviation of each pixel coordinate in each image (px), from 0 to 20.
     pub sigma_px: f64,
     /// Fraction of the visible corners that are measured, from 0 to 1.
     pub found: f64,
-    /// Number of clutter points in a view, anywhere on seabed and objects.
+    /// Number of clutter points in a view, anywhere on seabed and objects; at most 100 000.
     pub clutter: usize,
+}
+
+impl PointNoise {
+    /// Maximum number of clutter points in a view; all of a frame are in memory.
+    pub(crate) const MAX_CLUTTER: usize = 100_000;
 }
 
 impl Default for PointNoise {

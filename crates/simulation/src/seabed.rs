@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{
-    scene::Triangle,
+    scene::mesh::Triangle,
     stream::{Purpose, Stream},
 };
 

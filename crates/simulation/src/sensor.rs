@@ -1,18 +1,19 @@
 //! A simple camera model: blur, noise and 8-bit quantisation.
 
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
 use crate::stream::Stream;
 
 /// Lens and sensor of the virtual scene.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sensor {
     /// Standard deviation of the lens blur (px), from 0 to 20.
     pub blur: f64,
-    /// Standard deviation of the pixel noise (grey levels of 255), from 0 to 255.
+    /// Standard deviation of the pixel noise (grey levels), from 0 to 255.
     pub noise: f64,
-    /// Grey level of a white surface that faces the light, from 0 to 1 000 000.
+    /// Brightness of a white surface that faces the light (grey levels), from 0 to 1 000 000.
     pub white: f64,
 }
 

@@ -56,6 +56,8 @@ pub enum Purpose {
     Transponders,
     /// Selection and positions of wrong matches.
     Mismatches,
+    /// Errors of the ends of edges.
+    Edges,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.

@@ -97,6 +97,7 @@ pub(crate) fn survey_marks(
         survey_sigma: errors.survey,
         world_from_object: triad(s1, s2, s3).ok(),
         points,
+        edges: Vec::new(),
         interest: Vec::new(),
     };
     let start = object_from_world.inverse();

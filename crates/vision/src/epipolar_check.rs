@@ -2,7 +2,13 @@
 
 use seafix_geometry::{StereoPixels, StereoRig};
 
-use crate::{Descriptor, Detector, Harris, Image, Matcher, MutualRatio, Surf, View, Workspace};
+use crate::{
+    describe::{Descriptor, Surf},
+    detect::{Detector, Harris},
+    image::Image,
+    matching::{Matcher, MutualRatio, View},
+    workspace::Workspace,
+};
 
 /// The distances of matches from the epipolar lines of a rig; the rig takes no part in the matching.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

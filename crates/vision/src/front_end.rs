@@ -5,8 +5,16 @@ use std::time::Instant;
 use seafix_geometry::{MeasuredPoint, StereoRig, UncertainPixels};
 
 use crate::{
-    Descriptor, Descriptors, Detector, Filter, Image, Keypoint, Locator, Match, Matcher, Pair, Refinement, Threads,
-    Triangulator, UncertainPixel, View, Workspace,
+    align::Refinement,
+    describe::{Descriptor, Descriptors},
+    detect::{Detector, Keypoint},
+    filter::Filter,
+    image::Image,
+    locate::{Locator, Pair, UncertainPixel},
+    matching::{Match, Matcher, View},
+    regions::Regions,
+    triangulate::Triangulator,
+    workspace::{Threads, Workspace},
 };
 
 /// The stages from a pair of images to a cloud.
@@ -120,6 +128,19 @@ impl FrontEndOutput {
 impl FrontEnd {
     /// Replaces the contents of `output` by the results for this pair of images.
     pub fn run(&self, left: &Image, right: &Image, rig: &StereoRig, output: &mut FrontEndOutput) {
+        self.run_guided([left, right], rig, &[Regions::NONE; 2], output);
+    }
+
+    /// Replaces the contents of `output` by the results for the left and the right image of a pair.
+    ///
+    /// A guided detector selects more key points in the `regions` of the images.
+    pub fn run_guided(
+        &self,
+        [left, right]: [&Image; 2],
+        rig: &StereoRig,
+        [left_regions, right_regions]: &[Regions; 2],
+        output: &mut FrontEndOutput,
+    ) {
         let FrontEndOutput { sides: [l, r], filtered, work, matches, pairs, pixels, cloud, times } = output;
         let [clear_left, clear_right] = filtered;
         let threads = work.threads();
@@ -133,9 +154,10 @@ impl FrontEnd {
             }
         });
         times.detect_ms = timed(|| {
-            let detect =
-                |image, side: &mut SideOutput| self.detector.detect_into(image, &mut side.work, &mut side.keypoints);
-            threads.join(|| detect(left, l), || detect(right, r));
+            let detect = |image, regions, side: &mut SideOutput| {
+                self.detector.detect_guided_into(image, regions, &mut side.work, &mut side.keypoints);
+            };
+            threads.join(|| detect(left, left_regions, l), || detect(right, right_regions, r));
         });
         times.locate_ms = timed(|| {
             threads.join(|| self.locate(left, l), || self.locate(right, r));

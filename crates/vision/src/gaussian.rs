@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use crate::Threads;
+use crate::workspace::Threads;
 
 /// One half of a sampled Gaussian of standard deviation `sigma` (px), cut off at 3 `sigma`.
 ///

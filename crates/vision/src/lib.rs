@@ -62,10 +62,14 @@ mod filter;
 mod front_end;
 mod gaussian;
 mod image;
+mod keypoint;
+mod line_front_end;
 mod locate;
 mod matching;
+mod regions;
 mod right_camera_rotation;
 mod scale_space;
+mod segment;
 mod stages;
 mod swap_check;
 mod track;
@@ -77,16 +81,22 @@ pub use align::{
 };
 pub use describe::{Brief, DESCRIPTORS, Descriptor, Descriptors, Orb, Sift, Surf, Table, ZnccPatch};
 pub use detect::{
-    DETECTORS, Detector, Dog, Fast, FastHessian, FittedCorners, Harris, Keypoint, LCorners, Selection, ShiTomasi,
-    Window, XCorners,
+    DETECTORS, Detector, Dog, Fast, FastHessian, FittedCorners, GuidedCorners, Harris, Keypoint, LCorners, Selection,
+    ShiTomasi, Window, XCorners,
 };
 pub use epipolar_check::{EpipolarCheck, repeated_patterns};
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, FrontEndOutput, StageTimes};
 pub use image::{BadImage, Image};
+pub use line_front_end::{LineChoices, LineFrontEnd, LineOutput};
 pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, UncertainPixel, XCorner};
 pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View, ZnccBand};
+pub use regions::{Disc, Regions};
 pub use right_camera_rotation::RightCameraRotation;
+pub use segment::{
+    AContrario, BandDescriptor, EdgeDrawing, FitScratch, FittedSegment, LineRules, OverlapProfile, SEGMENT_DETECTORS,
+    SEGMENT_MATCHERS, Segment, SegmentDetector, SegmentFit, SegmentMatch, SegmentMatcher, SegmentView,
+};
 pub use stages::{InvalidStage, StageChoices};
 pub use swap_check::Sides;
 pub use track::{Pyramid, Track, Tracker};

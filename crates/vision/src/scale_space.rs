@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use crate::{
-    Image, Threads,
     gaussian::{half_kernel_into, smooth_into},
+    image::Image,
+    workspace::Threads,
 };
 
 /// The number of levels from one octave to the next; Lowe found the most repeatable extrema with three.

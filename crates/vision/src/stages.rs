@@ -2,7 +2,10 @@
 
 use seafix_component::{BuildError, Choice, Registry};
 
-use crate::{DESCRIPTORS, DETECTORS, FILTERS, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
+use crate::{
+    align::REFINEMENTS, describe::DESCRIPTORS, detect::DETECTORS, filter::FILTERS, front_end::FrontEnd,
+    locate::LOCATORS, matching::MATCHERS, triangulate::TRIANGULATORS,
+};
 
 /// The chosen component of each stage; the fields have the names of the settings.
 #[derive(Debug, Clone, Copy)]

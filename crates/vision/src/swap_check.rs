@@ -2,7 +2,13 @@
 
 use seafix_geometry::StereoRig;
 
-use crate::{Descriptor, Detector, EpipolarBand, Harris, Image, Match, Surf, View, Workspace};
+use crate::{
+    describe::{Descriptor, Surf},
+    detect::{Detector, Harris},
+    image::Image,
+    matching::{EpipolarBand, Match, View},
+    workspace::Workspace,
+};
 
 /// The numbers of matches of two images in the given and in the exchanged order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -161,6 +161,7 @@ fn bins(family: Family, numbers: impl Iterator<Item = u64>, clutter: Clutter) ->
             candidates: &candidates,
             tolerance: Tolerance::Fixed(generated.delta),
             prior: generated.prior.as_ref(),
+            edges: Default::default(),
         };
         let mut cells = Vec::new();
         for size in SIZES {

@@ -7,22 +7,15 @@ use rand_chacha::ChaCha8Rng;
 use seafix_evaluation::Solved;
 use seafix_geometry::{Camera, Object, Point, Transform};
 use seafix_proptests::problems::Listed;
-use seafix_referencing::{Acceptance, Mahalanobis, Outcome, RigidConsensus, Search, judge};
+use seafix_referencing::{Acceptance, Attempt, Mahalanobis, MaxPWrong, Outcome, RigidConsensus, Search, judge};
 use seafix_simulation::families::{Family, Generated, Presence};
-
-/// A bound of the probability of absence that rejects nothing.
-const ANYTHING: f64 = 0.999_999;
 
 /// The result of one generated problem.
 struct Tried {
     /// Whether the problem has a solution.
     defined: bool,
-    /// The probability of absence of a pose that passes all other tests; 1 of any other.
-    absent: f64,
-    /// The part of it that is due to a repeated pattern.
-    alike: f64,
-    /// The NFA of the same set, with the local density of clutter.
-    nfa: f64,
+    /// The probability that a pose is wrong which passes all other tests; 1 of any other.
+    p_wrong: f64,
     /// The reason of the rejection by the default settings; `None` if they accept.
     refused: Option<&'static str>,
     right: bool,
@@ -38,31 +31,27 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
         Transform::<Camera, Object>::from_rows(&generated.truth.t_cam_obj).expect("it is a rigid motion").inverse();
     let rule = Solved { ideal_rms: generated.truth.ideal_tre_rms, putative: file.putative.is_some() };
     let at: Vec<Point<Object>> = file.model.iter().map(|point| point.at).collect();
-    // Nothing is rejected by its NFA either: the row of the default is judged by the default.
-    let acceptance = Acceptance { absence: ANYTHING, max_nfa: f64::INFINITY, ..Acceptance::default() };
+    let acceptance = Acceptance { max_p_wrong: MaxPWrong::Number(1.0), ..Acceptance::default() };
     let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0));
     let posterior = found.as_ref().ok().and_then(|found| found.posterior.clone()).unwrap_or_default();
     let map_estimate =
         posterior.explanations.first().is_some_and(|best| rule.holds(&best.object_from_camera, &truth, &at));
-    let (mut absent, mut alike, mut right) = (1.0, 1.0, false);
+    let (mut p_wrong, mut right) = (1.0, false);
     let solver = Mahalanobis::default();
-    let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None).outcome;
-    let refused = by_default.reason();
+    let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None);
+    let refused = by_default.outcome.reason();
     let attempt = judge(&problem, found, &solver, &acceptance, None);
-    // Without rejection of absence any second pose would be a copy, so the default's answer is judged as it is.
-    let answers = [by_default, attempt.outcome].into_iter().find(|outcome| matches!(outcome, Outcome::Fix(_)));
-    if let Some(Outcome::Fix(reference)) = answers {
-        let probabilities = posterior.probabilities(&file.model, 0.08);
-        (absent, alike) = (probabilities.absent, probabilities.alike);
+    // If every probability is accepted, any second pose is a copy, so the default's answer is judged as it is.
+    let answers = [by_default, attempt].into_iter().find(|attempt| matches!(attempt.outcome, Outcome::Fix(_)));
+    if let Some(Attempt { outcome: Outcome::Fix(reference), p_wrong: Some(stated), .. }) = answers {
+        p_wrong = stated;
         right = rule.holds(&reference.object_from_camera, &truth, &at);
     }
-    let clutter_density = posterior.explanations.first().map_or(0.0, |best| best.ln_clutter_density);
-    let nfa = attempt.nfa.map_or(f64::INFINITY, |expected| expected * clutter_density.exp());
-    Tried { defined: generated.truth.pose_defined, absent, alike, nfa, refused, right, map_estimate }
+    Tried { defined: generated.truth.pose_defined, p_wrong, refused, right, map_estimate }
 }
 
 /// Numbers of solved (of those with a solution), wrong (of the answers with the object present), and answered problems
-/// without the object, for several values of `acceptance.absence`.
+/// without the object, for several values of `acceptance.max-p-wrong`.
 ///
 /// `cargo test --release -p seafix-proptests acceptance:: -- --ignored --nocapture`; `ACCEPTANCE_FAMILIES` (abcdefg),
 /// `ACCEPTANCE_PRESENT` (252) and `ACCEPTANCE_ABSENT` (252) frames of each family, `ACCEPTANCE_SEED` (21),
@@ -111,8 +100,8 @@ fn what_is_solved_depends_on_what_is_believed() {
             );
         };
         row("default".to_owned(), &|one| one.refused.is_none());
-        for absence in [0.5, 0.1, 1e-2, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 1e-6] {
-            row(format!("{absence:.0e}"), &|one| one.absent <= absence);
+        for max in [0.5, 0.1, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 1e-4, 1e-5] {
+            row(format!("{max:.0e}"), &|one| one.p_wrong <= max);
         }
         // The unsolved problems with a solution: reasons, with the most probable pose right and wrong.
         let mut reasons: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
@@ -120,10 +109,5 @@ fn what_is_solved_depends_on_what_is_believed() {
             reasons.entry(one.refused.unwrap_or("answered")).or_default()[usize::from(!one.map_estimate)] += 1;
         }
         println!("{name}, of {defined} not solved (most probable pose right, wrong): {reasons:?}");
-        // The default, or the NFA with a bound of the probability of absence.
-        for (nfa, absence) in [(1e-4, 1e-2), (3e-5, 1e-2), (1e-5, 1e-2), (3e-5, 5e-4), (1e-5, 5e-4)] {
-            let rare = |one: &Tried| one.nfa <= nfa && one.absent <= absence && one.alike <= 2e-5;
-            row(format!("NFA {nfa:.0e}, {absence:.0e}"), &|one| one.refused.is_none() || rare(one));
-        }
     }
 }

@@ -7,19 +7,26 @@ use seafix_component::Choice;
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
 use seafix_proptests::clutter_patterns::{ClutterPattern, scene};
 use seafix_referencing::{
-    Acceptance, Attempt, Candidates, Gate, Mahalanobis, ModelPoint, Outcome, Prior, PriorBound, Problem, SEARCHES,
-    Search, Tolerance, candidates, compute_fix, rms_apart,
+    Acceptance, Attempt, Candidates, Gate, Mahalanobis, MaxPWrong, ModelPoint, Outcome, Prior, PriorBound, Problem,
+    SEARCHES, Search, Tolerance, candidates, compute_fix, rms_apart,
 };
 
 /// Numbers of answers and wrong ones over the scenes.
-fn answered(name: &str, clutter_pattern: ClutterPattern, visible: usize, scenes: u64) -> (usize, usize) {
+fn answered(
+    name: &str,
+    max_p_wrong: MaxPWrong,
+    clutter_pattern: ClutterPattern,
+    visible: usize,
+    scenes: u64,
+) -> (usize, usize) {
     let search = SEARCHES.build(&Choice::named(name)).expect("it is listed");
+    let acceptance = Acceptance { max_p_wrong, ..Acceptance::default() };
     let (mut answers, mut wrong) = (0, 0);
     for seed in 0..scenes {
         let scene = scene(clutter_pattern, visible, seed);
         let problem = scene.problem();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let attempt = compute_fix(&problem, &*search, &Mahalanobis::default(), &Acceptance::default(), None, &mut rng);
+        let attempt = compute_fix(&problem, &*search, &Mahalanobis::default(), &acceptance, None, &mut rng);
         if let Outcome::Fix(fix) = attempt.outcome {
             answers += 1;
             wrong += usize::from(
@@ -40,7 +47,7 @@ fn what_structured_clutter_are_answered() {
             for visible in [0, 5, 8, 10] {
                 println!(
                     "{name} {clutter_pattern:?} visible {visible}: {:?} of {scenes}",
-                    answered(name, clutter_pattern, visible, scenes)
+                    answered(name, MaxPWrong::Balanced, clutter_pattern, visible, scenes)
                 );
             }
         }
@@ -50,16 +57,15 @@ fn what_structured_clutter_are_answered() {
 /// Clutter of the lattice that continues the object, of points measured twice, and clumped about the predicted
 /// positions is not taken for the object.
 ///
-/// Seen to fail without the test for structured clutter (a fifth of the gratings), when two points measured at one
-/// position count as two (two of the doubled scenes), and when the density of clutter is taken as uniform in a gate
-/// (two of the clumped).
+/// At a limit of 1e-3 two fixes in 160 scenes have a probability of 1 %, three of 0.06 %. At `strict` there is none.
 #[test]
 fn clutter_that_resembles_the_object_is_not_fixed() {
-    for (clutter_pattern, scenes) in
-        [(ClutterPattern::Gaps, 32), (ClutterPattern::Doubles, 160), (ClutterPattern::Clumped, 160)]
+    for (clutter_pattern, scenes, accidents) in
+        [(ClutterPattern::Gaps, 32, 0), (ClutterPattern::Doubles, 160, 0), (ClutterPattern::Clumped, 160, 2)]
     {
-        let (answers, _) = answered("rigid-consensus", clutter_pattern, 0, scenes);
-        assert_eq!(answers, 0, "{clutter_pattern:?}");
+        let count = |max_p_wrong| answered("rigid-consensus", max_p_wrong, clutter_pattern, 0, scenes).0;
+        assert_eq!(count(MaxPWrong::Strict), 0, "{clutter_pattern:?}");
+        assert!(count(MaxPWrong::Balanced) <= accidents, "{clutter_pattern:?}");
     }
 }
 
@@ -102,14 +108,22 @@ impl Shown {
         let prior = prior.as_ref();
         let candidates = candidates(&model, &cloud, prior, &Gate::default(), None);
         let tolerance = Tolerance::Fixed(0.0424);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior,
+            edges: Default::default(),
+        };
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         compute_fix(&problem, search, &Mahalanobis::default(), acceptance, None, &mut rng)
     }
 }
 
 /// An object a twentieth or a tenth larger or smaller is rarely answered, since four or five of its points are within
-/// noise of the model's. No search answers with a set whose NFA exceeds `acceptance.max_nfa`.
+/// noise of the model's. No search answers with a set whose probability of being wrong, or whose NFA,
+/// exceeds `acceptance.max_p_wrong`.
 ///
 /// Seen to fail when the NFA is not tested for searches by evidence.
 #[test]
@@ -131,7 +145,10 @@ fn a_random_set_is_no_answer() {
             if matches!(attempt.outcome, Outcome::Fix(_)) {
                 answers += 1;
                 let expected = attempt.nfa.expect("a search found it");
-                assert!(expected <= acceptance.max_nfa, "{name} {seed}: NFA {expected}");
+                let odds = acceptance.max_p_wrong.value() / (1.0 - acceptance.max_p_wrong.value());
+                assert!(expected <= odds, "{name} {seed}: NFA {expected}");
+                let p_wrong = attempt.p_wrong.expect("a search found it");
+                assert!(acceptance.max_p_wrong.allows(p_wrong), "{name} {seed}: {p_wrong}");
             }
         }
         assert!(answers < 12, "{name}: {answers} of 60");
@@ -162,6 +179,7 @@ fn a_smaller_copy_is_not_passed_over() {
             candidates: &candidates,
             tolerance: Tolerance::Fixed(0.04),
             prior: None,
+            edges: Default::default(),
         };
         let search = SEARCHES.build(&Choice::named("rigid-consensus")).expect("it is listed");
         let attempt = compute_fix(&problem, &*search, &Mahalanobis::default(), &Acceptance::default(), None, &mut rng);

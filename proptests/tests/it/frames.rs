@@ -74,6 +74,7 @@ fn object() -> impl Strategy<Value = SiteObject> {
             points: points
                 .map(|(i, (at, sigma))| ModelPoint { sigma, ..ModelPoint::exact(format!("P{i}"), at) })
                 .collect(),
+            edges: Vec::new(),
             interest: Vec::new(),
         }
     })

@@ -167,7 +167,9 @@ fn reproduces(layouts: u64) {
                 let draw = |draw| {
                     let mut points = observations(&placed, draw, 0.0).expect("every draw can be triangulated");
                     points.truncate(USED);
-                    let pose = built.solve(&Observations { points, rig: Some(&placed.rig) }).expect("thirteen points");
+                    let pose = built
+                        .solve(&Observations { points, edges: Vec::new(), rig: Some(&placed.rig) })
+                        .expect("thirteen points");
                     let (used, others) = placed.model.split_at(USED);
                     let rms = |points| transfer_rms(&pose, truth, points).expect("there are points");
                     [rms(others), rms(used), position_error(&pose, truth)].map(|error| (error * 1e3).powi(2))
@@ -433,7 +435,7 @@ fn no_answer_is_less_likely_than_the_truth() {
             let placed = settings.place(1).expect("the layout can be placed");
             for draw in 0..500 {
                 let Some(points) = observations(&placed, draw, 0.0) else { continue };
-                let data = Observations { points, rig: Some(&placed.rig) };
+                let data = Observations { points, edges: Vec::new(), rig: Some(&placed.rig) };
                 let Ok(pose) = solver.solve(&data) else {
                     refused += 1;
                     continue;

@@ -5,6 +5,7 @@
 mod a_contrario;
 mod acceptance;
 mod answers;
+mod association;
 mod between_fixes;
 mod clutter_patterns;
 mod complete;

@@ -135,7 +135,14 @@ fn a_true_set_is_coherent_by_construction() {
         });
         // Rounding of coordinates and roots adds to the errors.
         let tolerance = Tolerance::Fixed(2.0 * 3f64.sqrt() * e + 1e-12);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let [a, b] = [0, 1].map(|i| Correspondence { model: i, cloud: i });
         assert!(problem.coherent(a, b), "draw {draw}: {places:?}");
     }

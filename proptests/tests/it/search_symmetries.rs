@@ -10,6 +10,7 @@ use seafix_proptests::{
     law, not_idle,
     poses::pose,
     problems::{LARGE, Planted, SMALL, planted},
+    search_laws::{self, all_distinct, gist},
     searches::{Answer, searches},
 };
 use seafix_referencing::{
@@ -21,88 +22,9 @@ use std::cell::Cell;
 /// A budget of pair tests for hundreds of cases.
 const BUDGET: i64 = 20_000;
 
-/// An answer without its cost: the set, or the reason.
-fn gist(answer: &Answer) -> Result<Vec<Correspondence>, &'static str> {
-    answer.as_ref().map(|found| found.pairs.clone()).map_err(Rejected::reason)
-}
-
-fn distinct(points: impl Iterator<Item = Vector3<f64>>) -> bool {
-    let points: Vec<_> = points.collect();
-    points.iter().enumerate().all(|(i, a)| points[..i].iter().all(|b| a != b))
-}
-
-fn all_distinct(planted: &Planted) -> bool {
-    distinct(planted.model.iter().map(|p| p.at.coords)) && distinct(planted.cloud.iter().map(|c| c.position.at.coords))
-}
-
 /// The cloud points, each mapped by `change`.
 fn with_cloud(planted: &Planted, change: impl Fn(&MeasuredPoint) -> MeasuredPoint) -> Planted {
     Planted { cloud: planted.cloud.iter().map(change).collect(), ..planted.clone() }
-}
-
-/// P20. Points outside of every gate do not change the result: with 10 000 distant points more the answer is the same
-/// to the last bit.
-///
-/// Seen to fail when the size of the cloud counts among the tests.
-#[test]
-fn points_outside_every_gate_change_nothing() {
-    let searches = searches(BUDGET);
-    law(8, planted(LARGE), |planted| {
-        let mut more = planted.clone();
-        more.cloud.extend((0..10_000).map(|i| {
-            let at = Point::new(1e3 + f64::from(i), -1e4, 1e5 * f64::from(i % 7));
-            MeasuredPoint { position: UncertainPoint::isotropic(at, 0.01), pixels: None }
-        }));
-        for search in &searches {
-            prop_assert_eq!(search.answer(&more), search.answer(&planted), "{}", &search.name);
-        }
-        Ok(())
-    });
-}
-
-/// P24. The order of model and cloud changes only the order of the listing, if no two points coincide.
-///
-/// Seen to fail when vertices are sorted by their indices.
-#[test]
-fn the_order_of_the_points_changes_nothing() {
-    let searches = searches(BUDGET);
-    let answered = Cell::new(0);
-    let cases = law(96, (prop_oneof![planted(SMALL), planted(LARGE)], any::<u64>()), |(planted, seed)| {
-        prop_assume!(all_distinct(&planted));
-        // A multiplicative shuffle: the new index k has the old point order[k].
-        let order = |count: usize| {
-            let mut order: Vec<usize> = (0..count).collect();
-            order.sort_by_key(|&i| (i as u64 + 1).wrapping_mul(seed | 1).rotate_left(17).wrapping_mul(0x9E37_79B9));
-            order
-        };
-        let (models, clouds) = (order(planted.model.len()), order(planted.cloud.len()));
-        let new = |old: usize| clouds.iter().position(|&j| j == old).expect("a permutation");
-        let moved = Planted {
-            model: models.iter().map(|&i| planted.model[i].clone()).collect(),
-            cloud: clouds.iter().map(|&j| planted.cloud[j]).collect(),
-            candidates: Candidates::from_pairs(
-                models.len(),
-                models
-                    .iter()
-                    .enumerate()
-                    .flat_map(|(k, &i)| planted.candidates.lists[i].iter().map(|&j| (k, new(j))).collect::<Vec<_>>()),
-            ),
-            ..planted.clone()
-        };
-        for search in &searches {
-            let back = gist(&search.answer(&moved)).map(|pairs| {
-                let old =
-                    |pair: &Correspondence| Correspondence { model: models[pair.model], cloud: clouds[pair.cloud] };
-                let mut pairs: Vec<_> = pairs.iter().map(old).collect();
-                pairs.sort();
-                pairs
-            });
-            answered.set(answered.get() + u32::from(back.is_ok()));
-            prop_assert_eq!(gist(&search.answer(&planted)), back, "{}", &search.name);
-        }
-        Ok(())
-    });
-    not_idle("answers", answered.get(), cases, 1);
 }
 
 /// Whether a search exhausted its budget.
@@ -281,7 +203,14 @@ fn mirror_images_fixed(clouds: usize) -> usize {
         let cloud: Vec<MeasuredPoint> = model.iter().map(measured).collect();
         let candidates = Candidates::all(n, n);
         let tolerance = Tolerance::Fixed(0.042_426);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
         let attempt = compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng);
         let few = |pairs: usize| 5 * pairs <= 3 * n;
@@ -303,4 +232,16 @@ fn a_mirror_image_of_many_points_is_not_fixed() {
 #[ignore = "long: 6000 problems"]
 fn six_thousand_mirror_images_are_not_fixed() {
     assert_eq!(mirror_images_fixed(6000), 0);
+}
+
+/// Seen to fail when vertices are sorted by their indices.
+#[test]
+fn the_order_of_the_points_changes_nothing() {
+    search_laws::the_order_of_the_points_changes_nothing(&searches(BUDGET));
+}
+
+/// Seen to fail when the size of the cloud counts among the tests.
+#[test]
+fn points_outside_every_gate_change_nothing() {
+    search_laws::points_outside_every_gate_change_nothing(&searches(BUDGET));
 }

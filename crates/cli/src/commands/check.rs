@@ -2,15 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix_component::Fault;
-use seafix_component::read_text;
-use seafix_data::{dataset, source::check_recording};
-use seafix_experiment::{Plan, check_run, is_run};
-use seafix_io::ImageLimits;
-use seafix_log::{LogError, Reader, Recording};
+use seafix_component::{Fault, decoded, read_text, undecodable};
+use seafix_data::{
+    dataset,
+    source::{check_recording, is_recording},
+};
+use seafix_experiment::{Plan, check_run, inputs, is_run};
+use seafix_io::{
+    ImageLimits,
+    calibration::{self, Given},
+};
+use seafix_log::{LogError, Reader, Recording, unchanged};
 use seafix_referencing::{Site, TargetKind, problem_file};
 use seafix_simulation::scene::SitePlan;
 
+use super::convert;
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT},
     publication,
@@ -28,7 +34,10 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
     let mut files = Vec::new();
     paths.iter().for_each(|path| gather(path, &mut files));
     for path in &files {
-        let Examined { faults, warnings, note } = examine(path, limits);
+        let panicked =
+            |message| Examined { faults: vec![undecodable(path, message).to_string()], ..Examined::default() };
+        let examined = decoded(|| Ok(examine(path, limits)), panicked).unwrap_or_else(|panicked| panicked);
+        let Examined { faults, warnings, note } = examined;
         let mut text: String = faults.iter().map(|fault| format!("fault: {fault}\n")).collect();
         text += &warnings.iter().map(|warning| format!("warning: {warning}\n")).collect::<String>();
         text += &note;
@@ -46,7 +55,11 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
 /// recursively and sorted by name.
 fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     let before = files.len();
-    let entries = if path.is_dir() && !dataset::is_one(path) { std::fs::read_dir(path).ok() } else { None };
+    let entries = if path.is_dir() && !dataset::is_one(path) && !is_recording(path) {
+        std::fs::read_dir(path).ok()
+    } else {
+        None
+    };
     let mut entries: Vec<PathBuf> =
         entries.into_iter().flatten().filter_map(|entry| Some(entry.ok()?.path())).collect();
     entries.sort();
@@ -62,7 +75,7 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
         // Links are not followed: they may be circular.
         let is_link = entry.is_symlink();
         match entry.is_dir() {
-            true if dataset::is_one(&entry) => files.push(entry),
+            true if dataset::is_one(&entry) || is_recording(&entry) => files.push(entry),
             true if !is_link => {
                 let here = files.len();
                 gather(&entry, files);
@@ -91,16 +104,26 @@ struct Examined {
 /// The faults and warnings of one file or folder, by its format.
 fn examine(path: &Path, limits: ImageLimits) -> Examined {
     let lines = |faults: Vec<Fault>| faults.iter().map(ToString::to_string).collect();
+    let recording = || {
+        let (faults, warnings, reported) = check_recording(path, limits);
+        let note = if reported.is_empty() { reported } else { format!("note: {reported}\n") };
+        Examined { faults: lines(faults), warnings, note }
+    };
+    if is_recording(path) {
+        return recording();
+    }
     if path.extension().is_some_and(|extension| extension == "mcap") {
         return match log(path) {
             Ok(warning) => Examined { warnings: warning.into_iter().collect(), ..Examined::default() },
             // An intact file without a trial header is a recording.
-            Err(LogError::Foreign { .. }) if !is_of_a_trial(path) => {
-                let (faults, warnings, reported) = check_recording(path, limits);
-                let note = if reported.is_empty() { reported } else { format!("note: {reported}\n") };
-                Examined { faults: lines(faults), warnings, note }
-            }
+            Err(LogError::Foreign { .. }) if !is_of_a_trial(path) => recording(),
             Err(error) => Examined { faults: vec![error.to_string()], ..Examined::default() },
+        };
+    }
+    if calibration::is_calibration(path) {
+        return match calibration::read(&[path.to_owned()], Given::default()) {
+            Ok(found) => Examined { note: format!("note: {}\n", convert::summary(&found)), ..Examined::default() },
+            Err(fault) => Examined { faults: vec![fault.to_string()], ..Examined::default() },
         };
     }
     let (faults, warnings) = read(path, limits);
@@ -109,6 +132,7 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
 
 /// Reads all frames of a log; the result is a warning for a log that `seafix recover` saved.
 fn log(path: &Path) -> Result<Option<Fault>, LogError> {
+    unchanged(path)?;
     let mut reader = Reader::open(path)?;
     reader.by_ref().try_for_each(|frame| frame.map(|_| ()))?;
     Ok(reader.recovered().map(|lost| {
@@ -148,7 +172,10 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
                 }
                 Some(format) if format.starts_with("seafix-geometry/") => faults(geometry(path)),
                 Some(format) if format.starts_with("seafix-reports/") => faults(publication::read(path).map(|_| ())),
-                _ => faults(Plan::read(path, &[]).map(|_| ())),
+                _ => match Plan::read(path, &[]) {
+                    Ok(plan) => inputs(&plan),
+                    Err(faults) => (faults, Vec::new()),
+                },
             },
         },
     }

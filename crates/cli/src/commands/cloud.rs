@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use super::limits::Limits;
 use crate::{
+    atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     ply,
     terminal::{notify, print},
@@ -58,6 +59,8 @@ pub(crate) struct Cloud {
     /// Write the cloud to this PLY file.
     #[arg(long, value_name = "CLOUD.ply")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 impl Cloud {
@@ -93,7 +96,8 @@ impl Cloud {
             .collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         if let Some(path) = &self.out {
-            ply::write(path, &look.cloud, &left)?;
+            let inputs = [&*self.left, &*self.right, &*self.rig];
+            AtomicFile::begin(path, self.replacing, &inputs)?.finish(ply::ply(&look.cloud, &left))?;
         }
         let pipeline = pipeline.resolved().map_err(|error| Failure::new(USAGE, error))?;
         print(&if self.json {

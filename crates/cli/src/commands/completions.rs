@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Command};
 use clap_complete::Shell;
-use seafix_component::Fault;
+use seafix_component::{Fault, create_real_folder};
 
 use crate::{
     exit::{DONE, Ended, Failure, OUTPUT},
@@ -34,19 +34,22 @@ impl Completions {
 /// The manual pages.
 #[derive(Debug, Args)]
 pub(crate) struct Man {
-    /// The folder for the pages, one for each command; it is created if it does not exist.
+    /// The folder for the pages, one for each command; new or empty.
     folder: PathBuf,
 }
 
 impl Man {
     pub(crate) fn execute(&self, program: Command) -> Ended {
         let write = |folder: &Path| {
-            std::fs::create_dir_all(folder)?;
+            create_real_folder(folder)?;
+            if std::fs::read_dir(folder)?.next().is_some() {
+                return Err(std::io::Error::other("it is not empty"));
+            }
             clap_mangen::generate_to(program.name(PROGRAM), folder)
         };
         write(&self.folder).map_err(|error| {
             let what = format!("cannot write manual pages ({error})");
-            Failure::new(OUTPUT, Fault::new(what, &self.folder).remedy("name a writable folder"))
+            Failure::new(OUTPUT, Fault::new(what, &self.folder).remedy("name a new or empty folder"))
         })?;
         Ok(DONE)
     }

@@ -3,6 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use clap::Args;
+use seafix_component::create_real_folder;
 use seafix_simulation::families::{Family, Generated, Presence};
 
 use crate::{
@@ -37,7 +38,7 @@ impl Generate {
         let failed = |error: &dyn std::fmt::Display| {
             Failure::new(OUTPUT, format!("cannot write into {}: {error}", self.out.display()))
         };
-        fs::create_dir_all(&self.out).map_err(|error| failed(&error))?;
+        create_real_folder(&self.out).map_err(|error| failed(&error))?;
         if fs::read_dir(&self.out).map_err(|error| failed(&error))?.next().is_some() {
             return Err(failed(&"the folder is not empty; name another folder with --out"));
         }

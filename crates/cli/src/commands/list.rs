@@ -12,7 +12,7 @@ use crate::{
 #[derive(Debug, Args)]
 pub(crate) struct List {
     /// List this kind only: sources, filters, detectors, locators, descriptors, matchers, refinements, triangulators,
-    /// searches, solvers, odometries, policies or fusions.
+    /// segment-detectors, segment-matchers, searches, solvers, odometries, policies or fusions.
     kind: Option<String>,
     /// Print the tables of docs/components.md.
     #[arg(long, conflicts_with = "kind")]

@@ -2,14 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::{CommandFactory, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
-use crate::{Arguments, exit::Ended};
+use crate::exit::Ended;
 
 mod check;
 mod cloud;
 mod compare;
 mod completions;
+mod convert;
 mod diff;
 mod dive;
 mod eval;
@@ -31,6 +32,14 @@ mod show;
 mod solve;
 mod sweep;
 
+/// Position and attitude of an underwater vehicle relative to a known structure, from stereo images.
+#[derive(Debug, Parser)]
+#[command(name = "seafix", version, propagate_version = true)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
 /// The subcommands of `seafix`.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
@@ -44,6 +53,8 @@ pub(crate) enum Command {
     Solve(solve::Solve),
     /// Triangulate the cloud of one stereo pair.
     Cloud(cloud::Cloud),
+    /// Convert files of other programs.
+    Convert(convert::Convert),
     /// Build the model of an object from points marked by hand in one stereo pair.
     Model(model::Model),
     /// Estimate the trajectory of a stereo rig through a data set, relative to the first pose.
@@ -66,9 +77,9 @@ pub(crate) enum Command {
     },
     /// List the components for experiment files.
     List(list::List),
-    /// Show the purpose, source and settings of a component, with defaults.
+    /// Show the settings of a component, or of a table of a file: meaning, unit, range and default.
     Show {
-        /// The component's name.
+        /// The component's name, or `experiment`, `pipeline`, `acceptance`, `navigation`, `sites` or a table below them.
         name: String,
     },
     /// Print the JSON schema of a file format, for completion in editors.
@@ -103,6 +114,7 @@ impl Command {
             Self::Merge(command) => command.execute(),
             Self::Solve(command) => command.execute(),
             Self::Cloud(command) => command.execute(),
+            Self::Convert(command) => command.execute(),
             Self::Model(command) => command.execute(),
             Self::Odometry(command) => command.execute(),
             Self::Generate(command) => command.execute(),

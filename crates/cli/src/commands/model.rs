@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::limits::Limits;
 use crate::{
-    atomic_file,
+    atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended, Failure, INPUT, USAGE},
     terminal::{notify, print},
 };
@@ -57,6 +57,8 @@ pub(crate) struct Model {
     /// Write the site (seafix-site/1) to this file [default: standard output].
     #[arg(long, value_name = "SITE.toml")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 impl Model {
@@ -97,7 +99,8 @@ impl Model {
         model.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         let site = model.site.to_toml();
         if let Some(path) = &self.out {
-            atomic_file::write(path, &site)?;
+            let inputs = [&*self.left, &*self.right, &*self.rig, &*self.points];
+            AtomicFile::begin(path, self.replacing, &inputs)?.finish(&site)?;
         }
         match (self.json, &self.out) {
             (true, _) => print(&machines(&model))?,

@@ -13,12 +13,14 @@ use seafix_data::dataset::{
     Dataset, DatasetFrame, are_identical, identical_images_fault, right_camera_rotation, swapped_at_first, tum,
 };
 use seafix_experiment::changed;
-use seafix_navigation::{Lost, ODOMETRIES, Odometry, OdometryOutcome, OdometryTrajectory, Segment, StereoPair};
+use seafix_navigation::{
+    Lost, ODOMETRIES, Odometry, OdometryOutcome, OdometryTrajectory, RangeOffset, Segment, StereoPair,
+};
 use seafix_vision::{Image, RightCameraRotation, Threads};
 use serde_json::{Value, json};
 
 use crate::{
-    atomic_file::AtomicFile,
+    atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     terminal::{Progress, notify, print},
 };
@@ -30,6 +32,8 @@ pub(crate) struct Odometer {
     /// Write the poses world_from_camera to this file in TUM's format; the world frame is the first left camera.
     #[arg(long, value_name = "FILE.tum")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
     /// The odometry component.
     #[arg(long, default_value = "stereo", value_name = "NAME")]
     odometry: String,
@@ -39,7 +43,8 @@ pub(crate) struct Odometer {
     /// Sort pairs by time and keep the first of each stamp; by default unsorted pairs are an error.
     #[arg(long)]
     sort_stamps: bool,
-    /// Do not correct the rotation of the right camera, even if the images contradict the rig.
+    /// Do not correct the rotation of the right camera or the offset of the disparities, even if images or motion
+    /// contradict the rig.
     #[arg(long)]
     keep_rig: bool,
     /// Number of threads; poses do not depend on it.
@@ -62,6 +67,8 @@ struct Trip {
     unread: Vec<(u64, Fault)>,
     /// Time of the odometry (ms), without reading of files.
     odometry_ms: f64,
+    /// The offset of the rig's disparities that the motion revealed.
+    range_offset: Option<RangeOffset>,
 }
 
 impl Odometer {
@@ -83,7 +90,8 @@ impl Odometer {
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
         // An output that cannot be written is reported before the work.
-        let out = self.out.as_deref().map(AtomicFile::begin).transpose()?;
+        let begin = |path| AtomicFile::begin(path, self.replacing, &[&self.dataset]);
+        let out = self.out.as_deref().map(begin).transpose()?;
         if let Some(fault) = swapped_at_first(&dataset) {
             return Err(Failure::new(INPUT, fault));
         }
@@ -92,18 +100,25 @@ impl Odometer {
         if let Some(found) = &right_camera_rotation {
             dataset.rig = found.rig;
         }
-        let trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+        let mut trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+        let range_offset = trip.range_offset;
+        if let Some(found) = range_offset.filter(|found| found.corrected) {
+            // The first pairs preceded the correction.
+            dataset.rig = dataset.rig.with_range_offset(found.pixels);
+            trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+        }
         if let Some(fault) = trip.motionless(&dataset.folder) {
             return Err(Failure::new(INPUT, fault));
         }
         let reported = right_camera_rotation.as_ref().map(|found| turned(found).to_string());
-        let warnings: Vec<String> = reported.into_iter().chain(trip.warnings()).collect();
+        let reported = reported.into_iter().chain(range_offset.as_ref().map(offset));
+        let warnings: Vec<String> = reported.chain(trip.warnings()).collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         if let Some(out) = out {
             out.finish(poses(&trip.trajectory))?;
         }
         print(&if self.json {
-            machines(&trip, right_camera_rotation.as_ref(), &warnings, &settings)
+            machines(&trip, right_camera_rotation.as_ref(), range_offset.as_ref(), &warnings, &settings)
         } else {
             people(&trip)
         })?;
@@ -114,7 +129,10 @@ impl Odometer {
     fn build(&self) -> Result<(Box<dyn Odometry>, Choice), Failure> {
         let usage = |error| Failure::new(USAGE, error);
         let choice = ODOMETRIES.resolve(&Choice::named(&self.odometry)).map_err(usage)?;
-        let settings = changed(&choice.settings, &self.set, "detector.features=2000")
+        let kept = self.keep_rig && choice.settings.contains_key("correct-range-offset");
+        let kept = kept.then(|| "correct-range-offset=false".to_owned());
+        let set: Vec<String> = self.set.iter().cloned().chain(kept).collect();
+        let settings = changed(&choice.settings, &set, "detector.features=2000")
             .map_err(|faults| Failure::faults(USAGE, &faults))?;
         let choice = ODOMETRIES.resolve(&Choice { settings, ..choice }).map_err(usage)?;
         Ok((ODOMETRIES.build(&choice).map_err(usage)?, choice))
@@ -159,7 +177,8 @@ impl Odometer {
                 .remedy("restore the images named above, or remove their lines");
             return Err(Failure::new(INPUT, fault));
         }
-        Ok(Trip { trajectory: session.trajectory(), given, unread, odometry_ms })
+        let range_offset = session.range_offset();
+        Ok(Trip { trajectory: session.trajectory(), given, unread, odometry_ms, range_offset })
     }
 }
 
@@ -171,6 +190,19 @@ fn turned(found: &RightCameraRotation) -> String {
          {baseline:.3}° about the baseline and {ray:.3}° about its line of sight, which leaves {:.1} px (`--keep-rig` \
          prevents it); calibrate again, since other parameters may be wrong too",
         found.given_px, found.left_px
+    )
+}
+
+/// The warning of an offset of the disparities.
+fn offset(found: &RangeOffset) -> String {
+    let RangeOffset { pixels, sigma, windows, corrected } = found;
+    let done = match corrected {
+        true => "was corrected (`--keep-rig` prevents it)",
+        false => "was not corrected",
+    };
+    format!(
+        "the motion contradicts the rig: its disparities have an offset of {pixels:.2} ± {sigma:.2} px ({windows} windows of \
+         key frames), which {done}; calibrate again, since other parameters may be wrong too"
     )
 }
 
@@ -324,6 +356,7 @@ fn people(trip: &Trip) -> String {
 fn machines(
     trip: &Trip,
     right_camera_rotation: Option<&RightCameraRotation>,
+    range_offset: Option<&RangeOffset>,
     warnings: &[String],
     settings: &Choice,
 ) -> String {
@@ -349,6 +382,12 @@ fn machines(
             "agree": found.agree,
             "given_px": found.given_px,
             "left_px": found.left_px,
+        })),
+        "range_offset": range_offset.map(|found| json!({
+            "pixels": found.pixels,
+            "sigma": found.sigma,
+            "windows": found.windows,
+            "corrected": found.corrected,
         })),
         "warnings": warnings,
         "pairs_a_second": trip.pairs_a_second(),

@@ -9,7 +9,7 @@ use clap::Args;
 use rayon::prelude::*;
 use seafix_component::counted;
 use seafix_experiment::{Existing, Options, Remade, RunError, kept_identity, remake, run};
-use seafix_report::{Forms, Report, index, index_holds, report};
+use seafix_report::{Forms, Report, claim_index, index, index_holds, report};
 
 use super::report::{failure, verified};
 use crate::{
@@ -63,6 +63,9 @@ impl Publish {
         }
         if let Some(count) = self.check {
             return self.check_some(&list, count);
+        }
+        if self.only.is_empty() {
+            claim_index(&self.out).map_err(failure)?;
         }
         for one in &list {
             let how = if self.run(one)? { "kept run" } else { "new run" };

@@ -7,6 +7,7 @@ use std::{
 };
 
 use clap::Args;
+use seafix_component::Ownership;
 use seafix_log::{LogError, Reader, join_lacking, recover};
 
 use crate::{
@@ -66,6 +67,9 @@ fn is_of_output(error: &LogError) -> bool {
 fn of_run(run: &Path, out: &Path) -> Ended {
     if out.exists() {
         return Err(Failure::new(OUTPUT, format!("{} exists; name another folder with --out", out.display())));
+    }
+    if !matches!(Ownership::of(out, "recovered").map_err(|fault| Failure::new(OUTPUT, fault))?, Ownership::Free) {
+        return Err(Failure::new(OUTPUT, format!("{} is not empty; name another folder with --out", out.display())));
     }
     let mut trials: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
     for log in inside(&run.join("pieces")).iter().flat_map(|piece| inside(piece)) {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use seafix_experiment::changed_outputs;
-use seafix_report::{Forms, ReportError, Verified, index, report, verify};
+use seafix_report::{Forms, ReportError, Verified, claim_index, index, report, verify};
 
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT, OUTPUT, USAGE},
@@ -46,6 +46,9 @@ impl Report {
             (false, false, false) => Forms::ALL,
             (html, latex, pdf) => Forms { html, latex, pdf, small: false },
         };
+        if let (true, Some(out)) = (self.index, &self.out) {
+            claim_index(out).map_err(failure)?;
+        }
         let mut findings = Vec::new();
         for (run, folder) in self.runs.iter().zip(&folders) {
             let written = report(run, folder, forms).map_err(failure)?;
@@ -129,7 +132,8 @@ fn message(verified: &Verified, folder: &str) -> String {
 
 /// The failure of an error: an unreadable log is a failure of input, an unwritable report one of output.
 pub(crate) fn failure(error: ReportError) -> Failure {
-    let output = matches!(error, ReportError::Io { doing: "write", .. } | ReportError::Foreign { .. });
+    let output =
+        matches!(error, ReportError::Io { doing: "write", .. } | ReportError::Foreign { .. } | ReportError::Folder(_));
     let code = if output { OUTPUT } else { INPUT };
     Failure::new(code, error)
 }

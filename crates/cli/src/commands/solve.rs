@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use rayon::prelude::*;
-use seafix_component::Choice;
+use seafix_component::{Choice, decoded, undecodable};
 use seafix_experiment::changed;
 use seafix_referencing::{
     Acceptance, SEARCHES, SOLVERS,
@@ -30,7 +30,7 @@ pub(crate) struct Solve {
     #[arg(long, default_value = "mahalanobis")]
     solver: String,
     /// Change a setting of the search, the solver or the acceptance: a dotted key and a TOML value,
-    /// `search.budget=1000000`, `acceptance.absence=1e-3`.
+    /// `search.budget=1000000`, `acceptance.max-p-wrong=1e-4`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Number of problems that are solved at the same time.
@@ -84,7 +84,13 @@ impl Solve {
         };
         let solve = |path: &PathBuf| {
             // Every problem has its own stream of the same seed, so that answers do not depend on each other.
-            solve_file(path, &method, Stream::new(0, 0, 0, Purpose::Search).rng())
+            let solve = || Ok(solve_file(path, &method, Stream::new(0, 0, 0, Purpose::Search).rng()));
+            // One damaged file must not end the others.
+            let failed = |message| Line::Failed {
+                file: path.display().to_string(),
+                error: undecodable(path, message).to_string(),
+            };
+            decoded(solve, failed).unwrap_or_else(|failed| failed)
         };
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
@@ -159,7 +165,10 @@ fn people(answer: &Answer) -> String {
         );
     }
     if let Some(why) = &answer.explanation {
-        text += &format!(": {why}");
+        text += &format!(": {why}; {}", answer.remedy.unwrap_or_default());
+    }
+    if let Some(cause) = &answer.diagnosis {
+        text += &format!("; {cause}");
     }
     text += &match (&answer.runner_up, answer.margin) {
         (Some(other), Some(margin)) => {
@@ -171,6 +180,12 @@ fn people(answer: &Answer) -> String {
     text += &format!(" ({:.1} ms)\n", answer.time_ms);
     for row in answer.t_cam_obj.iter().flatten().take(3) {
         text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);
+    }
+    if let Some(best) = answer.best.as_ref().filter(|_| answer.t_cam_obj.is_none()) {
+        text += &format!("  best pose, not accepted, of {} pairs:\n", best.pairs.len());
+        for row in best.t_cam_obj.iter().take(3) {
+            text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);
+        }
     }
     text += &answer.integrity.as_ref().map_or_else(String::new, |support| format!("  {}\n", protected(support)));
     text

@@ -6,6 +6,7 @@ use std::{
 };
 
 use clap::{Args, ValueEnum};
+use seafix_component::{Fault, MARKER, Marker, Ownership, PartialFile, create_real_folder};
 use seafix_experiment::{Existing, Options, Plan, merge};
 use serde_json::Value;
 
@@ -44,6 +45,10 @@ pub(crate) struct Sweep {
     separate: bool,
 }
 
+/// The folder of the tasks' output, and the script of each task, in the folder of the shards.
+const LOGS: &str = "logs";
+const SCRIPT: &str = "shard.sh";
+
 /// The supported engines.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Engine {
@@ -72,15 +77,30 @@ impl Sweep {
         let refuse = |path: &Path, error: std::io::Error| {
             Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()))
         };
-        if self.out.exists() && fs::read_dir(&self.out).map_or(true, |mut entries| entries.next().is_some()) {
+        let owner = |folder: &Path, kind| Ownership::of(folder, kind).map_err(|fault| Failure::new(OUTPUT, fault));
+        if !matches!(owner(&self.out, "run")?, Ownership::Free) {
             let what = format!("{} exists and is not empty; name another folder", self.out.display());
             return Err(Failure::new(OUTPUT, what));
         }
         let shards = absolute(&self.shards_folder())?;
-        let logs = shards.join("logs");
-        fs::create_dir_all(&logs).map_err(|error| refuse(&logs, error))?;
-        let script = shards.join("shard.sh");
-        fs::write(&script, self.script(&shards, executor.variable())?).map_err(|error| refuse(&script, error))?;
+        let mut marker = self.marker(&plan.name);
+        match owner(&shards, "shards")? {
+            Ownership::Free => {}
+            // An earlier division may have had more shards.
+            Ownership::Ours(earlier) => marker = marker.and(&earlier),
+            Ownership::Foreign(other) => {
+                let fault = Fault::new("the folder of the shards is not empty", &shards);
+                let remedy = "name another folder with --out, or move it away";
+                return Err(Failure::new(OUTPUT, fault.value(format!("it holds `{other}`")).remedy(remedy)));
+            }
+        }
+        let logs = shards.join(LOGS);
+        fs::create_dir_all(&shards).map_err(|error| refuse(&shards, error))?;
+        marker.write(&shards).map_err(|error| refuse(&shards.join(MARKER), error))?;
+        create_real_folder(&logs).map_err(|error| refuse(&logs, error))?;
+        let script = shards.join(SCRIPT);
+        let text = self.script(&shards, executor.variable())?;
+        PartialFile::write(&script, text.as_bytes()).map_err(|error| refuse(&script, error))?;
         let (tasks, threads) = (self.shards as usize, usize::from(self.threads));
         notify(&format!("{tasks} shards of {} in {}", plan.name, shards.display()));
         signals::listen();
@@ -90,11 +110,19 @@ impl Sweep {
         if signals::turned_out() {
             return Err(Failure::new(signals::exit_code(), "interrupted; the same command resumes the sweep"));
         }
-        self.merge(&shards)
+        self.merge(&shards, &marker)
+    }
+
+    /// The marker of the folder of the shards.
+    fn marker(&self, name: &str) -> Marker {
+        let logs = (1..=self.shards).map(|k| format!("{LOGS}/{k}.log"));
+        let marker = Marker::new("shards", name, logs.chain([SCRIPT.to_owned()]));
+        (1..=self.shards).fold(marker, |marker, k| marker.with_folder(k.to_string()))
     }
 
     fn shards_folder(&self) -> PathBuf {
-        let mut name = self.out.as_os_str().to_owned();
+        // Without a final separator.
+        let mut name = self.out.components().as_path().as_os_str().to_owned();
         name.push("-shards");
         PathBuf::from(name)
     }
@@ -120,7 +148,7 @@ impl Sweep {
         ))
     }
 
-    fn merge(&self, shards: &Path) -> Ended {
+    fn merge(&self, shards: &Path, marker: &Marker) -> Ended {
         let folders: Vec<PathBuf> = (1..=self.shards).map(|k| shards.join(k.to_string())).collect();
         let full = |folder: &PathBuf| {
             let text = fs::read_to_string(folder.join("manifest.json")).unwrap_or_default();
@@ -142,8 +170,10 @@ impl Sweep {
         let finished = merge(&folders, &options, &progress);
         progress.end();
         report_on(&finished?, cores)?;
-        fs::remove_dir_all(shards)
-            .map_err(|error| Failure::new(OUTPUT, format!("cannot remove {}: {error}", shards.display())))?;
+        marker.remove(shards).map_err(|fault| Failure::new(OUTPUT, fault))?;
+        if shards.exists() {
+            notify(&format!("{} holds other files, and stays", shards.display()));
+        }
         Ok(DONE)
     }
 }

@@ -1,6 +1,6 @@
 //! The executor for HyperQueue: one task array on its workers.
 
-use super::{Array, Executor, engine, word};
+use super::array::{Array, Executor, engine, word};
 use crate::exit::Failure;
 
 /// A task array, submitted by `hq submit --array` to the server that `hq` finds.

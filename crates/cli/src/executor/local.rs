@@ -5,7 +5,7 @@ use std::{
     process::{Child, Command, Stdio},
 };
 
-use super::{Array, Executor};
+use super::array::{Array, Executor};
 use crate::{
     exit::{Failure, OUTPUT},
     signals,
@@ -44,6 +44,10 @@ impl Local {
     fn begin(self, array: &Array, task: usize) -> Result<Child, Failure> {
         let path = array.logs.join(format!("{task}.log"));
         let refuse = |error: std::io::Error| Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()));
+        if path.is_symlink() {
+            let what = format!("cannot write {}: a symbolic link; remove it", path.display());
+            return Err(Failure::new(OUTPUT, what));
+        }
         let log = File::create(&path).map_err(refuse)?;
         let message = log.try_clone().map_err(refuse)?;
         let mut command = Command::new("sh");

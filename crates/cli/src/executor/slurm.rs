@@ -1,6 +1,6 @@
 //! The executor for a Slurm cluster: one job array.
 
-use super::{Array, Executor, engine, word};
+use super::array::{Array, Executor, engine, word};
 use crate::exit::Failure;
 
 /// A job array, submitted by `sbatch --array`; all nodes share a file system.

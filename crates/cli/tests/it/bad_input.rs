@@ -194,7 +194,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
 fn a_truncated_image() {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();
-    sample.refused(3, &["a.pgm", "PNG, JPEG or PNM"]);
+    sample.refused(3, &["a.pgm", "PNG, JPEG, TIFF or PNM"]);
 }
 
 /// Seen to fail when lines are counted one too far.

@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 /// The packages from the lowest layer to the highest. A package depends on packages of lower layers only, never on one
 /// of its own layer. `ARCHITECTURE.md` explains the layers.
 const LAYERS: &[&[&str]] = &[
+    &["seafix-derive"],
     &["seafix-component"],
     &["seafix-geometry"],
     &["seafix-vision", "seafix-referencing", "seafix-evaluation", "seafix-log"],

@@ -7,13 +7,17 @@ use std::process::Command;
 mod bad_input;
 mod circles;
 mod cloud;
+mod documentation;
 mod eval;
+mod foreign_files;
 mod generate;
 #[cfg(unix)]
 mod hyperqueue;
 mod layers;
 mod model;
 mod odometry;
+#[cfg(unix)]
+mod ownership;
 mod recordings;
 mod runs;
 #[cfg(target_os = "linux")]
@@ -21,6 +25,7 @@ mod safety;
 #[cfg(target_os = "linux")]
 mod slurm;
 mod solve;
+mod supply;
 
 /// The command of the program, without arguments.
 fn program() -> Command {

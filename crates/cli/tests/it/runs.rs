@@ -331,10 +331,18 @@ fn a_kept_run_is_made_again_when_its_results_may_differ() {
     let table = fs::read_to_string(run.join("results.csv")).unwrap();
     let changed = table.lines().map(|line| line.replacen("fix", "referenceD", 1) + "\n").collect::<String>();
     fs::write(run.join("results.csv"), changed).unwrap();
+    let (code, _, error) = publish(&["--check", "5"]);
+    assert!(code == 3 && error.contains("not the file that its run has written"), "{error}");
+    // Without its hash the table counts as written by an earlier program.
+    let manifest = fs::read_to_string(run.join("manifest.json")).unwrap();
+    let mut unhashed: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    unhashed["outputs"].as_object_mut().unwrap().remove("results.csv");
+    fs::write(run.join("manifest.json"), unhashed.to_string()).unwrap();
     let (code, out, _) = publish(&["--check", "5"]);
     assert!(code == 1 && out.contains("1 of 2 kept runs") && out.contains("raise the VERSION"), "{out}");
     assert_eq!(fs::read_dir(folder.join("runs/reports")).unwrap().count(), 2, "a check leaves nothing behind");
     fs::write(run.join("results.csv"), table).unwrap();
+    fs::write(run.join("manifest.json"), manifest).unwrap();
 
     // Foreign files are not removed.
     fs::write(run.join("notes.txt"), "mine").unwrap();

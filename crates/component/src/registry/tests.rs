@@ -1,21 +1,27 @@
 use super::*;
+use seafix_component::Settings;
 use serde::Deserialize;
 
 trait Shape: std::fmt::Debug {
     fn area(&self) -> f64;
 }
 
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 struct Square {
+    /// Length of a side (m).
     side_length: f64,
+    /// Frame around the square.
     frame: Frame,
 }
 
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 struct Frame {
+    /// Width of the frame (m).
     width: f64,
+    /// Frames within the frame.
+    #[setting(form = Vec<toml::Value>)]
     holes: Vec<Frame>,
 }
 
@@ -46,7 +52,7 @@ static SHAPES: Registry<dyn Shape> = Registry::new("shape", &[entry!(Square)]);
 #[test]
 fn defaults_printed_are_defaults_used() {
     let listing = &SHAPES.listings()[0];
-    let printed = Choice { name: listing.name.to_owned(), settings: listing.defaults.clone() };
+    let printed = Choice { name: listing.name.to_owned(), settings: listing.table.defaults.clone() };
     assert_eq!(SHAPES.build(&printed).unwrap().area(), SHAPES.build(&Choice::named("square")).unwrap().area());
     assert_eq!(SHAPES.resolve(&Choice::named("square")).unwrap(), printed);
 }
@@ -118,4 +124,63 @@ fn a_number_out_of_range_names_its_key() {
     assert_eq!(out_of_range("lamps[1].aim = [0.0]; give a place").as_deref(), Some("lamps[1].aim"));
     assert_eq!(out_of_range("two keys = 1; give one"), None);
     assert_eq!(out_of_range("no number"), None);
+}
+
+trait Saying: Send + Sync + std::fmt::Debug {
+    fn greet(&self) -> String;
+}
+
+#[derive(Debug)]
+struct Said(String);
+
+impl Saying for Said {
+    fn greet(&self) -> String {
+        self.0.clone()
+    }
+}
+
+fn greeting(name: &str, word: &'static str) -> Added<dyn Saying> {
+    Added {
+        name: name.to_owned(),
+        summary: "says a word".to_owned(),
+        source: String::new(),
+        version: 3,
+        defaults: toml::Table::from_iter([("times".to_owned(), 1.into())]),
+        construct: Box::new(move |settings| {
+            let times = settings["times"].as_integer().unwrap_or_default();
+            usize::try_from(times)
+                .map(|times| Box::new(Said(word.repeat(times))) as Box<dyn Saying>)
+                .map_err(|_| format!("times = {times}; give 0 or more"))
+        }),
+    }
+}
+
+/// Fails if an added component is not found, keeps its first form, or takes settings that it does not have.
+#[test]
+fn an_added_component_is_chosen_by_name() {
+    static GREETINGS: Registry<dyn Saying> = Registry::new("greeting", &[]);
+    assert_eq!(GREETINGS.add(greeting("salve", "salve ")), Ok(()));
+    let twice = Choice::named("salve").with("times", 2);
+    assert_eq!(GREETINGS.build(&twice).unwrap().greet(), "salve salve ");
+    assert_eq!(GREETINGS.resolve(&Choice::named("salve")).unwrap(), Choice::named("salve").with("times", 1));
+    assert_eq!(GREETINGS.listings()[0].version, 3);
+    assert_eq!(GREETINGS.add(greeting("salve", "ave ")), Ok(()));
+    assert_eq!(GREETINGS.build(&twice).unwrap().greet(), "ave ave ");
+    assert_eq!(GREETINGS.names().collect::<Vec<_>>(), ["salve"]);
+    let error = |choice: &Choice| GREETINGS.build(choice).unwrap_err().to_string();
+    let wrong = error(&Choice::named("salve").with("tims", 2));
+    assert!(wrong.contains("`salve` has no setting `tims`, did you mean `times`?"), "{wrong}");
+    let wrong = error(&Choice::named("salve").with("times", "two"));
+    assert!(wrong.contains("expected integer, found string"), "{wrong}");
+    let wrong = error(&Choice::named("salve").with("times", -1));
+    assert!(wrong.contains("times = -1; give 0 or more"), "{wrong}");
+}
+
+#[test]
+fn a_name_is_new_and_in_kebab_case() {
+    static GREETINGS: Registry<dyn Saying> = Registry::new("greeting", &[]);
+    for bad in ["", "Salve", "two words", "-salve", "salve-", "a--b", "a_b", "1st"] {
+        assert!(matches!(GREETINGS.add(greeting(bad, "")), Err(NotAdded::Name { .. })), "{bad}");
+    }
+    assert_eq!(GREETINGS.add(greeting("salve-2", "")), Ok(()));
 }

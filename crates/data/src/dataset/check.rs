@@ -12,9 +12,13 @@ use seafix_component::Fault;
 use seafix_geometry::StereoPixels;
 use seafix_vision::{Image, RightCameraRotation, Sides, repeated_patterns};
 
-use seafix_io::{ImageLimits, image::regular};
+use seafix_io::{
+    ImageLimits,
+    image::{Orientation, orientation, regular},
+};
 
-use super::{Dataset, SAME_INSTANT_NS, folder::inside};
+use super::{contents::Dataset, folder::inside, pairing::SAME_INSTANT_NS};
+use crate::contradictions::{View, images_fault, mosaic_fault, poses_faults, scale_fault};
 
 /// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
 /// calibration, and compares every file with its hash if there is one.
@@ -30,15 +34,31 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     faults.extend(hash_faults(&dataset));
     let mut warnings = dataset.warnings.clone();
     warnings.extend(dataset.odd_times());
+    warnings.extend(dataset.turned_images());
     if faults.is_empty() {
         let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
         faults.extend(swap_fault(sides, &table));
         warnings.extend(strangers(sides, &table));
+        faults.extend(contradictions(&dataset));
     }
     (faults, warnings)
 }
 
 impl Dataset {
+    /// A warning about images that EXIF turns: the rig must belong to the upright ones.
+    fn turned_images(&self) -> Option<Fault> {
+        let all = || self.frames.iter().flat_map(|frame| [&frame.left, &frame.right]);
+        let turned: Vec<(&PathBuf, Orientation)> = all()
+            .map(|file| (file, orientation(file)))
+            .filter(|(_, orientation)| *orientation != Orientation::UPRIGHT)
+            .collect();
+        let (file, first) = turned.first()?;
+        let fault = Fault::new("images turned as their EXIF orientation states", file);
+        let fault =
+            fault.value(format!("{} in {} of {} images", first.describe(), turned.len(), 2 * self.frames.len()));
+        Some(fault.remedy("the rig must be that of the upright images, as OpenCV reads them"))
+    }
+
     /// Warnings about the stamps of the pairs: gaps of more than a year, and pairs closer than a camera can take them.
     pub fn odd_times(&self) -> Vec<Fault> {
         const YEAR_NS: u64 = 31_557_600_000_000_000;
@@ -55,6 +75,37 @@ impl Dataset {
         let remedy = "two pairs within a millisecond; check that stamps are nanoseconds";
         leap.into_iter().chain(reported("pairs too close in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
     }
+}
+
+/// The contradictions between the poses, the images, the rig and the site of a data set.
+pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
+    let file = dataset.folder.join("dataset.toml");
+    let mut faults = Vec::new();
+    if let Some(site) = &dataset.site {
+        let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
+        let priors: Vec<_> = dataset.frames.iter().map(|frame| frame.prior.map(|(pose, _)| pose)).collect();
+        let truths: Vec<_> = dataset.frames.iter().map(|frame| frame.truth).collect();
+        let sigma = dataset.frames.iter().find_map(|frame| frame.prior).map(|(_, covariance)| {
+            (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
+        });
+        faults.extend(poses_faults(&view, &priors, &truths, sigma, &file));
+    }
+    let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
+    let (mut seen, mut mosaics, mut posed) = (Vec::new(), Vec::new(), Vec::new());
+    for frame in dataset.frames.iter().step_by(step) {
+        let Ok((left, right)) = dataset.pair(frame) else { continue };
+        mosaics.extend(mosaic_fault(&left, &frame.left));
+        let matches = repeated_patterns(&left, &right, &dataset.rig);
+        posed.extend(frame.truth.map(|truth| (truth, matches.clone())));
+        seen.extend(matches);
+    }
+    if let Some(site) = dataset.site.as_ref().filter(|_| faults.is_empty()) {
+        let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
+        faults.extend(scale_fault(&view, &posed, &file));
+    }
+    faults.extend(mosaics.into_iter().next());
+    faults.extend(images_fault(&seen, &dataset.rig, &file));
+    faults
 }
 
 /// The pairs whose two images are identical, pixel by pixel.

@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::UnitQuaternion;
 use seafix_component::{Fault, read_text};
 use seafix_geometry::{Body, Camera, Frame, Pinhole, StereoRig, Transform, World};
-use yaml_rust2::{Yaml, YamlLoader};
+use seafix_io::yaml;
+use yaml_rust2::Yaml;
 
 use super::{
-    Dataset, DatasetFrame,
+    contents::{Dataset, DatasetFrame},
     foreign::{Foreign, image},
     pairing::{SAME_INSTANT_NS, left_out, pairs},
     tum::{Stamped, between},
@@ -90,11 +91,13 @@ fn camera(folder: &Path) -> Result<Sensor<Camera>, Fault> {
     let size = yaml.numbers::<2>("resolution")?;
     let [fx, fy, cx, cy] = yaml.numbers::<4>("intrinsics")?;
     yaml.word("camera_model", &["pinhole"])?;
-    yaml.word("distortion_model", &["radial-tangential", "radtan", "plumb_bob", "none"])?;
+    yaml.word("distortion_model", &["radial-tangential", "radtan", "plumb_bob", "none", "equidistant"])?;
+    let equidistant = yaml.content["distortion_model"].as_str() == Some("equidistant");
     let distortion = yaml.list("distortion_coefficients")?;
     let size = size.map(|length| length as u32);
-    let camera = Pinhole::new(size, [fx, fy], [cx, cy], &distortion)
-        .map_err(|error| yaml.fault("intrinsics", error.to_string()))?;
+    let new = if equidistant { Pinhole::equidistant } else { Pinhole::new };
+    let camera =
+        new(size, [fx, fy], [cx, cy], &distortion).map_err(|error| yaml.fault("intrinsics", error.to_string()))?;
     Ok(Sensor { camera, body_from_sensor: yaml.body_from_sensor()? })
 }
 
@@ -139,6 +142,10 @@ fn truth(home: &Path, body_from_camera: &Transform<Body, Camera>) -> Result<Vec<
         if sheet.exists() { Sheet::read(sheet)?.body_from_sensor()? } else { Transform::identity() };
     let marker_from_camera = body_from_marker.inverse() * *body_from_camera;
     let read = Trajectory::read(&folder.join("data.csv"))?;
+    if !read.has_attitude {
+        let fault = Fault::new("a truth without an attitude", &folder.join("data.csv"));
+        return Err(fault.remedy("give poses: nanoseconds, px, py, pz, qw, qx, qy, qz"));
+    }
     let poses = read.poses.iter().map(|pose| {
         let rotation = nalgebra::Rotation3::from_matrix_unchecked(pose.rotation);
         let mut turn = UnitQuaternion::from_rotation_matrix(&rotation);
@@ -158,19 +165,7 @@ struct Sheet {
 impl Sheet {
     fn read(file: PathBuf) -> Result<Self, Fault> {
         let text = read_text(&file)?;
-        // The first line of OpenCV's files is not valid YAML.
-        let body = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { &text };
-        let content = YamlLoader::load_from_str(body)
-            .map_err(|error| {
-                let line = error.marker().line() + usize::from(text.len() > body.len());
-                Fault::new("invalid YAML", &file)
-                    .on_line(line)
-                    .value(error.info())
-                    .remedy("give a sensor.yaml of EuRoC")
-            })?
-            .into_iter()
-            .next()
-            .unwrap_or(Yaml::Null);
+        let content = yaml::parse(&text, &file)?;
         Ok(Self { file, content, text })
     }
 

@@ -4,6 +4,8 @@ use std::path::{Component as Part, Path, PathBuf};
 
 use seafix_component::Fault;
 
+use super::names::found;
+
 /// Whether `name` is a valid path to a file that does not exist in `folder`.
 pub(super) fn is_absent(folder: &Path, name: &str) -> bool {
     let sound = !name.is_empty()
@@ -25,7 +27,7 @@ pub(super) fn inside(folder: &Path, name: &str, mentioned_in: &Path) -> Result<P
     if !Path::new(name).components().all(|part| matches!(part, Part::Normal(_) | Part::CurDir)) {
         return Err(fault("a path that leads out of the data set", "give a path relative to its folder, without `..`"));
     }
-    let path = folder.join(name);
+    let path = found(&folder.join(name));
     let (Ok(real), Ok(home)) = (path.canonicalize(), folder.canonicalize()) else {
         return Err(fault(
             "a file that does not exist",

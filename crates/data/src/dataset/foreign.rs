@@ -8,10 +8,10 @@ use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_io::ImageLimits;
 
 use super::{
-    Dataset, DatasetFrame,
+    contents::{Dataset, DatasetFrame},
     folder::{inside, is_absent},
 };
-use crate::source::SensorBuffer;
+use crate::sensor_buffer::SensorBuffer;
 
 /// A data set in a foreign format, without site and prior.
 pub(super) struct Foreign {

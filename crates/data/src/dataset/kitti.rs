@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitQuaternion, Vector3};
+use seafix_component::Settings;
 use seafix_component::{Fault, read_text};
 use seafix_geometry::{Camera, Pinhole, StereoRig, Transform, World};
 use serde::{Deserialize, Serialize};
@@ -14,14 +15,13 @@ use serde::{Deserialize, Serialize};
 use seafix_io::image::declared_size;
 
 use super::{
-    Dataset, DatasetFrame,
+    contents::{Dataset, DatasetFrame},
     foreign::{Foreign, image},
-    tum::nanoseconds,
 };
-use crate::trajectory::Trajectory;
+use crate::{formats::stamp::nanoseconds, trajectory::Trajectory};
 
 /// The pair of cameras to use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cameras {
     /// The grey cameras if present, otherwise the colour ones.
@@ -148,8 +148,9 @@ fn rig(folder: &Path, cameras: [usize; 2], size: [u32; 2]) -> Result<(StereoRig,
         let words: Vec<&str> = line.split_whitespace().skip(1).collect();
         let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
         let p: [f64; 12] = numbers
+            .filter(|numbers| numbers.iter().all(|number| number.is_finite()))
             .and_then(|numbers| numbers.try_into().ok())
-            .ok_or_else(|| fault(format!("`{name}` without 12 numbers")).value(line))?;
+            .ok_or_else(|| fault(format!("`{name}` without 12 finite numbers")).value(line))?;
         let [fx, skew, cx, tx, zero, fy, cy, ty, a, b, c, tz] = p;
         if [skew, zero, a, b] != [0.0; 4] || c != 1.0 {
             return Err(fault(format!("`{name}` is not of the form K [I | t]"))

@@ -5,75 +5,23 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_component::{Fault, line_of, nearest, read_text};
-use seafix_geometry::{Body, Camera, Covariance6, Object, StereoRig, Transform, World};
+use seafix_component::{Fault, decoded, line_of, nearest, read_text, undecodable};
+use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 use seafix_io::{
     ImageLimits,
     dataset::{Description, FORMATS},
-    image::size_fault,
-    read_image,
 };
-use seafix_navigation::{Device, Reading};
+use seafix_navigation::Device;
 use seafix_referencing::Site;
-use seafix_vision::Image;
 
 use super::{
-    CalibratedPort, Cameras, euroc,
+    contents::{Dataset, DatasetFrame},
+    euroc,
     folder::{inside, is_absent},
-    kitti, ports, tables, tum,
+    kitti::{self, Cameras},
+    tables, tum,
 };
-use crate::source::SensorBuffer;
-
-/// A data set with valid description, tables and paths. Its images are read frame by frame.
-#[derive(Debug)]
-pub struct Dataset {
-    /// The name.
-    pub name: String,
-    /// The folder.
-    pub folder: PathBuf,
-    /// The stereo rig.
-    pub rig: StereoRig,
-    /// The ports in front of the cameras; the rig was calibrated in water behind them.
-    pub ports: [Option<CalibratedPort>; 2],
-    /// The site, if known.
-    pub site: Option<Site>,
-    /// The pose of the left camera in the vehicle; the identity if the description has none.
-    pub body_from_camera: Transform<Body, Camera>,
-    /// The stereo pairs, in order of time.
-    pub frames: Vec<DatasetFrame>,
-    /// The true poses of displaced objects by id; the others are as surveyed.
-    pub objects: Vec<(String, Transform<World, Object>)>,
-    /// Whether the data set lists the visible feature points.
-    pub has_visibility: bool,
-    /// The readings of its Doppler log and gyro.
-    pub sensor_buffer: SensorBuffer,
-    /// The number of significant bits of a pixel in images of 16 bits.
-    pub bits: u8,
-    /// The limits of image sizes, set by the reader rather than the data set.
-    pub limits: ImageLimits,
-    /// The table of the frames, relative to the folder.
-    pub(super) table: String,
-    pub(super) hashes: Vec<(String, String)>,
-    /// The warnings.
-    pub warnings: Vec<Fault>,
-}
-
-/// A stereo pair of a data set with its truth and its prior.
-#[derive(Debug, Clone)]
-pub struct DatasetFrame {
-    /// The time (ns).
-    pub stamp_ns: u64,
-    /// The file of the left image.
-    pub left: PathBuf,
-    /// The file of the right image.
-    pub right: PathBuf,
-    /// The ground truth pose of the left camera.
-    pub truth: Option<Transform<World, Camera>>,
-    /// The prior pose with its covariance.
-    pub prior: Option<(Transform<World, Camera>, Covariance6<World, Camera>)>,
-    /// The feature points in view of both cameras: (object, point).
-    pub visible: Vec<(String, String)>,
-}
+use crate::{ports, sensor_buffer::SensorBuffer};
 
 impl Dataset {
     /// Reads the data set in `folder`: `seafix-dataset/1`, EuRoC or KITTI.
@@ -97,7 +45,7 @@ impl Dataset {
     /// # Errors
     /// All faults of the sequence.
     pub fn open_kitti(folder: &Path, cameras: Cameras) -> Result<Self, Vec<Fault>> {
-        kitti::read(folder, cameras, false)
+        at_the_border(folder, || kitti::read(folder, cameras, false))
     }
 
     /// Reads the EuRoC data set in `folder`.
@@ -109,7 +57,7 @@ impl Dataset {
             let fault = Fault::new("a folder without an EuRoC data set", folder);
             return Err(vec![fault.remedy("name the folder that has mav0/cam0")]);
         };
-        euroc::read(folder, &home, false)
+        at_the_border(folder, || euroc::read(folder, &home, false))
     }
 
     /// Reads the part of a data set that odometry may use: rig, stereo pairs and readings.
@@ -124,6 +72,10 @@ impl Dataset {
     }
 
     fn read(folder: &Path, pairs_only: bool, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
+        at_the_border(folder, || Self::read_any(folder, pairs_only, sort_stamps))
+    }
+
+    fn read_any(folder: &Path, pairs_only: bool, sort_stamps: bool) -> Result<Self, Vec<Fault>> {
         let file = folder.join("dataset.toml");
         if !folder.is_dir() {
             return Err(vec![Fault::new("no such folder", folder).remedy("give a folder with a dataset.toml")]);
@@ -161,59 +113,35 @@ impl Dataset {
     }
 }
 
+/// Reads a data set; a panic becomes a fault of it.
+fn at_the_border<T>(folder: &Path, read: impl FnOnce() -> Result<T, Vec<Fault>>) -> Result<T, Vec<Fault>> {
+    decoded(read, |message| vec![undecodable(folder, message)])
+}
+
 /// Whether `folder` holds a data set in a supported format.
 pub fn is_one(folder: &Path) -> bool {
     folder.join("dataset.toml").exists() || euroc::home(folder).is_some() || kitti::is_one(folder)
 }
 
-impl Dataset {
-    /// The same data set with other limits for its images.
-    #[must_use]
-    pub fn within(self, limits: ImageLimits) -> Self {
-        Self { limits, ..self }
-    }
-
-    /// Whether there are readings of both the Doppler log and the gyro.
-    pub fn has_readings(&self) -> bool {
-        self.sensor_buffer.is_complete()
-    }
-
-    /// The readings of Doppler log and gyro after `before` and up to `now` (ns).
-    pub fn readings(&self, before: Option<u64>, now: u64) -> Vec<Reading> {
-        self.sensor_buffer.between(before, now)
-    }
-
-    /// The two images of `frame`.
-    ///
-    /// # Errors
-    /// As for [`read_image`].
-    pub fn pair(&self, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
-        let left = read_image(&frame.left, self.rig.left().size(), self.bits, self.limits)?;
-        Ok((left, read_image(&frame.right, self.rig.right().size(), self.bits, self.limits)?))
-    }
-
-    /// Skips, with a warning, the pairs with an image of another size than its camera's calibration; a data set
-    /// recorded in two modes has some. If these are more than half of the pairs, none is skipped: the calibration is
-    /// wrong then, and the fault occurs when the images are read.
-    pub fn leave_out_mismatches(&mut self) {
-        let sizes = [self.rig.left().size(), self.rig.right().size()];
-        let faults: Vec<Option<Fault>> = self
-            .frames
-            .iter()
-            .map(|frame| {
-                [&frame.left, &frame.right].into_iter().zip(sizes).find_map(|(path, size)| size_fault(path, size))
-            })
-            .collect();
-        let (all, mismatches) = (faults.len(), faults.iter().flatten().count());
-        let Some(first) = faults.iter().flatten().next().filter(|_| 2 * mismatches <= all) else { return };
-        self.warnings.push(Fault {
-            what: format!("{mismatches} of {all} pairs skipped: {}", first.what),
-            remedy: "`reject-mismatched-images = true` of the source rejects the data set".to_owned(),
-            ..first.clone()
-        });
-        let mut fits = faults.iter().map(Option::is_none);
-        self.frames.retain(|_| fits.next().unwrap_or(true));
-    }
+/// The middle difference of the pairs' stamps to the nearest pose, in words; `None` without poses or pairs.
+fn clock_offset(frames: &[DatasetFrame], poses: &[tum::Stamped<World, Camera>]) -> Option<String> {
+    let nearest = |stamp: u64| {
+        let after = poses.partition_point(|(time, _)| *time < stamp);
+        let around = &poses[after.saturating_sub(1)..poses.len().min(after + 1)];
+        around.iter().map(|(time, _)| *time as f64 - stamp as f64).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    let mut offsets: Vec<f64> = frames.iter().filter_map(|frame| nearest(frame.stamp_ns)).collect();
+    offsets.sort_by(f64::total_cmp);
+    let middle = *offsets.get(offsets.len() / 2)? * 1e-9;
+    let known = match middle.abs().round() as i64 {
+        18 => " (GPS time is 18 s ahead of UTC)",
+        19 => " (TAI is 19 s ahead of GPS time)",
+        37 => " (TAI is 37 s ahead of UTC)",
+        3600..86_400 if (middle.abs() / 900.0).fract() < 0.01 => " (a time zone?)",
+        _ => "",
+    };
+    let side = if middle > 0.0 { "after" } else { "before" };
+    Some(format!("the nearest pose is {:.3} s {side} its pair{known}", middle.abs()))
 }
 
 /// A reader of one description that collects its faults.
@@ -296,11 +224,19 @@ impl Reader<'_> {
         let mut warnings = std::mem::take(&mut self.warnings);
         warnings.extend(site.iter().flat_map(|site| site.warnings.clone()));
         warnings.extend(rig.as_ref().ok().and_then(|(rig, _)| d.not_rectified(rig, self.file, self.source)));
-        for (name, given, found) in [
-            ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count()),
-            ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count()),
+        for (name, given, found, poses) in [
+            ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count(), &truth),
+            ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count(), &prior),
         ] {
-            if given && found < frames.len() {
+            if given
+                && found == 0
+                && let Some(offset) = clock_offset(&frames, poses)
+            {
+                let what = format!("clocks of pairs and {name} that differ");
+                let fault = Fault::new(what, self.file).on_line(line_of(self.source, &[name]));
+                warnings
+                    .push(fault.value(offset).remedy("no pair has a pose: give both in one clock, UTC or GPS time"));
+            } else if given && found < frames.len() {
                 warnings.push(
                     Fault::new(format!("stereo pairs without a {name}"), self.file)
                         .on_line(line_of(self.source, &[name]))
@@ -354,8 +290,8 @@ impl Reader<'_> {
     /// A trajectory. Each table with a quaternion that needed normalisation has one warning.
     fn poses(&mut self, name: &str) -> Option<Vec<tum::Stamped<World, Camera>>> {
         let (path, content) = self.content(name)?;
-        let poses = tum::parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()?;
-        if let Some((line, length)) = tum::normalised(&content) {
+        let (poses, normalised) = tum::parse(&content, &path).map_err(|fault| self.faults.push(fault)).ok()?;
+        if let Some((line, length)) = normalised {
             let what = Fault::new("a quaternion that is not of unit length", &path).on_line(line);
             self.warnings.push(what.value(format!("{length:.6}")).remedy("it was normalised; give more decimals"));
         }

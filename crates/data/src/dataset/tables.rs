@@ -1,4 +1,4 @@
-//! The CSV tables of a data set: a header line, then values without quotes.
+//! The CSV tables of a data set: a header line, then values.
 
 use std::path::Path;
 
@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 use seafix_component::Fault;
 use seafix_geometry::{Camera, Covariance6, Object, Transform, World};
 use seafix_navigation::{Device, Reading};
+
+use crate::formats::named::{number, rows};
 
 /// The content of a table, or its first fault.
 type Table<T> = Result<Vec<T>, Fault>;
@@ -31,13 +33,13 @@ pub(super) struct VisibleLine {
 pub(super) fn frames(text: &str, file: &Path, sort_stamps: bool) -> Table<FrameLine> {
     let mut frames: Vec<FrameLine> = Vec::new();
     for (line, [stamp, left, right]) in rows(text, file, ["stamp_ns", "left", "right"])? {
-        let stamp_ns = number(stamp, line, file)?;
+        let stamp_ns = number(&stamp, line, file)?;
         if !sort_stamps && frames.last().is_some_and(|last| last.stamp_ns >= stamp_ns) {
             return Err(Fault::new("a stamp not later than the previous one", file).on_line(line).value(stamp).remedy(
                 "sort the lines by time, one a stereo pair; `sort-stamps` does it and keeps the first of each stamp",
             ));
         }
-        frames.push(FrameLine { line, stamp_ns, left: left.to_owned(), right: right.to_owned() });
+        frames.push(FrameLine { line, stamp_ns, left, right });
     }
     if sort_stamps {
         frames.sort_by_key(|frame| frame.stamp_ns);
@@ -54,8 +56,8 @@ pub(super) fn visibility(text: &str, file: &Path) -> Table<VisibleLine> {
     rows(text, file, ["stamp_ns", "object", "point"])?
         .into_iter()
         .map(|(line, [stamp, object, point])| {
-            let stamp_ns = number(stamp, line, file)?;
-            Ok(VisibleLine { line, stamp_ns, object: object.to_owned(), point: point.to_owned() })
+            let stamp_ns = number(&stamp, line, file)?;
+            Ok(VisibleLine { line, stamp_ns, object, point })
         })
         .collect()
 }
@@ -100,14 +102,14 @@ pub(super) fn readings(text: &str, file: &Path, device: Device) -> Table<(u64, R
     rows(text, file, ["stamp_ns", "arrival_ns", axes[0], axes[1], axes[2], "sigma"])?
         .into_iter()
         .map(|(line, [stamp, arrival, x, y, z, sigma])| {
-            let real = |word| number::<f64>(word, line, file);
-            let value = Vector3::new(real(x)?, real(y)?, real(z)?);
+            let real = |word: &str| number::<f64>(word, line, file);
+            let value = Vector3::new(real(&x)?, real(&y)?, real(&z)?);
             let fault = |what: &str, value: &str, remedy: &str| {
                 Err(Fault::new(what, file).on_line(line).value(value).remedy(remedy))
             };
-            let spread = real(sigma)?;
+            let spread = real(&sigma)?;
             if !(spread >= 0.0 && spread.is_finite()) {
-                return fault("an invalid standard deviation", sigma, "give one number for each axis, zero or more");
+                return fault("an invalid standard deviation", &sigma, "give one number for each axis, zero or more");
             }
             if !value.iter().all(|x| x.is_finite()) {
                 return fault(
@@ -116,44 +118,16 @@ pub(super) fn readings(text: &str, file: &Path, device: Device) -> Table<(u64, R
                     "remove the line",
                 );
             }
-            let (stamp_ns, arrival_ns) = (number(stamp, line, file)?, number(arrival, line, file)?);
+            let (stamp_ns, arrival_ns) = (number(&stamp, line, file)?, number(&arrival, line, file)?);
             if arrival_ns < stamp_ns {
                 return fault(
                     "a reading that arrives before its measurement",
-                    arrival,
+                    &arrival,
                     "arrival_ns must be the later time",
                 );
             }
             let covariance = Matrix3::identity() * (spread * spread);
             Ok((arrival_ns, Reading { device, stamp_ns, value, covariance }))
-        })
-        .collect()
-}
-
-/// The data lines with exactly the columns of `header`, and their line numbers.
-pub fn rows<'a, const N: usize>(text: &'a str, file: &Path, header: [&str; N]) -> Table<(usize, [&'a str; N])> {
-    let expected = header.join(",");
-    let mut lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
-    match lines.next() {
-        Some((_, line)) if line.split(',').map(str::trim).eq(header) => {}
-        other => {
-            return Err(Fault::new("a wrong header", file)
-                .on_line(1)
-                .value(other.map_or("", |(_, line)| line))
-                .remedy(format!("the first line is `{expected}`")));
-        }
-    }
-    lines
-        .filter(|(_, line)| !line.is_empty())
-        .map(|(number, line)| {
-            let words: Vec<&str> = line.split(',').map(str::trim).collect();
-            let columns = words.len();
-            words.try_into().map(|words| (number, words)).map_err(|_| {
-                Fault::new(format!("{columns} columns"), file)
-                    .on_line(number)
-                    .value(line)
-                    .remedy(format!("a line is `{expected}`"))
-            })
         })
         .collect()
 }
@@ -184,15 +158,6 @@ fn wide_rows<'a>(text: &'a str, file: &Path, head: &str, count: usize) -> Table<
             Ok((line, key, numbers))
         })
         .collect()
-}
-
-/// Parses a number.
-///
-/// # Errors
-/// A word that is not a number, with its line.
-pub fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
-    word.parse()
-        .map_err(|_| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
 }
 
 #[cfg(test)]

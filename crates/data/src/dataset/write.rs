@@ -6,13 +6,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use seafix::FrameData;
 use seafix_component::Fault;
 use seafix_geometry::{Camera, Covariance6, Transform, World};
 
 use seafix_io::dataset::{Description, FORMATS, PriorSigma, RigNumbers};
 
 use super::{check::input_hashes, png::write_png, tum};
-use crate::source::{FrameData, Sequence};
+use crate::sequence::Sequence;
 
 /// Writes every frame of `sequence` as a data set in `folder`, which must not exist.
 ///
@@ -34,10 +35,17 @@ pub fn write(sequence: &dyn Sequence, folder: &Path, licence: &str, done: &dyn F
     if partial.exists() {
         return Err(Fault::new("the remains of an interrupted export", &partial).remedy("delete it"));
     }
-    fs::create_dir_all(&partial).map_err(|error| failed(&partial, &error))?;
+    let parent = partial.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent.map_or(Ok(()), fs::create_dir_all).map_err(|error| failed(&partial, &error))?;
+    fs::create_dir(&partial).map_err(|error| failed(&partial, &error))?;
     let name = folder.file_name().map_or_else(|| "dataset".to_owned(), |name| name.to_string_lossy().into_owned());
-    fill(sequence, &partial, [&name, licence], done)?;
-    fs::rename(&partial, folder).map_err(|error| failed(folder, &error))
+    let filled = fill(sequence, &partial, [&name, licence], done);
+    let written = filled.and_then(|()| fs::rename(&partial, folder).map_err(|error| failed(folder, &error)));
+    if written.is_err() {
+        // This call has created the folder.
+        let _ = fs::remove_dir_all(&partial);
+    }
+    written
 }
 
 fn fill(sequence: &dyn Sequence, folder: &Path, [name, licence]: [&str; 2], done: &dyn Fn()) -> Result<(), Fault> {

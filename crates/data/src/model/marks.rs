@@ -5,7 +5,7 @@ use std::{collections::HashMap, path::Path};
 use seafix_component::Fault;
 use seafix_geometry::Pixel;
 
-use crate::dataset::tables::{number, rows};
+use crate::formats::named::{number, rows};
 
 /// A feature point marked by an operator.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,7 @@ pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<
         if id.is_empty() {
             return Err(fault("a mark without a name").remedy("give every point its id"));
         }
-        if let Some(first) = known.insert(id.to_owned(), line) {
+        if let Some(first) = known.insert(id.clone(), line) {
             return Err(fault("a point marked twice")
                 .value(format!("`{id}`"))
                 .remedy(format!("it is already on line {first}; give each point its own id")));
@@ -50,11 +50,12 @@ pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<
                 .value(format!("`{id}` at {u}, {v}"))
                 .remedy(format!("the image has {width}×{height} pixels; the first has its centre at 0, 0")))
         };
-        let right = match [right_u, right_v] {
+        let right = match [right_u.as_str(), right_v.as_str()] {
             ["", ""] => None,
             [u, v] => Some(pixel(u, v, sizes[1], "right")?),
         };
-        marks.push(Mark { line, id: id.to_owned(), left: pixel(left_u, left_v, sizes[0], "left")?, right });
+        let left = pixel(&left_u, &left_v, sizes[0], "left")?;
+        marks.push(Mark { line, id, left, right });
     }
     if marks.len() < 3 {
         return Err(Fault::new("too few marks for a model", file)
@@ -79,6 +80,10 @@ mod tests {
         let marks = read(text, Path::new("clicks.csv"), [[640, 480]; 2]).unwrap();
         assert_eq!(marks[0].right, Some(Pixel { u: 3.0, v: 4.5 }));
         assert_eq!((marks[1].line, marks[1].right), (3, None));
+        let quoted = "id;left_v;left_u;right_u;right_v\n\"A\";2,5;1;;\n\"B\";0,0;9;;\n\"C\";9;8;;\n;;;;\n";
+        let marks = read(quoted, Path::new("clicks.csv"), [[640, 480]; 2]).unwrap();
+        assert_eq!((marks[0].id.as_str(), marks[0].left), ("A", Pixel { u: 1.0, v: 2.5 }));
+        assert_eq!(marks.len(), 3);
         assert!(message("A,1,2,3,4\nA,1,2,3,4\n").starts_with("a point marked twice in clicks.csv:3: `A`"));
         assert!(message("A,640,2,3,4\n").starts_with("a mark outside the left image in clicks.csv:2: `A` at 640, 2"));
         assert!(message("A,1,2,3,NaN\n").starts_with("a mark outside the right image"));

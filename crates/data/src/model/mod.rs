@@ -128,6 +128,7 @@ impl ModelByHand<'_> {
                 .iter()
                 .map(|point| ModelPoint { sigma: point.sigma(), ..ModelPoint::exact(&point.mark.id, point.at) })
                 .collect(),
+            edges: Vec::new(),
             interest: Vec::new(),
         };
         let site = Site { name: self.object.clone(), frame: 0, objects: vec![object], warnings: Vec::new() };

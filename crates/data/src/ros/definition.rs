@@ -3,7 +3,7 @@
 use super::idl;
 
 /// The supported types and their parts: name, then type and name of each field.
-const KNOWN: [(&str, &[(&str, &str)]); 17] = [
+const KNOWN: [(&str, &[(&str, &str)]); 19] = [
     (
         "sensor_msgs/Image",
         &[
@@ -42,6 +42,8 @@ const KNOWN: [(&str, &[(&str, &str)]); 17] = [
             ("TwistWithCovariance", "twist"),
         ],
     ),
+    ("geometry_msgs/PoseStamped", &[("Header", "header"), ("Pose", "pose")]),
+    ("geometry_msgs/PoseWithCovarianceStamped", &[("Header", "header"), ("PoseWithCovariance", "pose")]),
     ("tf2_msgs/TFMessage", &[("TransformStamped[]", "transforms")]),
     (
         "sensor_msgs/RegionOfInterest",
@@ -89,7 +91,13 @@ pub(crate) fn differs(name: &str, encoding: &str, definition: &str) -> Option<St
             let known = known.get(index).map(|(kind, field)| format!("{kind} {field}"));
             let message =
                 |field: &Option<String>| field.as_deref().map_or("nothing".to_owned(), |field| format!("`{field}`"));
-            (found != known)
+            // ROS 1 writes D, K, R and P, which the layout does not depend on.
+            let same = |a: &String, b: &String| a.eq_ignore_ascii_case(b);
+            let agree = match (&found, &known) {
+                (Some(found), Some(known)) => same(found, known),
+                (found, known) => found == known,
+            };
+            (!agree)
                 .then(|| format!("field {} of {name} is {}, expected {}", index + 1, message(&found), message(&known)))
         })
     })
@@ -142,6 +150,7 @@ mod tests {
             "field 7 of sensor_msgs/Image is nothing, expected `uint8[] data`"
         );
         assert!(of(&IMAGE.replace("uint32 nanosec", "uint32 nsec")).unwrap().contains("builtin_interfaces/Time"));
+        assert_eq!(of(&IMAGE.replace("uint32 height", "uint32 Height")), None);
         assert_eq!(of(&IMAGE.replace("uint32 height", "uint8 MONO=1\nuint8 RGB = 2\nuint32 height")), None);
     }
 }

@@ -69,14 +69,19 @@ impl CameraInfo {
     }
 }
 
-/// `nav_msgs/Odometry`, without the velocity.
+/// The types of messages with a pose.
+pub(crate) const POSES: [&str; 3] =
+    ["nav_msgs/Odometry", "geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped"];
+
+/// A message of one of the types [`POSES`], without the velocity.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Odometry {
+pub(crate) struct PoseMessage {
     pub header: Stamped,
+    /// The frame whose pose it is; empty if the type has none.
     pub child: String,
     pub pose: Pose,
     /// The covariance of the position, then of the rotation about the axes of the header's frame.
-    pub covariance: Matrix6<f64>,
+    pub covariance: Option<Matrix6<f64>>,
 }
 
 /// A transform of `tf2_msgs/TFMessage`.
@@ -151,12 +156,21 @@ impl CameraInfo {
     }
 }
 
-impl Odometry {
-    pub(crate) fn decode(message: &[u8]) -> Read<Self> {
+impl PoseMessage {
+    /// Decodes a message of the type `kind`.
+    pub(crate) fn decode(message: &[u8], kind: &str) -> Read<Self> {
         let mut cdr = Cdr::new(message)?;
-        let (header, child, pose) = (header(&mut cdr)?, cdr.string()?, pose(&mut cdr)?);
-        let covariance = Matrix6::from_row_slice(&cdr.f64s::<36>()?);
-        cdr.f64s::<42>()?;
+        let header = header(&mut cdr)?;
+        let is_odometry = kind == "nav_msgs/Odometry";
+        let child = if is_odometry { cdr.string()? } else { String::new() };
+        let pose = pose(&mut cdr)?;
+        let covariance = match kind {
+            "geometry_msgs/PoseStamped" => None,
+            _ => Some(Matrix6::from_row_slice(&cdr.f64s::<36>()?)),
+        };
+        if is_odometry {
+            cdr.f64s::<42>()?;
+        }
         cdr.end()?;
         Ok(Self { header, child, pose, covariance })
     }

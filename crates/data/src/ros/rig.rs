@@ -1,33 +1,29 @@
 //! A stereo rig from two `CameraInfo` messages.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use seafix_component::Settings;
 use seafix_geometry::{Camera, Pinhole, RightCamera, Transform};
 use serde::{Deserialize, Serialize};
 
-use super::CameraInfo;
+use super::messages::CameraInfo;
 
 /// The kind of the images in a recording.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Views {
-    /// Rectified if the topic's name says so (`image_rect`), otherwise raw.
+    /// Decided by the calibration, and where it allows both, by the distances of matches to the epipolar lines.
     #[default]
-    ByName,
+    #[serde(alias = "by-name")]
+    Auto,
     /// Raw images: K and D apply.
     Raw,
     /// Rectified images: P applies.
     Rectified,
 }
 
-impl Views {
-    /// Whether the images on this topic are rectified.
-    pub fn rectified(self, topic: &str) -> bool {
-        match self {
-            Self::ByName => topic.contains("rect") && !topic.contains("unrect"),
-            Self::Raw => false,
-            Self::Rectified => true,
-        }
-    }
+/// Whether K is no camera, so that images can only be rectified.
+pub(crate) fn is_without_raw_model(info: &CameraInfo) -> bool {
+    info.k[0] == 0.0
 }
 
 /// The camera model of the images.
@@ -43,9 +39,11 @@ pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, Stri
     let built = match (rectified, info.model.as_str()) {
         (true, _) => Pinhole::new(info.size, [px, py], [pcx, pcy], &[]),
         (false, "plumb_bob" | "rational_polynomial" | "") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
-        // This holds for any D: a fisheye lens without coefficients (r = f·θ) is not a pinhole (r = f·tan θ).
+        (false, "equidistant" | "fisheye" | "kannala_brandt" | "kannala_brandt4") => {
+            Pinhole::equidistant(info.size, [fx, fy], [cx, cy], &info.d)
+        }
         (false, other) => {
-            let read = "use plumb_bob or rational_polynomial";
+            let read = "use plumb_bob, rational_polynomial or equidistant";
             let remedy = "or rectify the images and set images = \"rectified\"";
             return Err(format!("the distortion model `{other}` is not supported; {read}, {remedy}"));
         }

@@ -4,33 +4,60 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use seafix_component::Fault;
-use seafix_geometry::{Camera, Covariance6, Frame, Pinhole, StereoRig, Transform, World};
+use seafix_geometry::{Camera, Covariance6, Frame, Pinhole, Pixel, StereoRig, Transform, World};
 use seafix_io::{
     ImageLimits,
     image::{decode_image, image_of_samples},
+    unit_fault,
 };
-use seafix_log::{Entry, Recording, Topic};
-use seafix_vision::{Image, Sides};
+use seafix_log::Topic;
+use seafix_vision::{Image, Sides, repeated_patterns};
 
-use super::{Mcap, logged::fault, topics::Topics};
+use super::{
+    mcap::{Mcap, Stamps},
+    recordings::{Message, Recordings},
+    topics::Topics,
+};
 use crate::{
-    dataset::{INSPECTED_PAIRS, are_identical, left_out, pairs, strangers, swap_fault, tum::Stamped},
-    ros::{self, CameraInfo, CompressedImage, Odometry, Tree},
+    contradictions::{images_fault, mosaic_fault, residual},
+    dataset::{INSPECTED_PAIRS, are_identical, constant_offset, left_out, pairs, strangers, swap_fault, tum::Stamped},
+    ros::{self, CameraInfo, CompressedImage, Mosaic, Tree, Views},
 };
 
 /// The stereo rig and pairs of a recording; every image has been decoded once.
 pub(super) struct Bag {
     path: PathBuf,
-    recording: Recording,
+    recording: Recordings,
     settings: Mcap,
     topics: Topics,
     tree: Tree,
     /// The coordinate frames of the cameras.
     frames: [String; 2],
     pub(super) rig: StereoRig,
+    /// What the images are taken for, and why.
+    views: String,
     /// The stamp and the two messages of each pair.
-    pub(super) pairs: Vec<(u64, [Entry; 2])>,
+    pub(super) pairs: Vec<(u64, [Message; 2])>,
     pub(super) warnings: Vec<Fault>,
+    /// The contradictions between images and rig.
+    pub(super) doubts: Vec<Fault>,
+}
+
+/// The possible rigs of the images.
+enum Readings {
+    /// The only one, and why.
+    One(Box<StereoRig>, String),
+    /// The calibration allows both.
+    Two { raw: Box<StereoRig>, rectified: Box<StereoRig> },
+}
+
+impl Readings {
+    fn first(&self) -> (StereoRig, String) {
+        match self {
+            Self::One(rig, why) => (**rig, why.clone()),
+            Self::Two { raw, .. } => (**raw, String::new()),
+        }
+    }
 }
 
 /// A coordinate frame named by ROS.
@@ -45,8 +72,7 @@ impl Bag {
     /// Reads `path`, decodes every image, and checks rig and images for consistency. A pair with an unreadable image is
     /// skipped with a warning; at least half of the pairs must be readable.
     pub(super) fn open(path: &Path, settings: &Mcap) -> Result<Self, Fault> {
-        let recording =
-            Recording::open(path, |topic: &Topic| topic.encoding == "cdr").map_err(|error| fault(path, &error))?;
+        let recording = Recordings::open(path, |topic: &Topic| topic.encoding == "cdr")?;
         let topics = Topics::of(path, &recording, settings)?;
         let mut warnings = Vec::new();
         if !recording.is_protected() {
@@ -57,21 +83,32 @@ impl Bag {
         let tree = reader.tree()?;
         let images = [reader.stamps(&topics.images[0])?, reader.stamps(&topics.images[1])?];
         let frames = [0, 1].map(|side| images[side].first().map_or_else(String::new, |(_, _, frame)| frame.clone()));
-        let rig = reader.rig(&topics, &infos, &tree, &frames)?;
+        let readings = reader.readings(&topics, &infos, &tree, &frames)?;
         let stamps = [0, 1].map(|side| images[side].iter().map(|image| image.0).collect::<Vec<u64>>());
         let found = pairs(&stamps[0], &stamps[1], (settings.tolerance * 1e9) as u64);
+        if 2 * found.len() < stamps[0].len().max(stamps[1].len()) {
+            // A constant difference of the clocks explains more than a count of images without partners.
+            constant_offset(&stamps[0], &stamps[1], path).map_or(Ok(()), Err)?;
+        }
         let left = left_out(found.len(), [stamps[0].len(), stamps[1].len()], path);
         reader.warnings.extend(left?);
         if found.is_empty() {
             return Err(Fault::new("no stereo pair", path)
                 .remedy("no two images have stamps within `tolerance`; enlarge it or check the topics"));
         }
-        let pairs: Vec<(u64, [Entry; 2])> =
+        let pairs: Vec<(u64, [Message; 2])> =
             found.iter().map(|&(i, j)| (images[0][i].0, [images[0][i].1, images[1][j].1])).collect();
         let warnings = reader.warnings;
         let (path, settings) = (path.to_owned(), settings.clone());
-        let mut bag = Self { path, recording, settings, topics, tree, frames, rig, pairs, warnings };
+        // The sizes of both readings are those of the images.
+        let (rig, views) = readings.first();
+        let mut bag =
+            Self { path, recording, settings, topics, tree, frames, rig, views, pairs, warnings, doubts: Vec::new() };
         bag.inspect_images()?;
+        bag.decide(readings)?;
+        if let Some(fault) = unit_fault(&bag.rig, &bag.path) {
+            return Err(fault.value(format!("{:.4} m in {}", bag.rig.baseline(), bag.topics.infos[1])));
+        }
         bag.appear_at_the_sides()?;
         Ok(bag)
     }
@@ -79,12 +116,16 @@ impl Bag {
     /// The two images of a pair.
     pub(super) fn pair(&self, index: usize) -> Result<(Image, Image), Fault> {
         let [left, right] = &self.pairs[index].1;
-        let bytes = |entry: &Entry| self.recording.message(entry).map_err(|error| fault(&self.path, &error));
-        self.decoded([left, right], [&bytes(left)?, &bytes(right)?])
+        self.decoded([left, right], [&self.recording.bytes(left)?, &self.recording.bytes(right)?])
+    }
+
+    /// The files of the recording.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
+        self.recording.paths()
     }
 
     /// The poses of the left camera at the stamps of the pairs, with covariances if there are any. `said` is a topic of
-    /// odometry, or `tf:FRAME` for the pose of the camera in that frame.
+    /// poses, or `tf:FRAME` for the pose of the camera in that frame.
     pub(super) fn poses(&self, text: &str) -> Result<Poses, Fault> {
         let (recording, settings) = (&self.recording, &self.settings);
         let reader = Messages { path: &self.path, recording, settings, warnings: Vec::new() };
@@ -96,12 +137,14 @@ impl Bag {
     pub(super) fn notes(&self) -> String {
         let ([left, right], [w, h]) = (&self.topics.images, self.rig.left().size());
         let (first, last) = (self.pairs[0].0, self.pairs[self.pairs.len() - 1].0);
-        let poses = self.recording.topics().iter().filter(|topic| ros::plain(&topic.schema) == "nav_msgs/Odometry");
+        let is_pose = |topic: &&Topic| ros::POSES.contains(&ros::plain(&topic.schema).as_str());
+        let poses = self.recording.topics().iter().filter(is_pose);
         let poses: Vec<String> = poses.map(|topic| format!("`{}`", topic.name)).collect();
         format!(
-            "{} pairs of {w}×{h} from `{left}` and `{right}` over {:.1} s, baseline {:.4} m; odometry: {}",
+            "{} pairs of {w}×{h} from `{left}` and `{right}` over {:.1} s, {}, baseline {:.4} m; odometry: {}",
             self.pairs.len(),
             (last - first) as f64 * 1e-9,
+            self.views,
             self.rig.baseline(),
             if poses.is_empty() { "none".to_owned() } else { poses.join(", ") }
         )
@@ -113,12 +156,12 @@ impl Bag {
         const AT_ONCE: usize = 16;
         /// The maximum number of skipped pairs with a warning of their own.
         const REPORTED: usize = 10;
-        let bytes = |entry: &Entry| self.recording.message(entry).map_err(|error| fault(&self.path, &error));
+        let bytes = |message: &Message| self.recording.bytes(message);
         let mut seen: Vec<Result<bool, Fault>> = Vec::with_capacity(self.pairs.len());
         for some in self.pairs.chunks(AT_ONCE) {
             let read = some.iter().map(|(_, [left, right])| Ok([bytes(left)?, bytes(right)?]));
             let read = read.collect::<Result<Vec<_>, Fault>>()?;
-            let inspect = |((_, [left, right]), [l, r]): (&(u64, [Entry; 2]), &[Vec<u8>; 2])| {
+            let inspect = |((_, [left, right]), [l, r]): (&(u64, [Message; 2]), &[Vec<u8>; 2])| {
                 self.decoded([left, right], [l, r]).map(|(left, right)| are_identical(&left, &right))
             };
             seen.extend(some.par_iter().zip(&read).map(inspect).collect::<Vec<_>>());
@@ -149,14 +192,53 @@ impl Bag {
         Ok(())
     }
 
+    /// Decides between raw and rectified images by the distances of matches to the epipolar lines of both readings.
+    fn decide(&mut self, readings: Readings) -> Result<(), Fault> {
+        let Readings::Two { raw, rectified } = readings else { return Ok(()) };
+        let (raw, rectified) = (*raw, *rectified);
+        let apart = largest_difference(&raw, &rectified);
+        if apart < SAME_PIXEL {
+            (self.rig, self.views) = (raw, format!("raw or rectified, which differ by {apart:.3} px at most"));
+            return Ok(());
+        }
+        let step = self.pairs.len().div_ceil(INSPECTED_PAIRS).max(1);
+        let mut seen = Vec::new();
+        for index in (0..self.pairs.len()).step_by(step) {
+            let (left, right) = self.pair(index)?;
+            seen.extend(repeated_patterns(&left, &right, &raw));
+        }
+        let residuals = [&raw, &rectified].map(|rig| residual(&seen, rig));
+        let said =
+            format!("{:.2} px from the epipolar lines as raw, {:.2} px as rectified", residuals[0], residuals[1]);
+        let (rig, views) = match decision(residuals, seen.len()) {
+            Some(false) => (raw, format!("taken as raw ({said})")),
+            Some(true) => (rectified, format!("taken as rectified ({said})")),
+            None => {
+                let fault = Fault::new("images that may be raw or rectified", &self.path).value(said);
+                return Err(fault.remedy("set `images` to \"raw\" (K and D hold) or \"rectified\" (P holds)"));
+            }
+        };
+        (self.rig, self.views) = (rig, views);
+        Ok(())
+    }
+
     /// Checks a sample of pairs for exchanged left and right images.
     fn appear_at_the_sides(&mut self) -> Result<(), Fault> {
         let step = self.pairs.len().div_ceil(INSPECTED_PAIRS).max(1);
-        let mut sides = Sides::default();
+        let (mut sides, mut seen, mut doubts) = (Sides::default(), Vec::new(), Vec::new());
         for index in (0..self.pairs.len()).step_by(step) {
             let (left, right) = self.pair(index)?;
             sides = sides + Sides::of_images(&left, &right, &self.rig);
+            seen.extend(repeated_patterns(&left, &right, &self.rig));
+            if doubts.is_empty() {
+                doubts.extend(mosaic_fault(&left, &self.path).map(|fault| {
+                    let value = format!("{}: {}", self.topics.images[0], fault.value);
+                    fault.value(value)
+                }));
+            }
         }
+        doubts.extend(images_fault(&seen, &self.rig, &self.path));
+        self.doubts = doubts;
         if let Some(fault) = swap_fault(sides, &self.path) {
             return Err(fault.remedy("exchange the topics `left` and `right`, or `left-info` and `right-info`"));
         }
@@ -172,20 +254,29 @@ impl Bag {
         Ok(())
     }
 
-    fn decoded(&self, entries: [&Entry; 2], bytes: [&[u8]; 2]) -> Result<(Image, Image), Fault> {
+    fn decoded(&self, entries: [&Message; 2], bytes: [&[u8]; 2]) -> Result<(Image, Image), Fault> {
         let [left, right] = [self.rig.left(), self.rig.right()];
         Ok((self.image(entries[0], bytes[0], left)?, self.image(entries[1], bytes[1], right)?))
     }
 
     /// The image of a message.
-    fn image(&self, entry: &Entry, bytes: &[u8], camera: &Pinhole) -> Result<Image, Fault> {
+    fn image(&self, entry: &Message, bytes: &[u8], camera: &Pinhole) -> Result<Image, Fault> {
         let topic = &self.recording.topics()[entry.topic];
         let broken = |what: String| message_fault(&self.path, topic, entry, &what);
         let limits = ImageLimits { pixels: self.settings.max_pixels, bytes: self.settings.max_bytes };
         if ros::plain(&topic.schema) == "sensor_msgs/CompressedImage" {
             let message = CompressedImage::decode(bytes).map_err(broken)?;
             let place = PathBuf::from(format!("{} ({} at {} ns)", self.path.display(), topic.name, entry.log_time));
-            return decode_image(message.data, &place, camera.size(), self.settings.bits, limits);
+            let image = decode_image(message.data, &place, camera.size(), self.settings.bits, limits)?;
+            let mosaic = Mosaic::of(message.format.split([';', ' ']).next().unwrap_or_default());
+            let lossy = message.data.starts_with(&[0xFF, 0xD8]);
+            return match mosaic {
+                Some(_) if lossy => {
+                    Err(broken("a Bayer mosaic compressed as JPEG, which mixes its colours".to_owned()))
+                }
+                Some(mosaic) => Ok(mosaic.grey(&image)),
+                None => Ok(image),
+            };
         }
         let message = ros::Image::decode(bytes).map_err(broken)?;
         if message.size != camera.size() {
@@ -193,30 +284,72 @@ impl Bag {
             return Err(broken(format!("an image of {w}×{h} from a camera calibrated for {cw}×{ch}")));
         }
         let (samples, white) = message.samples(self.settings.bits).map_err(broken)?;
-        image_of_samples(&samples, message.size, white).map_err(|fault| broken(fault.what))
+        let image = image_of_samples(&samples, message.size, white).map_err(|fault| broken(fault.what))?;
+        Ok(Mosaic::of(&message.encoding).map_or_else(|| image.clone(), |mosaic| mosaic.grey(&image)))
+    }
+}
+
+/// The maximum difference (px) of two readings that need no decision.
+const SAME_PIXEL: f64 = 0.05;
+
+/// The largest difference (px) of the directions of a pixel in two readings of the same images, over both images; the
+/// difference of the cameras' poses is added.
+fn largest_difference(raw: &StereoRig, rectified: &StereoRig) -> f64 {
+    const STEPS: u32 = 8;
+    let of = |a: &Pinhole, b: &Pinhole| {
+        let [width, height] = a.size().map(|length| f64::from(length - 1));
+        let places = (0..=STEPS).flat_map(|i| (0..=STEPS).map(move |j| (i, j)));
+        let off = |(i, j): (u32, u32)| {
+            let place = |k: u32, length: f64| length * f64::from(k) / f64::from(STEPS);
+            let pixel = Pixel { u: place(i, width), v: place(j, height) };
+            match (a.normalize(&pixel), b.normalize(&pixel)) {
+                (Some(one), Some(other)) => (one - other).norm() * a.focal()[0],
+                _ => f64::INFINITY,
+            }
+        };
+        places.map(off).fold(0.0, f64::max)
+    };
+    let (a, b) = (raw.right_from_left(), rectified.right_from_left());
+    let moved = (a.translation() - b.translation()).norm() / raw.baseline();
+    let posed = (a.rotation().angle_to(&b.rotation()) + moved) * raw.mean_focal();
+    of(raw.left(), rectified.left()).max(of(raw.right(), rectified.right())) + posed
+}
+
+/// Whether the images are rectified, by the residuals of the readings as raw and as rectified; `None` if they do not
+/// tell.
+fn decision([raw, rectified]: [f64; 2], matches: usize) -> Option<bool> {
+    /// The minimum number of matches.
+    const FEW: usize = 30;
+    /// The minimum ratio of the residuals.
+    const CLEAR: f64 = 1.5;
+    match () {
+        () if matches < FEW => None,
+        () if raw * CLEAR < rectified => Some(false),
+        () if rectified * CLEAR < raw => Some(true),
+        () => None,
     }
 }
 
 /// The fault of a message.
-fn message_fault(path: &Path, topic: &Topic, entry: &Entry, what: &str) -> Fault {
+fn message_fault(path: &Path, topic: &Topic, entry: &Message, what: &str) -> Fault {
     Fault::new(what, path).value(format!("{} message {} at {} ns", topic.name, entry.sequence, entry.log_time))
 }
 
 /// A reader of messages of a recording.
 struct Messages<'a> {
     path: &'a Path,
-    recording: &'a Recording,
+    recording: &'a Recordings,
     settings: &'a Mcap,
     warnings: Vec<Fault>,
 }
 
 impl Messages<'_> {
-    fn of<'s>(&'s self, topic: &'s str) -> impl Iterator<Item = &'s Entry> {
-        self.recording.entries().iter().filter(move |entry| self.recording.topics()[entry.topic].name == topic)
+    fn of<'s>(&'s self, topic: &'s str) -> impl Iterator<Item = &'s Message> {
+        self.recording.messages().iter().filter(move |entry| self.recording.topics()[entry.topic].name == topic)
     }
 
-    fn read<T>(&self, entry: &Entry, decode: impl Fn(&[u8]) -> Result<T, String>) -> Result<T, Fault> {
-        let bytes = self.recording.message(entry).map_err(|error| fault(self.path, &error))?;
+    fn read<T>(&self, entry: &Message, decode: impl Fn(&[u8]) -> Result<T, String>) -> Result<T, Fault> {
+        let bytes = self.recording.bytes(entry)?;
         decode(&bytes).map_err(|what| message_fault(self.path, &self.recording.topics()[entry.topic], entry, &what))
     }
 
@@ -237,13 +370,23 @@ impl Messages<'_> {
     }
 
     /// The stamp, message and coordinate frame of each image, in order of time.
-    fn stamps(&mut self, topic: &str) -> Result<Vec<(u64, Entry, String)>, Fault> {
-        let mut images: Vec<(u64, Entry, String)> = Vec::new();
+    fn stamps(&mut self, topic: &str) -> Result<Vec<(u64, Message, String)>, Fault> {
+        let mut images: Vec<(u64, Message, String)> = Vec::new();
         for entry in self.of(topic) {
             let header = self.read(entry, ros::stamp)?;
-            images.push((header.stamp_ns, *entry, header.frame));
+            let stamp_ns = if self.settings.stamps == Stamps::Log { entry.log_time } else { header.stamp_ns };
+            images.push((stamp_ns, *entry, header.frame));
         }
-        let fault = |what: &str, at: &(u64, Entry, String)| {
+        let unset = images.iter().filter(|(stamp, ..)| *stamp == 0).count();
+        if unset > 0 && 2 * unset >= images.len() {
+            let value = format!("{topic}: 0 in {unset} of {} messages", images.len());
+            let fault = Fault::new("stamps that were never set", self.path).value(value);
+            return Err(fault.remedy(
+                "`stamps = \"log\"` takes the times of recording, which vary by the transport; better let the driver set \
+                 header.stamp",
+            ));
+        }
+        let fault = |what: &str, at: &(u64, Message, String)| {
             let fault = Fault::new(what, self.path).value(format!("{topic}: {} ns", at.0));
             fault.remedy("`sort-stamps = true` sorts them and keeps the first of each stamp")
         };
@@ -278,14 +421,40 @@ impl Messages<'_> {
         Ok(tree)
     }
 
+    /// The rigs of raw and of rectified images, as far as the settings and the calibration allow them.
+    fn readings(
+        &self,
+        topics: &Topics,
+        infos: &[CameraInfo; 2],
+        tree: &Tree,
+        frames: &[String; 2],
+    ) -> Result<Readings, Fault> {
+        let of = |rectified: bool| self.rig(topics, infos, tree, frames, rectified);
+        match self.settings.images {
+            Views::Raw => Ok(Readings::One(Box::new(of(false)?), "raw, as set".to_owned())),
+            Views::Rectified => Ok(Readings::One(Box::new(of(true)?), "rectified, as set".to_owned())),
+            Views::Auto => match (of(false), of(true)) {
+                (Ok(raw), Ok(rectified)) if raw.is_rectified() && raw.left() == rectified.left() => {
+                    Ok(Readings::One(Box::new(rectified), "rectified: K without distortion is P".to_owned()))
+                }
+                (Ok(raw), Ok(rectified)) => Ok(Readings::Two { raw: Box::new(raw), rectified: Box::new(rectified) }),
+                (Ok(raw), Err(_)) => Ok(Readings::One(Box::new(raw), "raw: P is no camera".to_owned())),
+                (Err(_), Ok(rectified)) if infos.iter().all(ros::is_without_raw_model) => {
+                    Ok(Readings::One(Box::new(rectified), "rectified: K is no camera".to_owned()))
+                }
+                (Err(fault), _) => Err(fault),
+            },
+        }
+    }
+
     fn rig(
         &self,
         topics: &Topics,
         infos: &[CameraInfo; 2],
         tree: &Tree,
         frames: &[String; 2],
+        rectified: bool,
     ) -> Result<StereoRig, Fault> {
-        let rectified = self.settings.images.rectified(&topics.images[0]);
         let fault = |side: usize, what: String| Fault::new(what, self.path).value(&topics.infos[side]);
         let camera = |side: usize| ros::camera(&infos[side], rectified).map_err(|what| fault(side, what));
         let calibrated = ros::right_from_left(&infos[0], &infos[1], rectified).map_err(|what| fault(1, what))?;
@@ -331,8 +500,10 @@ impl Messages<'_> {
         }
         let (mut poses, mut covariances) = (Vec::new(), Vec::new());
         for entry in self.of(text) {
-            let message = self.read(entry, Odometry::decode)?;
-            let child_from_camera: Transform<Child, Camera> = match message.child.trim_start_matches('/') {
+            let kind = ros::plain(&self.recording.topics()[entry.topic].schema);
+            let message = self.read(entry, |bytes| ros::PoseMessage::decode(bytes, &kind))?;
+            let child = if message.child.is_empty() { &self.settings.pose_frame } else { &message.child };
+            let child_from_camera: Transform<Child, Camera> = match child.trim_start_matches('/') {
                 "" => Transform::identity(),
                 child if child == camera.trim_start_matches('/') => Transform::identity(),
                 child => tree.look_up(child, camera, message.header.stamp_ns, gap).ok_or_else(|| {
@@ -342,7 +513,8 @@ impl Messages<'_> {
             };
             let world_from_child: Transform<World, Child> = message.pose.transform();
             poses.push((message.header.stamp_ns, world_from_child * child_from_camera));
-            covariances.push(ros::covariance(&message, &child_from_camera));
+            covariances
+                .push(message.covariance.and_then(|given| ros::covariance(&message.pose, &given, &child_from_camera)));
         }
         if poses.windows(2).any(|pair| pair[0].0 >= pair[1].0) {
             return Err(Fault::new("stamps that do not increase", self.path).value(text));

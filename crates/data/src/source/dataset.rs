@@ -2,17 +2,20 @@
 
 use std::path::Path;
 
-use seafix_component::{Component, Fault, in_range, read_text};
+use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix_component::{Component, Fault, Settings, in_range, read_text};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_io::ImageLimits;
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
 
-use super::{CalibratedPort, FrameData, Hints, SensorFrame, Sequence, Source, Truth, WorldPrior};
-use crate::dataset::{Dataset, hash_faults, input_hashes, inspect_images, swapped};
+use crate::{
+    dataset::{CalibratedPort, Dataset, contradictions, hash_faults, input_hashes, inspect_images, swapped},
+    sequence::{Sequence, Source, Truth},
+};
 
 /// A reader of `seafix-dataset/1` folders, EuRoC folders and KITTI sequences.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DatasetSource {
     /// The folder, relative to the experiment file.
@@ -100,7 +103,13 @@ impl Recorded {
         if faults.is_empty() {
             faults.extend(swapped(&dataset));
         }
-        if faults.is_empty() { Ok(Box::new(Recorded { dataset, site })) } else { Err(faults) }
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+        // A run goes on with data that contradict each other: its results show what they are worth.
+        let doubts = contradictions(&dataset);
+        dataset.warnings.extend(doubts);
+        Ok(Box::new(Recorded { dataset, site }))
     }
 }
 

@@ -2,20 +2,24 @@
 
 use std::path::Path;
 
-use seafix_component::{Component, Fault};
+use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix_component::{Component, Fault, Settings};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
 use seafix_simulation::{CALIBRATION_RANGE, Mission, PlannedMission, optics::PortKind};
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    CalibratedPort, FrameData, Hints, SensorBuffer, SensorFrame, Sequence, Source, Truth, WorldPrior, readings,
+use super::readings;
+use crate::{
+    ports::CalibratedPort,
+    sensor_buffer::SensorBuffer,
+    sequence::{Sequence, Source, Truth},
 };
 
 /// A source that simulates a vehicle's dive over a given site, under lamps in water. Every disturbance is a setting. It
 /// gives rendered stereo pairs, or with `as-points` clouds of the same views.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, Settings)]
 #[serde(transparent)]
 pub struct Dive(pub Mission);
 

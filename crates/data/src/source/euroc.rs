@@ -2,15 +2,18 @@
 
 use std::path::Path;
 
-use seafix_component::{Component, Fault, in_range};
+use seafix_component::{Component, Fault, Settings, in_range};
 use seafix_io::ImageLimits;
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetSource, Sequence, Source, dataset::Recorded};
-use crate::dataset::Dataset;
+use super::dataset::{DatasetSource, Recorded};
+use crate::{
+    dataset::Dataset,
+    sequence::{Sequence, Source},
+};
 
 /// A reader of folders in the EuRoC layout: `mav0/cam0`, `mav0/cam1`, `mav0/state_groundtruth_estimate0`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Euroc {
     /// The folder, relative to the experiment file.

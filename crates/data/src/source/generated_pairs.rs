@@ -2,18 +2,19 @@
 
 use std::path::Path;
 
-use seafix_component::{Component, Fault, in_range};
+use seafix_component::{Component, Fault, Settings, in_range};
 use seafix_simulation::families::{Generated, PutativePairs};
 use serde::{Deserialize, Serialize};
 
-use super::{Sequence, Source, generated_problems::posed, problem_sequence::ProblemSequence};
+use super::{generated_problems::posed, problem_sequence::ProblemSequence};
+use crate::sequence::{Sequence, Source};
 
 /// Putative pairs of model and measured points, of which a given fraction are outliers; each frame has an object and a
 /// pose of its own.
 ///
 /// This is the usual benchmark of robust registration: Yang, Shi and Carlone, *TEASER: fast and certifiable point cloud
 /// registration*, 2020, Sec. VII. The object, pose and noise of a frame do not depend on the outlier fraction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct GeneratedPairs {
     /// The number of pairs of a frame.

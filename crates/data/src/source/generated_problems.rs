@@ -2,19 +2,17 @@
 
 use std::{path::Path, sync::Arc};
 
-use seafix_component::{Component, Fault, in_range};
+use seafix_component::{Component, Fault, Settings, in_range};
 use seafix_evaluation::Solved;
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_simulation::families::{Family, Generated, Presence};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Sequence, Source, TrueAnswer,
-    problem_sequence::{Posed, ProblemSequence},
-};
+use super::problem_sequence::{Posed, ProblemSequence};
+use crate::sequence::{Sequence, Source, TrueAnswer};
 
 /// Generated coherence problems of one family, one a frame, equal to those that `seafix generate` writes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct GeneratedProblems {
     /// The family: `paper-scale`, `site-scale`, `no-prior`, `putative`, `lattice`, `few-visible` or `dense-clutter`.

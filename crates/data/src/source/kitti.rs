@@ -2,16 +2,19 @@
 
 use std::path::Path;
 
-use seafix_component::{Component, Fault, in_range};
+use seafix_component::{Component, Fault, Settings, in_range};
 use seafix_io::ImageLimits;
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetSource, Sequence, Source, dataset::Recorded};
-use crate::dataset::{Cameras, Dataset};
+use super::dataset::{DatasetSource, Recorded};
+use crate::{
+    dataset::{Cameras, Dataset},
+    sequence::{Sequence, Source},
+};
 
 /// A reader of KITTI odometry sequences: `calib.txt`, `times.txt`, `image_0`, `image_1`, and the ground truth in
 /// `poses.txt` or `../../poses/NAME.txt`.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Kitti {
     /// The folder, relative to the experiment file.

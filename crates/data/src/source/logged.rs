@@ -3,15 +3,20 @@
 use std::path::Path;
 
 use nalgebra::Matrix4;
+use seafix::{FrameData, SensorFrame, WorldPrior};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Covariance6, Pinhole, RightCamera, StereoRig, Transform, World};
-use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord};
+use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord, unchanged};
 use seafix_navigation::Device;
 use seafix_referencing::Site;
 use seafix_vision::Image;
 
-use super::{FrameData, LoggedInput, SensorFrame, Sequence, Truth, WorldPrior, problem_sequence::no_site};
-use crate::{dataset::sha256, log_conversion};
+use super::{mcap::LoggedInput, problem_sequence::no_site};
+use crate::{
+    dataset::sha256,
+    log_conversion,
+    sequence::{Sequence, Truth},
+};
 
 /// The log of a trial as a sequence: inputs and ground truth, without the trial's results.
 pub(super) struct Logged {
@@ -33,7 +38,8 @@ impl Logged {
     /// Opens the log at `path`; `reading` selects its images or its clouds.
     pub(super) fn open(path: &Path, reading: LoggedInput) -> Result<Self, Vec<Fault>> {
         let one = |fault| vec![fault];
-        let frames = Frames::open(path).map_err(|error| one(fault(path, &error)))?;
+        let frames = unchanged(path).and_then(|()| Frames::open(path));
+        let frames = frames.map_err(|error| one(fault(path, &error)))?;
         let header = frames.header();
         if frames.is_empty() {
             return Err(one(
@@ -104,10 +110,11 @@ pub(super) fn fault(path: &Path, error: &LogError) -> Fault {
 }
 
 fn rig(record: &RigRecord) -> Result<StereoRig, String> {
-    let camera =
-        |side: &str, CameraRecord { size, matrix: [[fx, _, cx], [_, fy, cy], _], distortion }: &CameraRecord| {
-            Pinhole::new(*size, [*fx, *fy], [*cx, *cy], distortion).map_err(|error| format!("{side} camera: {error}"))
-        };
+    let camera = |side: &str, record: &CameraRecord| {
+        let CameraRecord { size, matrix: [[fx, _, cx], [_, fy, cy], _], distortion, equidistant } = record;
+        let new = if *equidistant { Pinhole::equidistant } else { Pinhole::new };
+        new(*size, [*fx, *fy], [*cx, *cy], distortion).map_err(|error| format!("{side} camera: {error}"))
+    };
     let right_from_left: Transform<RightCamera, Camera> = match record.right_from_left_rotation {
         Some(rotation) => {
             let translation = std::array::from_fn(|row| record.right_from_left[row][3]);

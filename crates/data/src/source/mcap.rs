@@ -1,17 +1,13 @@
-//! MCAP files: logs of other runs, and ROS 2 recordings.
+//! Settings of MCAP files: logs of other runs, and ROS 2 recordings.
 
-use std::path::Path;
-
-use seafix_component::{Component, Fault, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_io::ImageLimits;
-use seafix_log::Recording;
 use serde::{Deserialize, Serialize};
 
-use super::{Sequence, Source, logged, logged::Logged, recorded::Recorded};
 use crate::{dataset::SAME_INSTANT_NS, ros::Views};
 
 /// The part of a log's inputs to replay.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoggedInput {
     /// Images if there are any, otherwise clouds.
@@ -23,12 +19,23 @@ pub enum LoggedInput {
     Clouds,
 }
 
+/// The stamps of images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stamps {
+    /// The stamp in the message's header, the time of capture.
+    #[default]
+    Header,
+    /// The time of recording.
+    Log,
+}
+
 /// A reader of MCAP files: the log of a trial, or a ROS 2 recording with images, calibrations and poses. All settings
 /// except `path` and `read` apply to ROS 2 recordings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mcap {
-    /// The file, relative to the experiment file.
+    /// The file, or a folder of rosbag2, relative to the experiment file.
     pub path: String,
     /// The part of a Seafix log to replay: `images`, `clouds`, or `any` (images if there are any).
     pub read: LoggedInput,
@@ -42,10 +49,15 @@ pub struct Mcap {
     pub left_info: String,
     /// The topic of the right calibration, like `left-info`.
     pub right_info: String,
-    /// The kind of the images, `rectified` or `raw`; `by-name` takes topics with `rect` in their name as rectified.
+    /// The kind of the images, `rectified` or `raw`; `auto` decides by the calibration and by the matches of the images.
     pub images: Views,
-    /// The prior pose: a topic of Odometry, or `tf:FRAME` for the pose of the camera in that frame; no prior if empty.
+    /// The stamps of the images: `header`, or `log` for the times of recording where a driver sets none.
+    pub stamps: Stamps,
+    /// The prior pose: a topic of Odometry, PoseStamped or PoseWithCovarianceStamped, or `tf:FRAME` for the pose of the
+    /// camera in that frame; no prior if empty.
     pub prior: String,
+    /// The frame whose pose messages without a child frame state; the left camera's if empty.
+    pub pose_frame: String,
     /// The standard deviation of the prior's position per world axis (m); 0 uses the covariances of the messages.
     pub prior_position: f64,
     /// The standard deviation of the prior's attitude per camera axis (degrees); 0 uses the covariances of the
@@ -79,8 +91,10 @@ impl Default for Mcap {
             right: none(),
             left_info: none(),
             right_info: none(),
-            images: Views::ByName,
+            images: Views::Auto,
+            stamps: Stamps::Header,
             prior: none(),
+            pose_frame: none(),
             prior_position: 0.0,
             prior_attitude_deg: 0.0,
             truth: none(),
@@ -112,7 +126,12 @@ impl Component for Mcap {
     const SOURCE: &'static str = "mcap.dev";
 
     fn check(&self) -> Result<(), String> {
-        in_range(!self.path.is_empty(), "path", "''", "an .mcap file, relative to the experiment file")?;
+        in_range(
+            !self.path.is_empty(),
+            "path",
+            "''",
+            "an .mcap file or a folder of rosbag2, relative to the experiment file",
+        )?;
         let seconds = |value: f64| (0.0..=1e6).contains(&value);
         in_range(seconds(self.tolerance), "tolerance", self.tolerance, "0 to 1e6 seconds")?;
         in_range(seconds(self.max_gap), "max-gap", self.max_gap, "0 to 1e6 seconds")?;
@@ -129,25 +148,5 @@ impl Component for Mcap {
         let max = i64::MAX as u64;
         in_range((1..=max).contains(&self.max_pixels), "max-pixels", self.max_pixels, "at least 1")?;
         in_range((1..=max).contains(&self.max_bytes), "max-bytes", self.max_bytes, "at least 1")
-    }
-}
-
-impl Source for Mcap {
-    fn open(&self, _seed: u64, folder: &Path) -> Result<Box<dyn Sequence>, Vec<Fault>> {
-        let path = folder.join(&self.path);
-        let one = |fault| vec![fault];
-        let recording = Recording::open(&path, |_| false).map_err(|error| one(logged::fault(&path, &error)))?;
-        if recording.topics().iter().any(|topic| topic.schema == "seafix.v2.TrialHeader") {
-            return Ok(Box::new(Logged::open(&path, self.read)?));
-        }
-        if self.site.is_empty() {
-            let fault = Fault::new("a recording without a site", &path);
-            return Err(one(fault.remedy("a fix needs a known object: set `site` to a site file")));
-        }
-        Ok(Box::new(Recorded::open(&path, self, folder)?))
-    }
-
-    fn may_have_readings(&self) -> bool {
-        true
     }
 }

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use seafix::{FrameData, Hints, SensorFrame};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Object, StereoRig, Transform};
 use seafix_referencing::{Site, SiteObject, problem_file::CoherenceProblem};
 use seafix_simulation::VirtualRig;
 
-use super::{FrameData, Hints, SensorFrame, Sequence, TrueAnswer, Truth};
+use crate::sequence::{Sequence, TrueAnswer, Truth};
 
 /// The nominal time between frames (ns); problems have no time.
 const STEP_NS: u64 = 100_000_000;
@@ -47,6 +48,7 @@ pub(super) fn site_of(problem: &CoherenceProblem) -> Site {
         survey_sigma: 0.0,
         world_from_object: None,
         points: problem.model.clone(),
+        edges: Vec::new(),
         interest: Vec::new(),
     };
     Site { objects: vec![object], ..no_site() }

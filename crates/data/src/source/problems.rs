@@ -7,21 +7,21 @@ use std::{
 };
 
 use hmac_sha256::Hash as Sha256;
-use seafix_component::{Component, Fault, in_range, read_text};
+use seafix_component::{Component, Fault, Settings, in_range, read_text};
 use seafix_evaluation::Solved;
 use seafix_geometry::{Camera, Object, Transform};
 use seafix_referencing::problem_file::{self, CoherenceProblem};
 use serde::{Deserialize, Serialize, de::IgnoredAny};
 
-use super::{
-    Sequence, Source, TrueAnswer,
-    problem_sequence::{Posed, ProblemSequence},
+use super::problem_sequence::{Posed, ProblemSequence};
+use crate::{
+    dataset::sha256,
+    sequence::{Sequence, Source, TrueAnswer},
 };
-use crate::dataset::sha256;
 
 /// A source of coherence problems (`coherence-problem/1`) from a folder, one a frame. Subfolders are included, in the
 /// order of paths. The ground truth of `NAME.json` is `NAME.truth.json` if it exists; only evaluation uses it.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Problems {
     /// The folder, or the file of one problem; relative to the experiment file.

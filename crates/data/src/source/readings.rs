@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_navigation::{Device, Reading};
 use seafix_simulation::{PlannedMission, sensors::TimedReading};
 
-use super::SensorBuffer;
+use crate::sensor_buffer::SensorBuffer;
 
 /// The readings of the Doppler log and the gyro, with the noise of their data sheets.
 pub(super) fn sensor_buffer(mission: &PlannedMission) -> SensorBuffer {

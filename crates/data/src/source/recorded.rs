@@ -2,15 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
+use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 use seafix_component::{Fault, read_text};
 use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform, World};
 use seafix_io::ImageLimits;
 use seafix_referencing::Site;
 
-use super::{FrameData, Hints, Mcap, SensorFrame, Sequence, Truth, WorldPrior, bag::Bag};
-use crate::dataset::{
-    sha256,
-    tum::{Stamped, between},
+use super::{bag::Bag, mcap::Mcap};
+use crate::{
+    contradictions::{View, poses_faults},
+    dataset::{
+        sha256,
+        tum::{Stamped, between},
+    },
+    sequence::{Sequence, Truth},
 };
 
 /// The stereo pairs, calibration and poses of a ROS 2 recording.
@@ -31,7 +36,7 @@ pub(super) struct Recorded {
 pub fn check_recording(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>, String) {
     let settings = Mcap { max_pixels: limits.pixels, max_bytes: limits.bytes, ..Mcap::default() };
     match Bag::open(path, &settings) {
-        Ok(bag) => (Vec::new(), bag.warnings.clone(), bag.notes()),
+        Ok(bag) => (bag.doubts.clone(), bag.warnings.clone(), bag.notes()),
         Err(fault) => (vec![fault], Vec::new(), String::new()),
     }
 }
@@ -56,6 +61,7 @@ impl Recorded {
         };
         let (truth, _) = bag.poses(&settings.truth).map_err(one)?;
         let mut warnings = bag.warnings.clone();
+        warnings.extend(bag.doubts.clone());
         for (name, given, poses) in [("prior", &settings.prior, &prior), ("truth", &settings.truth, &truth)] {
             let lacks = |stamp: u64| between(poses, stamp, settings.gap_ns()).is_none();
             let without = bag.pairs.iter().filter(|(stamp, _)| lacks(*stamp)).count();
@@ -66,6 +72,14 @@ impl Recorded {
             }
         }
         warnings.extend(site.warnings.clone());
+        let view = View::new(&site, &[], &bag.rig, Transform::identity());
+        let of = |poses: &[Stamped<World, Camera>]| -> Vec<_> {
+            bag.pairs.iter().map(|(stamp, _)| between(poses, *stamp, settings.gap_ns())).collect()
+        };
+        let sigma = covariances.first().map(|covariance: &Covariance6<World, Camera>| {
+            (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
+        });
+        warnings.extend(poses_faults(&view, &of(&prior), &of(&truth), sigma, path));
         let (path, gap_ns) = (path.to_owned(), settings.gap_ns());
         Ok(Self { path, bag, gap_ns, site, prior, covariances, truth, warnings })
     }
@@ -128,6 +142,7 @@ impl Sequence for Recorded {
     }
 
     fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
-        Ok(vec![(self.name().to_owned(), sha256(&self.path)?)])
+        let name = |path: &Path| path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        self.bag.files().map(|path| Ok((name(path), sha256(path)?))).collect()
     }
 }

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use seafix_component::{Fault, nearest};
-use seafix_log::{Recording, Topic};
+use seafix_log::Topic;
 
-use super::Mcap;
+use super::{mcap::Mcap, recordings::Recordings};
 use crate::ros;
 
 /// The topics of a stereo rig, left and right.
@@ -17,8 +17,11 @@ pub(super) struct Topics {
 
 const IMAGES: [&str; 2] = ["sensor_msgs/Image", "sensor_msgs/CompressedImage"];
 const INFOS: [&str; 1] = ["sensor_msgs/CameraInfo"];
-const ODOMETRY: [&str; 1] = ["nav_msgs/Odometry"];
 const TRANSFORMS: [&str; 1] = ["tf2_msgs/TFMessage"];
+
+/// The conversion of a ROS 1 bag. `mcap convert` keeps messages in the encoding of ROS 1.
+const ROS_1: &str = "convert the ROS 1 bag itself: `pip install rosbags`, then `rosbags-convert --src IN.bag --dst OUT \
+                     --dst-storage mcap --dst-typestore ros2_humble`, and give the folder OUT";
 
 /// The words for the two cameras in topic names.
 const SIDES: [[&str; 2]; 5] =
@@ -26,7 +29,7 @@ const SIDES: [[&str; 2]; 5] =
 
 impl Topics {
     /// The topics that the settings name, otherwise those recognised by name. Their schemas are supported.
-    pub(super) fn of(path: &Path, recording: &Recording, settings: &Mcap) -> Result<Self, Fault> {
+    pub(super) fn of(path: &Path, recording: &Recordings, settings: &Mcap) -> Result<Self, Fault> {
         let find = Finder { path, topics: recording.topics() };
         let images = match [settings.left.as_str(), settings.right.as_str()] {
             ["", ""] => find.by_name()?,
@@ -39,7 +42,7 @@ impl Topics {
         let infos = [info(0, &settings.left_info, "left-info")?, info(1, &settings.right_info, "right-info")?];
         for (key, message) in [("prior", &settings.prior), ("truth", &settings.truth)] {
             if !message.is_empty() && !message.starts_with("tf:") {
-                find.called(message, key, &ODOMETRY)?;
+                find.called(message, key, &ros::POSES)?;
             }
         }
         for name in ["/tf", "/tf_static"] {
@@ -83,10 +86,12 @@ impl<'a> Finder<'a> {
                 .remedy(format!("give a topic of type {}", types.join(" or "))));
         }
         if topic.encoding != "cdr" || !["ros2msg", "ros2idl"].contains(&topic.schema_encoding.as_str()) {
+            let remedy = match topic.encoding.as_str() {
+                "ros1" => ROS_1,
+                _ => "only `cdr` with `ros2msg` or `ros2idl` is supported",
+            };
             return Err(fault(format!("messages in `{}`, described in `{}`", topic.encoding, topic.schema_encoding))
-                .remedy(
-                    "only `cdr` with `ros2msg` or `ros2idl` is supported; convert a ROS 1 bag with rosbags-convert",
-                ));
+                .remedy(remedy));
         }
         match ros::differs(&topic.schema, &topic.schema_encoding, &String::from_utf8_lossy(&topic.definition)) {
             Some(what) => Err(fault(what).remedy("give a bag with ROS 2 message definitions")),

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
+use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform};
 use seafix_referencing::Site;
 use seafix_simulation::{Dive, PlannedDive};
 
-use super::{FrameData, Hints, SensorFrame, Sequence, Truth, WorldPrior};
+use crate::sequence::{Sequence, Truth};
 
 pub(super) fn open(dive: &Dive, seed: u64, images: bool) -> Result<Box<dyn Sequence>, Vec<Fault>> {
     let dive =

@@ -3,18 +3,19 @@
 use std::path::Path;
 
 use nalgebra::{Matrix4, UnitQuaternion, Vector3};
-use seafix_component::{Component, Fault, in_range};
+use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix_component::{Component, Fault, Settings, in_range};
 use seafix_evaluation::{Seen, cramer_rao};
 use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, Point, StereoRig, Transform, World, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_simulation::{Layout, Placed, Purpose, Shape, Stream, VirtualRig};
 use serde::{Deserialize, Serialize};
 
-use super::{FrameData, Hints, SensorFrame, Sequence, Source, Truth, WorldPrior};
+use crate::sequence::{Sequence, Source, Truth};
 
 /// A Monte Carlo of point layouts, as clouds of noisy points. Every layout is one object of a site, or several objects
 /// that share its points; layouts are 1 km apart. Frame k is draw k / `layouts` of layout k mod `layouts`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct VirtualLayouts {
     /// The shape of the layouts: `spread` or `compact`.
@@ -95,8 +96,12 @@ impl Component for VirtualLayouts {
         )?;
         let gate = self.gate > 0.0 && self.gate <= 10.0;
         in_range(gate, "gate", self.gate, "a positive number of metres, at most 10")?;
-        let enough = self.objects >= 1 && 3 * self.objects <= self.points;
+        let enough = self.objects >= 1 && self.objects <= self.points / 3;
         in_range(enough, "objects", self.objects, "1 or more, with three points each")?;
+        let focal = self.rig.focal > 0.0 && self.rig.focal.is_finite();
+        in_range(focal, "rig.focal", self.rig.focal, "a positive number of pixels")?;
+        let baseline = (1e-3..=5.0).contains(&self.rig.baseline);
+        in_range(baseline, "rig.baseline", self.rig.baseline, "metres, from 0.001 to 5")?;
         self.rig.build().map(|_| ()).map_err(|error| error.to_string())
     }
 }
@@ -163,6 +168,7 @@ impl VirtualLayouts {
             survey_sigma: self.survey_sigma,
             world_from_object: Some(stands(&base_in_world)),
             points: points.iter().enumerate().map(own).collect(),
+            edges: Vec::new(),
             interest: Vec::new(),
         };
         (object, truly)

@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use seafix_component::{Component, Fault};
+use seafix_component::{Component, Fault, Settings};
 use seafix_simulation::Dive;
 use serde::{Deserialize, Serialize};
 
-use super::{Sequence, Source, virtual_dive::open};
+use super::virtual_dive::open;
+use crate::sequence::{Sequence, Source};
 
 /// The dive of `virtual-images` as clouds of noisy points, without rendering or processing of images.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, Settings)]
 #[serde(transparent)]
 pub struct VirtualPoints(pub Dive);
 

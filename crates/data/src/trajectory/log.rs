@@ -5,9 +5,9 @@ use std::path::Path;
 use nalgebra::{Matrix3, Vector3};
 use seafix_component::Fault;
 use seafix_evaluation::trajectory::Pose;
-use seafix_log::{FrameRecord, Matrix4, Reader, TrialHeader};
+use seafix_log::{FrameRecord, Matrix4, Reader, TrialHeader, unchanged};
 
-use super::Trajectory;
+use super::poses::Trajectory;
 use seafix::UNKNOWN_MOTION;
 
 /// The kind of a logged trajectory of the left camera.
@@ -30,7 +30,7 @@ impl Trajectory {
     /// A log that cannot be read or has no such trajectory.
     pub fn of_log(file: &Path, which: LoggedTrajectory) -> Result<Self, Fault> {
         let unreadable = |error: seafix_log::LogError| Fault::new(error.to_string(), file);
-        let reader = Reader::open(file).map_err(unreadable)?.without_images();
+        let reader = unchanged(file).and_then(|()| Reader::open(file)).map_err(unreadable)?.without_images();
         let header = reader.header().clone();
         let (mut stamps, mut poses): (Vec<u64>, Vec<Pose>) = (Vec::new(), Vec::new());
         let mut breaks = Vec::new();
@@ -61,7 +61,7 @@ impl Trajectory {
             };
             return Err(Fault::new(what, file).remedy(remedy));
         }
-        Ok(Self { stamps: Some(stamps), poses, breaks })
+        Ok(Self { stamps: Some(stamps), poses, breaks, has_attitude: true, warnings: Vec::new() })
     }
 }
 

@@ -1,31 +1,24 @@
-//! Trajectories in TUM, KITTI and EuRoC files, recognised by content, and in logs.
+//! Trajectories in TUM, KITTI and EuRoC files, tables with named columns, COLMAP's images, and logs.
 
 mod euroc;
 mod kitti;
+mod lines;
 mod log;
+mod poses;
 mod tum;
 
 use std::path::Path;
 
-use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
-use seafix_component::{Fault, read_text};
+use seafix_component::{Fault, decoded_file, read_text};
 use seafix_evaluation::trajectory::Pose;
 
-use crate::dataset::tum::nanoseconds;
-
+use crate::formats::{
+    colmap_images,
+    pose_rows::{Attitude, PoseRow, PoseRows, Reading, read},
+};
+use lines::{all_lines, breaks};
 pub use log::LoggedTrajectory;
-
-/// A trajectory: the poses of a body in the order of a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trajectory {
-    /// The stamp of each pose (ns), strictly increasing; `None` for a KITTI file.
-    pub stamps: Option<Vec<u64>>,
-    /// The poses, `reference_from_body`.
-    pub poses: Vec<Pose>,
-    /// The indices of the poses before which the trajectory is broken. The motion to such a pose is unknown; a line `#
-    /// broken: …` marks it in the file.
-    pub breaks: Vec<usize>,
-}
+pub use poses::Trajectory;
 
 /// The format of a trajectory file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,17 +40,6 @@ impl Format {
             _ => Self::Tum,
         }
     }
-
-    /// The format of a text, by the separator and the number of columns of its first data line.
-    fn of_text(text: &str) -> Option<Self> {
-        let line = lines(text).next()?.1;
-        let full = |stamp: &str| stamp.trim().parse::<u64>().is_ok();
-        match (line.contains(','), line.split_whitespace().count()) {
-            (true, _) if text.contains("#timestamp") || line.split(',').next().is_some_and(full) => Some(Self::Euroc),
-            (false, 12) => Some(Self::Kitti),
-            _ => Some(Self::Tum),
-        }
-    }
 }
 
 impl Trajectory {
@@ -75,8 +57,7 @@ impl Trajectory {
     /// # Errors
     /// As for [`read`](Self::read), except for the order.
     pub fn read_repaired(file: &Path) -> Result<Self, Fault> {
-        let text = read_text(file)?;
-        Self::of_lines(&sorted(&text), &text, file)
+        Self::of_text(&read_text(file)?, file, true)
     }
 
     /// Reads the trajectory in a text; `file` is named in faults.
@@ -84,19 +65,48 @@ impl Trajectory {
     /// # Errors
     /// As for [`read`](Self::read).
     pub fn parse(text: &str, file: &Path) -> Result<Self, Fault> {
-        Self::of_lines(&all_lines(text).collect::<Vec<_>>(), text, file)
+        Self::of_text(text, file, false)
     }
 
-    fn of_lines(lines: &[(usize, &str)], text: &str, file: &Path) -> Result<Self, Fault> {
-        let Some(format) = Format::of_text(text) else {
-            return Err(Fault::new("a trajectory without poses", file).remedy("give TUM, KITTI or EuRoC lines"));
-        };
-        let read = match format {
-            Format::Tum => tum::parse(lines, file),
-            Format::Kitti => kitti::parse(lines, file),
-            Format::Euroc => euroc::parse(lines, file),
-        };
-        Ok(Self { breaks: breaks(lines), ..read? })
+    fn of_text(text: &str, file: &Path, sorts: bool) -> Result<Self, Fault> {
+        decoded_file(file, || Self::read_text(text, file, sorts))
+    }
+
+    fn read_text(text: &str, file: &Path, sorts: bool) -> Result<Self, Fault> {
+        let lines = all_lines(text);
+        if colmap_images::is_one(&lines) {
+            return Self::of_images(&lines, file);
+        }
+        let PoseRows { rows, warnings, .. } = read(&lines, file, Reading { sorts, doubts_order: true })?;
+        let breaks = breaks(&lines, &rows);
+        let has_attitude = rows.iter().all(|row| row.attitude != Attitude::Unknown);
+        let stamps = rows.iter().map(|row| row.stamp_ns).collect();
+        let poses = rows.iter().map(pose).collect();
+        Ok(Self { stamps, poses, breaks, has_attitude, warnings })
+    }
+
+    /// The trajectory of the cameras of COLMAP's images.
+    fn of_images(lines: &[(usize, &str)], file: &Path) -> Result<Self, Fault> {
+        let images = colmap_images::parse(lines, file)?;
+        if images.is_empty() {
+            return Err(Fault::new("a trajectory without poses", file).remedy("give the lines of images"));
+        }
+        let stamps: Option<Vec<u64>> = images.iter().map(|image| image.stamp_ns).collect();
+        let twice = stamps.as_ref().and_then(|stamps| stamps.windows(2).position(|pair| pair[0] == pair[1]));
+        if let Some(index) = twice {
+            let fault = Fault::new("two images of one time", file).on_line(images[index + 1].line);
+            let remedy = "give the images of one camera";
+            return Err(fault.value(format!("{} and {}", images[index].name, images[index + 1].name)).remedy(remedy));
+        }
+        let mut warnings = Vec::new();
+        if stamps.is_none() {
+            let fault = Fault::new("images whose names are no stamps", file).value(&images[0].name);
+            warnings.push(fault.remedy("the poses are in order of the names and have no stamps"));
+        }
+        let poses = images
+            .iter()
+            .map(|image| Pose { rotation: image.rotation.to_rotation_matrix().into_inner(), position: image.position });
+        Ok(Self { stamps, poses: poses.collect(), breaks: Vec::new(), has_attitude: true, warnings })
     }
 
     /// The text of this trajectory in a format. Poses without stamps receive their index as seconds.
@@ -113,88 +123,14 @@ impl Trajectory {
     }
 }
 
-/// The beginning of a comment line that marks the motion to the next pose as unknown.
-const BROKEN: &str = "# broken";
-
-/// The lines with their numbers, from 1.
-fn all_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
-}
-
-fn holds_numbers(line: &str) -> bool {
-    !line.is_empty() && !line.starts_with('#')
-}
-
-/// The data lines with their numbers, from 1.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    all_lines(text).filter(|(_, line)| holds_numbers(line))
-}
-
-/// Numbered lines of a text.
-type Lines<'a> = Vec<(usize, &'a str)>;
-
-/// The lines sorted by stamp, with the first of each stamp kept. Comments stay before their line. Lines without a stamp
-/// keep their place and are rejected by the reader.
-fn sorted(text: &str) -> Lines<'_> {
-    let mut groups: Vec<(Option<u64>, Lines<'_>)> = Vec::new();
-    let mut group = Vec::new();
-    for (number, line) in all_lines(text) {
-        group.push((number, line));
-        if holds_numbers(line) {
-            let word = line.split([',', ' ', '\t']).next().unwrap_or_default();
-            let stamp = if line.contains(',') { word.parse().ok() } else { nanoseconds(word) };
-            groups.push((stamp, std::mem::take(&mut group)));
-        }
-    }
-    if groups.iter().all(|(stamp, _)| stamp.is_some()) {
-        groups.sort_by_key(|(stamp, _)| *stamp);
-        groups.dedup_by_key(|(stamp, _)| *stamp);
-    }
-    groups.into_iter().flat_map(|(_, lines)| lines).collect()
-}
-
-/// The indices of the poses before which the trajectory is broken.
-fn breaks(lines: &[(usize, &str)]) -> Vec<usize> {
-    let (mut breaks, mut poses, mut broken) = (Vec::new(), 0, false);
-    for (_, line) in lines {
-        broken |= line.starts_with(BROKEN);
-        if holds_numbers(line) {
-            if std::mem::take(&mut broken) && poses > 0 {
-                breaks.push(poses);
-            }
-            poses += 1;
-        }
-    }
-    breaks
-}
-
-/// The number in a word, or a fault.
-fn number(word: &str, file: &Path, line: usize) -> Result<f64, Fault> {
-    word.trim()
-        .parse()
-        .ok()
-        .filter(|x: &f64| x.is_finite())
-        .ok_or_else(|| Fault::new("not a finite number", file).on_line(line).value(word).remedy("give a number"))
-}
-
-/// The pose with this position and attitude (w, x, y, z). An error is the norm of a quaternion that is not of unit
-/// length.
-fn pose(position: [f64; 3], [w, x, y, z]: [f64; 4]) -> Result<Pose, f64> {
-    let quaternion = Quaternion::new(w, x, y, z);
-    if (quaternion.norm() - 1.0).abs() > 1e-3 {
-        return Err(quaternion.norm());
-    }
-    let rotation = UnitQuaternion::new_normalize(quaternion).to_rotation_matrix().into_inner();
-    Ok(Pose { rotation, position: Vector3::from(position) })
-}
-
-/// The quaternion (w, x, y, z) of a pose with w ≥ 0.
-fn quaternion(pose: &Pose) -> [f64; 4] {
-    let mut rotation = Rotation3::from_matrix_unchecked(pose.rotation);
-    rotation.renormalize();
-    let q = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
-    let q = if q.w < 0.0 { -q } else { q };
-    [q.w, q.i, q.j, q.k]
+/// The pose of a row; one without an attitude has the axes of the reference.
+fn pose(row: &PoseRow) -> Pose {
+    let rotation = match row.attitude {
+        Attitude::Quaternion(turn) => turn.to_rotation_matrix().into_inner(),
+        Attitude::Matrix(rotation) => rotation,
+        Attitude::Unknown => Pose::IDENTITY.rotation,
+    };
+    Pose { rotation, position: row.position }
 }
 
 #[cfg(test)]
@@ -210,23 +146,13 @@ mod tests {
         let walk = read("1.000000001 1 2 3 0.1 -0.2 0.3 0.9273618495495704\n2.5 4 5 6 0 0 0 1\n").unwrap();
         for format in [Format::Tum, Format::Euroc, Format::Kitti] {
             let again = read(&walk.print(format)).unwrap();
+            assert!(again.has_attitude && again.warnings.is_empty(), "{format:?}");
             assert_eq!(again.stamps, (format != Format::Kitti).then(|| walk.stamps.clone().unwrap()), "{format:?}");
             for (a, b) in again.poses.iter().zip(&walk.poses) {
                 assert_eq!(a.position, b.position, "{format:?}");
                 assert!((a.rotation - b.rotation).amax() < 1e-15, "{format:?}");
             }
         }
-    }
-
-    #[test]
-    fn the_format_is_reported_by_content() {
-        assert_eq!(Format::of_text("# x\n1 0 0 0 0 0 0 1\n"), Some(Format::Tum));
-        assert_eq!(Format::of_text("1 0 0 0 0 1 0 0 0 0 1 0\n"), Some(Format::Kitti));
-        assert_eq!(
-            Format::of_text("#timestamp, p_x\n1403636580838555648,4.6,-1.7,0.7,1,0,0,0,9\n"),
-            Some(Format::Euroc)
-        );
-        assert_eq!(Format::of_text("# nothing\n\n"), None);
     }
 
     /// Seen to fail when comments are skipped, and when a line that cannot be sorted is rejected although it can be
@@ -255,7 +181,7 @@ mod tests {
         assert!(read("").unwrap_err().starts_with("a trajectory without poses in walk"));
         assert!(read("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n").unwrap_err().starts_with("7 columns in walk:2"));
         assert!(read("1,0,0,0,0,0,0\n").unwrap_err().starts_with("7 columns in walk:1"));
-        assert!(read("1.5,0,0,0,0,0,0,1\n").unwrap_err().contains("not commas"));
+        assert!(read("1.5,0,0,0,0,0,0,1\n").unwrap_err().contains("(TUM) or qw qx qy qz (EuRoC)"));
         assert!(read("5,0,0,0,1,0,0,0\n5,0,0,0,1,0,0,0\n").unwrap_err().contains("in walk:2: 5; sort the lines"));
         assert!(read("1 0 0 0 0 1 0 0 0 0 -1 0\n").unwrap_err().contains("not a rotation in walk:1"));
         let header =
@@ -266,7 +192,5 @@ mod tests {
         let tum = read("1000 1 2 3 0.1 -0.2 0.3 0.9273618495495704\n").unwrap().poses[0];
         assert!((xyzw.rotation - tum.rotation).amax() < 1e-15);
         assert!((xyzw.rotation - wxyz.rotation).amax() > 0.1, "the header names the order of w");
-        let wxyz = "# timestamp tx ty tz qw qx qy qz\n1 0 0 0 1 0 0 0\n";
-        assert!(read(wxyz).unwrap_err().starts_with("quaternions with w first in walk:1"), "{wxyz}");
     }
 }

@@ -7,7 +7,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::{median, quantile};
+use super::quantile::{median, quantile};
 
 /// Maximum number of blocks; with this number the ends of an interval are accurate to 4 % of its width.
 const BLOCKS: usize = 400;

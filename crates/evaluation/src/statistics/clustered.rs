@@ -67,7 +67,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::clopper_pearson;
+    use crate::statistics::rate::clopper_pearson;
 
     #[test]
     fn few_events_give_wide_intervals_that_hold_the_observed_fraction() {

@@ -3,8 +3,8 @@
 /// Holm's adjustment of p-values for the size of their family.
 ///
 /// The adjusted values are in the order of `p`. With p₍₁₎ ≤ … ≤ p₍ₘ₎ the adjusted p₍ᵢ₎ is the maximum over j ≤ i of
-/// min(1, (m − j + 1) p₍ⱼ₎). Claims with an adjusted value below α have a probability of at most α of any false claim
-/// in the family.
+/// min(1, (m − j + 1) p₍ⱼ₎). If all claims with an adjusted value below α are accepted, the probability that any of
+/// them is false is at most α.
 ///
 /// Source: Holm, *A simple sequentially rejective multiple test procedure*, 1979.
 ///

@@ -7,7 +7,7 @@ mod bootstrap;
 mod clustered;
 mod holm;
 mod mcnemar;
-mod quantile;
+pub(crate) mod quantile;
 mod rate;
 mod recall;
 mod wilcoxon;

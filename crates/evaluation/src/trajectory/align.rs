@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Pose;
+use super::pose::Pose;
 
 /// A similarity transform: p ↦ `scale` · `rotation` · p + `translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,9 @@
 //! Drift of odometry relative to the path length (KITTI).
 
-use super::{Pose, path_lengths, relation::angle};
+use super::{
+    pose::{Pose, path_lengths},
+    relation::angle,
+};
 
 /// The drift over one segment of the reference path.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,6 +42,24 @@ pub fn drift(reference: &[Pose], estimate: &[Pose], lengths: &[f64]) -> Vec<Drif
     lengths.iter().flat_map(|&length| (0..reference.len()).filter_map(move |from| segment(from, length))).collect()
 }
 
+/// The drift over segments of a trajectory whose attitude is unknown.
+///
+/// The error is the difference of the two distances from the first to the last position of a segment, divided by the
+/// length: it is the part of the drift along the path, and unlike [`drift`] independent of the axes.
+///
+/// # Panics
+/// If the trajectories differ in length.
+pub fn drift_of_positions(reference: &[Pose], estimate: &[Pose], lengths: &[f64]) -> Vec<DriftSegment> {
+    let error =
+        |poses: &[Pose], segment: &DriftSegment| (poses[segment.to].position - poses[segment.from].position).norm();
+    let mut segments = drift(reference, estimate, lengths);
+    for segment in &mut segments {
+        let apart = (error(reference, segment) - error(estimate, segment)).abs();
+        (segment.translation, segment.rotation) = (apart / segment.length, f64::NAN);
+    }
+    segments
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -51,5 +72,10 @@ mod tests {
         let segments = drift(&line(1.0), &line(1.01), &[5.0, 40.0]);
         assert_eq!(segments.len(), 16, "starts with five metres left; forty are never reached");
         assert!(segments.iter().all(|segment| (segment.translation - 0.01).abs() < 1e-12 && segment.rotation < 1e-12));
+        let turned = line(1.01).into_iter().map(|pose| Pose { position: pose.position.yzx(), ..pose });
+        let positions = drift_of_positions(&line(1.0), &turned.collect::<Vec<_>>(), &[5.0]);
+        assert!(
+            positions.iter().all(|segment| (segment.translation - 0.01).abs() < 1e-12 && segment.rotation.is_nan())
+        );
     }
 }

@@ -1,6 +1,9 @@
 //! Selection of pose pairs for the relative error.
 
-use super::{Pose, path_lengths, relation::angle};
+use super::{
+    pose::{Pose, path_lengths},
+    relation::angle,
+};
 
 /// The distance between the two poses of a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,8 +18,9 @@ pub enum Delta {
 
 /// The pairs (i, j), i < j, of poses at the distance `delta`, selected as by evo.
 ///
-/// Pairs are consecutive by default. With `all`, one pair starts at every pose; frames are then exact, and metres and
-/// radians within `tolerance` times the distance.
+/// Pairs are consecutive by default. With `all`, pairs may start at every pose: for a number of frames the pair at
+/// exactly this number; for a path length the nearest pair within `tolerance` times the length; for an angle every pair
+/// within `tolerance` times the angle.
 pub fn pairs(poses: &[Pose], delta: Delta, all: bool, tolerance: f64) -> Vec<(usize, usize)> {
     match delta {
         Delta::Frames(step) => {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
-use super::Pose;
+use super::pose::Pose;
 
 /// The measure of a pose difference E, by evo's names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

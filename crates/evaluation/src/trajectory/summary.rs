@@ -1,6 +1,6 @@
 //! Summary statistics of errors.
 
-use crate::quantile;
+use crate::statistics::quantile;
 
 /// Statistics of errors, by evo's names; all NaN without errors.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -80,6 +80,14 @@ fn faults_name_their_line() {
             .contains("e.toml:4:7")
     );
     assert!(message("question = ''\nsource = 'virtual-points'\n").contains("no question in e.toml:1"));
+    let published = |source: &str, quantity: &str, range: &str| {
+        message(&format!(
+            "question = 'why'\nsource = 'virtual-points'\n[[published]]\nsource = '{source}'\nquantity = '{quantity}'\nrange = {range}\n"
+        ))
+    };
+    assert!(published("", "fit_rms", "[0.0, 0.1]").starts_with("no source in e.toml:4"));
+    assert!(published("a book", "nees", "[0.0, 0.1]").starts_with("unknown quantity in e.toml:5"));
+    assert!(published("a book", "fit_rms", "[0.2, 0.1]").starts_with("no range in e.toml:6"));
     assert!(
         message("question = 'why'\nsource = { name = 'virtual-points', distanc = 2 }\n")
             .contains("did you mean `distance`")

@@ -233,10 +233,10 @@ mod tests {
             let frame = FrameRecord { frame: 2, stamp_ns: 7, targets: vec![target], ..Default::default() };
             table.add("001", &frame);
         }
-        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,explanation,wrong,wrong_pairs,visible";
+        let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,explanation,p_absent,p_wrong";
         assert!(Table::head().starts_with(head));
         let mut lines = table.text.lines();
-        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,rejected,absent,,,,4,,"));
+        assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,rejected,absent,,,,,,4,,"));
         assert!(lines.next().unwrap().contains("\"'=1+1\""));
     }
 }

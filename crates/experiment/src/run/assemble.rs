@@ -7,6 +7,7 @@ use std::{
 };
 
 use rayon::{ThreadPool, prelude::*};
+use seafix_component::PartialFile;
 
 use crate::{
     results::{TrialRows, join_csv, join_parquet},
@@ -90,10 +91,10 @@ impl Output<'_> {
         Ok(Some((name, sha256(&self.path).map_err(RunError::Output)?)))
     }
 
-    /// Writes the file with the extension `.partial`, and renames it when it is on the disk.
+    /// Writes the file with the extension `.partial`, and renames it when it is complete.
     fn complete(&self, write: impl FnOnce(&Path) -> Result<(), String>) -> Result<(), RunError> {
-        let partial = PathBuf::from(format!("{}.partial", self.path.display()));
-        write(&partial).map_err(|error| RunError::unwritable(&partial, error))?;
-        fs::rename(&partial, &self.path).map_err(|error| RunError::unwritable(&self.path, error))
+        let (partial, _) = PartialFile::create(&self.path).map_err(|error| RunError::unwritable(&self.path, error))?;
+        write(partial.unfinished()).map_err(|error| RunError::unwritable(partial.unfinished(), error))?;
+        partial.finish().map_err(|error| RunError::unwritable(&self.path, error))
     }
 }

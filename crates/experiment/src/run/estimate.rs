@@ -145,9 +145,16 @@ struct Scratch(PathBuf);
 
 impl Scratch {
     fn new() -> Result<Self, RunError> {
-        let folder = std::env::temp_dir().join(format!("seafix-{}", std::process::id()));
-        fs::create_dir_all(&folder).map_err(|error| RunError::unwritable(&folder, error))?;
-        Ok(Self(folder))
+        // The name is tried until it is new: an existing folder belongs to someone else.
+        for number in 0..1000 {
+            let folder = std::env::temp_dir().join(format!("seafix-{}-{number}", std::process::id()));
+            match fs::create_dir(&folder) {
+                Ok(()) => return Ok(Self(folder)),
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(RunError::unwritable(&folder, error)),
+            }
+        }
+        Err(RunError::unwritable(&std::env::temp_dir(), "no free name for a temporary folder"))
     }
 
     /// The size of the logs in it (bytes).

@@ -1,19 +1,23 @@
-//! The folder of a run: its lock, and the decision whether to create, resume or replace the run.
+//! The folder of a run: its marker, and the decision whether to create, resume or replace the run.
 
 use std::{
-    fs::{self, File, OpenOptions, TryLockError},
-    io::{ErrorKind, Read, Seek, Write},
+    fs,
+    io::ErrorKind,
     path::{Path, PathBuf},
 };
 
-use seafix_component::Fault;
+use seafix_component::{Fault, MARKER, Marker, Ownership};
 
 use crate::run::{
+    lock::Lock,
     manifest::{self, Manifest},
     options::{Existing, Options},
     outcome::RunError,
-    store::{self, Store},
+    store,
 };
+
+/// The kind of a run's folder.
+const KIND: &str = "run";
 
 /// The folder of a run, locked during the lifetime of this value.
 #[derive(Debug)]
@@ -23,75 +27,100 @@ pub(super) struct Claim {
     pub(super) finished: Option<Manifest>,
     /// The reason for the removal of an outdated run, if there was one.
     pub(super) outdated: Option<String>,
-    lock: Lock,
+    /// The files that the run may write.
+    pub(super) marker: Marker,
+    /// The lock; none for a kept run, which is only read.
+    lock: Option<Lock>,
 }
-
-/// A file that is locked during the lifetime of this value.
-#[derive(Debug)]
-struct Lock {
-    path: PathBuf,
-    file: File,
-}
-
-impl Drop for Lock {
-    /// The file is removed under the lock, so that a process that has opened it notices.
-    fn drop(&mut self) {
-        // The folder may have been replaced by another process.
-        if is_at(&self.file, &self.path) {
-            let _ = fs::remove_file(&self.path);
-        }
-    }
-}
-
-/// The file with the advisory lock of a running process; it contains the process and the host.
-const LOCK: &str = ".lock";
 
 /// Checks the folder before anything is opened, computed or written.
 pub(super) fn inspect(options: &Options) -> Result<(), Fault> {
-    match &options.out {
-        Some(out) if options.existing == Existing::Refuse && !free(out)? => Err(taken(out)),
-        _ => Ok(()),
+    let Some(out) = &options.out else { return Ok(()) };
+    match Ownership::of(out, KIND)? {
+        Ownership::Free => Ok(()),
+        Ownership::Ours(_) if options.existing == Existing::Refuse => Err(taken(out)),
+        Ownership::Ours(_) => Ok(()),
+        // A run of an earlier version is kept, but not changed.
+        Ownership::Foreign(_) if options.existing == Existing::Keep && manifest::is_run(out) => Ok(()),
+        Ownership::Foreign(name) => Err(foreign(out, &name)),
+    }
+}
+
+/// The fault of an input in the output folder: an input is never an output. `inputs` are files and folders.
+pub(super) fn input_inside(options: &Options, inputs: impl IntoIterator<Item = PathBuf>) -> Result<(), Fault> {
+    let Some(out) = options.out.as_ref().and_then(|out| out.canonicalize().ok()) else { return Ok(()) };
+    if options.existing == Existing::Resume {
+        // Nothing is removed.
+        return Ok(());
+    }
+    match inputs.into_iter().find(|input| input.canonicalize().is_ok_and(|input| input.starts_with(&out))) {
+        None => Ok(()),
+        Some(input) => {
+            let fault = Fault::new("an input in the output folder", &input);
+            Err(fault.remedy("choose another folder with --out"))
+        }
     }
 }
 
 impl Claim {
     /// Claims the folder in `options`, or else the next free one below `runs` for `name`.
     pub(super) fn new(options: &Options, name: &str, manifest: &Manifest) -> Result<Self, RunError> {
+        let marker = marker(manifest);
+        let (finished, outdated) = (None, None);
         let Some(out) = &options.out else {
             let folder = next_free(name).map_err(RunError::Output)?;
-            let lock = lock(&folder).map_err(RunError::Output)?;
-            return Ok(Self { folder, finished: None, outdated: None, lock });
+            let lock = Some(Lock::new(&folder).map_err(RunError::Output)?);
+            marker.write(&folder).map_err(|error| RunError::unwritable(&folder.join(MARKER), error))?;
+            return Ok(Self { folder, finished, outdated, marker, lock });
         };
         inspect(options).map_err(RunError::Output)?;
-        fs::create_dir_all(out).map_err(|error| RunError::Output(unmade(out, &error)))?;
-        let mut claim =
-            Self { folder: out.clone(), finished: None, outdated: None, lock: lock(out).map_err(RunError::Output)? };
-        // The check is repeated under the lock, because another run may have ended in between.
-        if free(out).map_err(RunError::Output)? {
-            return Ok(claim);
-        }
-        match options.existing {
-            Existing::Refuse => Err(RunError::Output(taken(out))),
-            Existing::Overwrite => clear(out).map(|()| claim),
-            Existing::Keep => claim.keep(manifest),
-            Existing::Resume => {
-                let old = Manifest::read(out).map_err(RunError::Output)?;
-                let shard = (old.shard != manifest.shard).then_some("the number of its shard");
-                if let Some(what) = manifest.differs(&old).or(shard) {
-                    let fault = Fault::new("the folder holds another run", &out.join(manifest::NAME)).value(what);
-                    let remedy = "repeat the earlier run, choose a new folder with --out, or --overwrite";
-                    return Err(RunError::Output(fault.remedy(format!("it differs; {remedy}"))));
-                }
-                claim.finished = ["finished", "shard"].contains(&&old.state[..]).then_some(old);
-                Ok(claim)
+        if let Ownership::Foreign(name) = Ownership::of(out, KIND).map_err(RunError::Output)? {
+            let old = Manifest::read(out).map_err(RunError::Output)?;
+            if old.timed == manifest.timed && old.stands_for(manifest, out) {
+                return Ok(Self { folder: out.clone(), finished: Some(old), outdated, marker, lock: None });
             }
+            return Err(RunError::Output(foreign(out, &name)));
         }
+        fs::create_dir_all(out).map_err(|error| RunError::Output(unmade(out, &error)))?;
+        let lock = Some(Lock::new(out).map_err(RunError::Output)?);
+        let mut claim = Self { folder: out.clone(), finished, outdated, marker, lock };
+        // The check is repeated under the lock, because another run may have ended in between.
+        let old = match Ownership::of(out, KIND).map_err(RunError::Output)? {
+            Ownership::Free => return claim.mark(),
+            Ownership::Foreign(name) => return Err(RunError::Output(foreign(out, &name))),
+            Ownership::Ours(old) => old,
+        };
+        if options.existing == Existing::Refuse {
+            return Err(RunError::Output(taken(out)));
+        }
+        if options.existing == Existing::Overwrite || !manifest::is_run(out) {
+            // Without a manifest nothing was computed.
+            claim.clear(&old)?;
+            return claim.mark();
+        }
+        if options.existing == Existing::Keep {
+            return claim.keep(manifest, &old);
+        }
+        let old = Manifest::read(out).map_err(RunError::Output)?;
+        let shard = (old.shard != manifest.shard).then_some("the number of its shard");
+        if let Some(what) = manifest.differs(&old).or(shard) {
+            let fault = Fault::new("the folder holds another run", &out.join(manifest::NAME)).value(what);
+            let remedy = "repeat the earlier run, choose a new folder with --out, or --overwrite";
+            return Err(RunError::Output(fault.remedy(format!("it differs; {remedy}"))));
+        }
+        claim.finished = ["finished", "shard"].contains(&&old.state[..]).then_some(old);
+        claim.marker.tidy(out).map_err(RunError::Output)?;
+        Ok(claim)
     }
-}
 
-impl Claim {
+    /// Writes the marker.
+    fn mark(self) -> Result<Self, RunError> {
+        let written = self.marker.write(&self.folder);
+        written.map_err(|error| RunError::unwritable(&self.folder.join(MARKER), error)).map(|()| self)
+    }
+
     /// Keeps the existing run if its results are those that `manifest` describes; otherwise makes room.
-    fn keep(mut self, manifest: &Manifest) -> Result<Self, RunError> {
+    fn keep(mut self, manifest: &Manifest, marker: &Marker) -> Result<Self, RunError> {
         let old = Manifest::read(&self.folder).map_err(RunError::Output)?;
         if old.timed != manifest.timed {
             // Durations cannot be reproduced.
@@ -104,14 +133,25 @@ impl Claim {
         } else if old.state == "finished" || old.shard.is_some() || manifest.differs(&old).is_some() {
             // Only the program that began an unfinished run resumes it.
             self.outdated = Some(old.outdated(manifest));
-            clear(&self.folder)?;
+            self.clear(marker)?;
+            return self.mark();
         }
+        self.marker.tidy(&self.folder).map_err(RunError::Output)?;
         Ok(self)
+    }
+
+    /// Removes the files that the marker of the existing run lists. Any other file is a fault.
+    fn clear(&self, old: &Marker) -> Result<(), RunError> {
+        if let Some(stranger) = old.stranger(&self.folder).map_err(RunError::Output)? {
+            let fault = Fault::new("the output folder holds a file that is not part of a run", &stranger);
+            return Err(RunError::Output(fault.remedy("move it away, or choose a new folder with --out")));
+        }
+        old.clear(&self.folder, "").map_err(RunError::Output)
     }
 
     /// Checks that the folder is still the claimed one: another process may have replaced it under the same name.
     pub(super) fn holds(&self) -> Result<(), RunError> {
-        if is_at(&self.lock.file, &self.lock.path) {
+        if self.lock.as_ref().is_none_or(Lock::holds) {
             return Ok(());
         }
         let fault = Fault::new("the output folder was removed or replaced while the run was made", &self.folder);
@@ -121,17 +161,26 @@ impl Claim {
     }
 }
 
-/// Whether the folder is absent or empty, apart from the lock of a run killed before it began.
-fn free(out: &Path) -> Result<bool, Fault> {
-    let entries = match fs::read_dir(out) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),
-        Err(error) => return Err(unmade(out, &error)),
-        Ok(entries) => entries,
+/// The marker of a run: all files that it may write.
+pub(super) fn marker(manifest: &Manifest) -> Marker {
+    let fixed = [manifest::NAME, "results.csv", "results.parquet"].map(str::to_owned);
+    let trials = || {
+        manifest.trials.iter().flat_map(|trial| [trial.log.clone(), store::pose_graph(&trial.name)]).collect::<Vec<_>>()
     };
-    let mut names = entries.flatten().map(|entry| entry.file_name());
-    let unbegun =
-        |name: std::ffi::OsString| name == LOCK || name.to_string_lossy() == format!("{}.partial", manifest::NAME);
-    Ok(names.all(unbegun))
+    let pieces = store::FIXED.map(str::to_owned).into_iter().chain(trials());
+    let pieces = pieces.map(|name| format!("{}/*/{name}", store::FOLDER)).collect::<Vec<_>>();
+    Marker::new(KIND, &manifest.identity, fixed.into_iter().chain(trials()).chain(pieces)).with_folder("report")
+}
+
+/// The fault of a folder without a marker.
+fn foreign(out: &Path, name: &str) -> Fault {
+    let fault = Fault::new("the output folder is not empty", out);
+    if manifest::is_run(out) {
+        let remedy =
+            format!("without `{MARKER}` it is not changed: choose a new one with --out, or remove it yourself");
+        return fault.value("a run of an earlier version").remedy(remedy);
+    }
+    fault.value(format!("it holds `{name}`, which is not part of a run")).remedy("choose a new one with --out")
 }
 
 fn taken(out: &Path) -> Fault {
@@ -143,97 +192,12 @@ fn taken(out: &Path) -> Fault {
     }
 }
 
-fn unmade(path: &Path, error: &std::io::Error) -> Fault {
+pub(super) fn unmade(path: &Path, error: &std::io::Error) -> Fault {
     let fault = Fault::new(format!("cannot create the output folder ({error})"), path);
     if path.is_file() {
         return fault.remedy("a file has this name; give a new folder with --out");
     }
     fault.remedy("check free space and permissions, or choose another with --out")
-}
-
-/// Locks a folder, or reports the process that holds the lock.
-fn lock(folder: &Path) -> Result<Lock, Fault> {
-    let path = folder.join(LOCK);
-    let failed = |error: &std::io::Error| unmade(&path, error);
-    let mut file = OpenOptions::new()
-        .create(true)
-        .read(true)
-        .write(true)
-        .truncate(false)
-        .open(&path)
-        .map_err(|error| failed(&error))?;
-    match file.try_lock() {
-        Ok(()) => {}
-        Err(TryLockError::WouldBlock) => {
-            let mut holder = String::new();
-            let _ = file.read_to_string(&mut holder);
-            let fault = Fault::new("another run writes into the output folder", folder).value(holder.trim());
-            return Err(fault.remedy("wait for its end, or choose another folder with --out"));
-        }
-        Err(TryLockError::Error(error)) => return Err(failed(&error)),
-    }
-    // A run that just ended may have removed the file between opening and locking; such a lock is void.
-    if !is_at(&file, &path) {
-        return lock(folder);
-    }
-    let text = format!("process {} on {}\n", std::process::id(), host());
-    let write = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(text.as_bytes()));
-    write.map_err(|error| failed(&error))?;
-    Ok(Lock { path, file })
-}
-
-/// Whether an open file is still the one with this name.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let same = |a: &fs::Metadata, b: &fs::Metadata| (a.dev(), a.ino()) == (b.dev(), b.ino());
-    file.metadata().is_ok_and(|open| fs::metadata(path).is_ok_and(|named| same(&open, &named)))
-}
-
-/// Other systems do not rename or remove an open file.
-#[cfg(not(unix))]
-fn is_at(_file: &File, path: &Path) -> bool {
-    path.exists()
-}
-
-/// The name of the machine, if there is one.
-fn host() -> String {
-    let name = fs::read_to_string("/proc/sys/kernel/hostname").ok();
-    let name = name.or_else(|| std::env::var("HOSTNAME").or_else(|_| std::env::var("COMPUTERNAME")).ok());
-    name.map(|name| name.trim().to_owned())
-        .filter(|name| !name.is_empty())
-        .unwrap_or_else(|| "a nameless host".to_owned())
-}
-
-/// Removes the run in a folder. An unknown file in it is a fault.
-fn clear(out: &Path) -> Result<(), RunError> {
-    let failed = |path: &Path, error: std::io::Error| RunError::unwritable(path, error);
-    let names: Vec<String> = fs::read_dir(out)
-        .map_err(|error| failed(out, error))?
-        .flatten()
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .collect();
-    let own = |name: &str| {
-        let name = name.trim_end_matches(".partial");
-        [LOCK, manifest::NAME, "results.csv", "results.parquet", "pieces", "report"].contains(&name)
-            || [".mcap", store::POSE_GRAPH].iter().any(|end| name.ends_with(end))
-    };
-    if let Some(foreign) = names.iter().find(|name| !own(name)) {
-        let fault = Fault::new("the output folder holds a file that is not part of a run", &out.join(foreign));
-        return Err(RunError::Output(fault.remedy("move it away, or choose a new folder with --out")));
-    }
-    Store::of(out).remove()?;
-    // The manifest is removed last, so that an interruption leaves a recognisable run.
-    let rest = names.iter().filter(|name| *name != LOCK && *name != manifest::NAME && *name != "pieces");
-    for name in rest.map(String::as_str).chain([manifest::NAME]) {
-        let path = out.join(name);
-        let removed = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-        match removed {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(failed(&path, error)),
-            _ => {}
-        }
-    }
-    Ok(())
 }
 
 /// Creates a new folder below `runs`.

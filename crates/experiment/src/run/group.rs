@@ -7,12 +7,13 @@ use seafix::{
     FrameData, FrameResult, Keyframes, NavigationSession, NavigationStack, NavigationState, OdometryResult,
     SensorFrame, TrialOdometry, View,
 };
-use seafix_component::Fault;
+use seafix_component::{Fault, decoded, undecodable};
 use seafix_data::source::{Sequence, own_site};
 use seafix_log::{FrameRecord, SharedStages, TrialHeader};
 use seafix_navigation::PoseGraph;
 use seafix_referencing::{ObjectObservations, Site, Target, TargetKind};
 use seafix_simulation::{Purpose, Stream};
+use seafix_vision::Regions;
 
 use crate::{
     experiment::{Plan, Trial},
@@ -97,7 +98,8 @@ pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunErr
             group.trials.push(trial);
             continue;
         }
-        match trial.source.open(trial.resolved.seed, &plan.folder) {
+        let open = || trial.source.open(trial.resolved.seed, &plan.folder);
+        match decoded(open, |message| vec![undecodable(Path::new(&trial.resolved.source.name), message)]) {
             Ok(sequence) => match frame_bytes(&*sequence, trial.resolved.log.images) {
                 Ok(frame_bytes) => {
                     let (targets, pose_graphs, headers) = (Vec::new(), Vec::new(), Vec::new());
@@ -201,7 +203,8 @@ impl Group<'_> {
     /// processed the frames before.
     pub(super) fn observe(&self, index: usize, sessions: &mut Sessions<'_>) -> Result<GroupFrame, Fault> {
         let (sequence, number) = (&*self.sequence, self.sequence.number(index));
-        let sensor_frame = sequence.sensor_frame(index)?;
+        let undecodable = |message| undecodable(Path::new(sequence.name()), message);
+        let sensor_frame = decoded(|| sequence.sensor_frame(index), undecodable)?;
         let own = own_site(&sensor_frame).map(|site| {
             let targets = site.targets(TargetKind::Object).expect("targets of single objects need no world");
             (site, targets)
@@ -213,17 +216,19 @@ impl Group<'_> {
             let trial = self.trials[which];
             let mut stream = Stream::new(trial.resolved.seed, 0, number, Purpose::Search);
             let targets = searched(&own, &self.targets[which]);
-            let cloud =
-                || shared.cloud(&self.sharing, which, || trial.stages.cloud(&sensor_frame.frame_data, sequence.rig()));
+            let cloud = |regions: &[Regions; 2]| {
+                let make = || trial.stages.cloud(&sensor_frame.frame_data, sequence.rig(), targets, regions);
+                shared.cloud(&self.sharing, which, make)
+            };
             match (session, &moved[self.sharing.odometry_of(which)]) {
                 (Some(session), Some(moved)) => {
                     session.advance(&sensor_frame, moved, cloud, stream.rng()).map(|(seen, known)| (seen, Some(known)))
                 }
                 _ => {
-                    let (view, priors) = (
-                        View { sensor_frame: &sensor_frame, cloud: cloud(), targets, rig: sequence.rig() },
-                        sensor_frame.prior_pose(targets),
-                    );
+                    let priors = sensor_frame.prior_pose(targets);
+                    let regions = trial.stages.regions(targets, &[&priors], sequence.rig());
+                    let cloud = cloud(&regions);
+                    let view = View { sensor_frame: &sensor_frame, cloud, targets, rig: sequence.rig() };
                     let seek = || trial.stages.seek_all(view, &priors, stream.rng());
                     let sought = shared.sought(&self.sharing, which, seek);
                     Ok((trial.stages.fix_from(view, &priors, sought, stream.rng()), None))

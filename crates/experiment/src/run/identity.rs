@@ -4,17 +4,17 @@
 //! the versions of all components in use, and the versions of the shared code. It covers neither commit nor machine:
 //! two runs with the same identity have the same results.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    sync::LazyLock,
-};
+use std::collections::{BTreeMap, BTreeSet};
 
 use hmac_sha256::Hash as Sha256;
 use seafix_component::{Listing, Registry};
 use seafix_log::TrialHeader;
 use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
 use seafix_referencing::{SEARCHES, SOLVERS};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS,
+    TRIANGULATORS,
+};
 use serde::{Deserialize, Serialize};
 
 use seafix_data::{dataset::hex, source::SOURCES};
@@ -29,12 +29,12 @@ use crate::{
 pub const SHARED: [SharedPart; 8] = [
     // Cameras, rigs, distortion, transforms and covariances.
     SharedPart { name: "geometry", version: 1, used: |_| true },
-    // Candidates, gates, tolerance, acceptance tests, integrity and joint fixes.
-    SharedPart { name: "acceptance", version: 1, used: |_| true },
+    // Points in view, candidates, gates, tolerance, acceptance tests, integrity and joint fixes.
+    SharedPart { name: "acceptance", version: 2, used: |_| true },
     // Errors, rates and bounds; the comparison with truth.
     SharedPart { name: "evaluation", version: 1, used: |_| true },
     // The logged quantities and the choice of logged frames.
-    SharedPart { name: "log", version: 2, used: |_| true },
+    SharedPart { name: "log", version: 3, used: |_| true },
     // The order of the stages on a stereo pair.
     SharedPart { name: "front-end", version: 1, used: |used| used.images },
     // The navigator, the pose graph and key frames.
@@ -77,6 +77,8 @@ pub fn components() -> Vec<Vec<Listing>> {
         of(&MATCHERS),
         of(&REFINEMENTS),
         of(&TRIANGULATORS),
+        of(&SEGMENT_DETECTORS),
+        of(&SEGMENT_MATCHERS),
         of(&SEARCHES),
         of(&SOLVERS),
         of(&ODOMETRIES),
@@ -84,8 +86,6 @@ pub fn components() -> Vec<Vec<Listing>> {
         of(&FUSIONS),
     ]
 }
-
-static ALL: LazyLock<Vec<Listing>> = LazyLock::new(|| components().concat());
 
 /// The inputs of one source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -102,6 +102,8 @@ pub(crate) type Versions = BTreeMap<String, u32>;
 
 /// The versions of everything that the trials of a plan use.
 pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
+    // A program may have added components since the last run.
+    let all = components().concat();
     let mut versions = Versions::new();
     for (group, input) in groups.iter().zip(inputs) {
         for trial in &group.trials {
@@ -112,23 +114,32 @@ pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
                 // A recording has input files, a simulation has none.
                 simulated: input.files.is_empty(),
             };
-            versions.extend(of_trial(trial, &used));
+            versions.extend(of_trial(trial, &used, &all));
         }
     }
     versions
 }
 
-fn of_trial(trial: &Trial, used: &Used) -> Versions {
+fn of_trial(trial: &Trial, used: &Used, all: &[Listing]) -> Versions {
     /// The stages between images and a cloud.
-    const FRONT_END: [&str; 7] =
-        ["filters", "detector", "locator", "descriptor", "matcher", "refinement", "triangulator"];
+    const FRONT_END: [&str; 9] = [
+        "filters",
+        "detector",
+        "locator",
+        "descriptor",
+        "matcher",
+        "refinement",
+        "triangulator",
+        "segment-detector",
+        "segment-matcher",
+    ];
     let mut settings =
         toml::Table::try_from(&trial.resolved).expect("a resolved experiment is a table of plain values");
     if let Some(pipeline) = settings.get_mut("pipeline").and_then(toml::Value::as_table_mut) {
         let idle = |stage: &str| !used.images && FRONT_END.contains(&stage) || used.labelled && stage == "search";
         pipeline.retain(|stage, _| !idle(stage));
     }
-    let mut found = Found::default();
+    let mut found = Found { all, versions: Versions::new(), defaults: BTreeSet::new() };
     settings.iter().for_each(|(key, value)| found.visit(key, value));
     let shared = SHARED.iter().filter(|shared| (shared.used)(used));
     found.versions.extend(shared.map(|shared| (format!("shared {}", shared.name), shared.version)));
@@ -140,14 +151,14 @@ fn of_trial(trial: &Trial, used: &Used) -> Versions {
 /// A setting chooses a component by its bare name, or by `name` in a table. If the setting's key does not determine the
 /// kind, a name that several kinds have counts for all of them: an unnecessary repetition of a run does less harm than
 /// a stale result.
-#[derive(Default)]
-struct Found {
+struct Found<'a> {
+    all: &'a [Listing],
     versions: Versions,
     /// The components whose defaults have been searched.
     defaults: BTreeSet<(&'static str, &'static str)>,
 }
 
-impl Found {
+impl Found<'_> {
     fn visit(&mut self, key: &str, value: &toml::Value) {
         match value {
             toml::Value::String(name) => self.component(key, name, &toml::Table::new()),
@@ -163,15 +174,16 @@ impl Found {
 
     /// Adds the components of this name, and those among the defaults that `settings` do not override.
     fn component(&mut self, key: &str, name: &str, settings: &toml::Table) {
+        let all = self.all;
         let reported = match key {
             "filters" => Some("filter"),
-            key => ALL.iter().map(|listing| listing.kind).find(|kind| *kind == key),
+            key => all.iter().map(|listing| listing.kind).find(|kind| *kind == key),
         };
         for listing in
-            ALL.iter().filter(|listing| listing.name == name && reported.is_none_or(|kind| kind == listing.kind))
+            all.iter().filter(|listing| listing.name == name && reported.is_none_or(|kind| kind == listing.kind))
         {
             self.versions.insert(format!("{} {name}", listing.kind), listing.version);
-            let mut left = listing.defaults.iter().filter(|(key, _)| !settings.contains_key(*key)).peekable();
+            let mut left = listing.table.defaults.iter().filter(|(key, _)| !settings.contains_key(*key)).peekable();
             if left.peek().is_some() && self.defaults.insert((listing.kind, listing.name)) {
                 left.for_each(|(key, value)| self.visit(key, value));
             }
@@ -269,7 +281,8 @@ mod tests {
             assert!(owned.contains_key(part), "no {part} in {owned:?}");
         }
         // A component chosen by its bare name includes the components of its defaults.
-        let mut found = Found::default();
+        let all = components().concat();
+        let mut found = Found { all: &all, versions: Versions::new(), defaults: BTreeSet::new() };
         found.visit("odometry", &toml::Value::from("stereo"));
         assert!(found.versions.contains_key("solver p3p-stereo"), "{:?}", found.versions);
     }

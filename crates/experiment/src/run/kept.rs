@@ -6,14 +6,14 @@ use std::{
     path::Path,
 };
 
-use seafix_component::Fault;
-use seafix_log::{FrameRecord, Reader};
+use seafix_component::{Fault, Marker};
+use seafix_log::{FrameRecord, Reader, unchanged};
 
 use crate::{
     experiment::Plan,
     results::TrialRows,
     run::{
-        group,
+        folder as run_folder, group,
         manifest::{self, Manifest},
         observer::Observer,
         options::Options,
@@ -58,15 +58,18 @@ pub fn remake(
     let chosen = u64::from_str_radix(&kept.identity[..16], 16).unwrap_or(0) % pieces.len() as u64;
     let piece = pieces[chosen as usize].shortened(frames);
     let group = &groups[piece.group];
-    let scratch = Scratch::new(options.out.as_deref().unwrap_or(folder))?;
+    let marker = run_folder::marker(&manifest);
+    let scratch = Scratch::new(options.out.as_deref().unwrap_or(folder), &marker)?;
     observer.begins(piece.frames() * group.trials.len(), partition::bytes(&groups, &[&piece]), scratch.0);
-    let store = Store::open(scratch.0)?;
+    let store = Store::open(scratch.0, marker.clone())?;
     if !worker::work(&groups, &[&piece], &store, &options.pool()?, false, observer)? {
         return Err(RunError::Interrupted(folder.to_owned()));
     }
     let lost = || RunError::Output(Fault::new("a piece that was not stored correctly", scratch.0));
     let sealed = store.sound(piece.number).ok_or_else(lost)?;
     let results = folder.join("results.csv");
+    let changed = |path: &Path| unchanged(path).map_err(|error| input(Fault::new(error.to_string(), path)));
+    changed(&results)?;
     let table =
         fs::read_to_string(&results).map_err(|error| input(Fault::new(format!("cannot read ({error})"), &results)))?;
     let mut differing = Vec::new();
@@ -75,6 +78,7 @@ pub fn remake(
         if !table.contains(&rows(&sealed, name).map_err(|error| RunError::unwritable(scratch.0, error))?) {
             differing.push(format!("{name}: rows of {}", message(group, &piece)));
         }
+        changed(&folder.join(format!("{name}.mcap")))?;
         let (made, log) = (Reader::open(&sealed.log(name))?, Reader::open(&folder.join(format!("{name}.mcap")))?);
         if !in_log(made, log)? {
             differing.push(format!("{name}: logged frames among {}", message(group, &piece)));
@@ -83,19 +87,19 @@ pub fn remake(
     Ok(Remade { frames: piece.frames() * group.trials.len(), differing })
 }
 
-/// A temporary folder, removed with its content when dropped.
-struct Scratch<'a>(&'a Path);
+/// A temporary folder, removed with the listed files when dropped.
+struct Scratch<'a>(&'a Path, &'a Marker);
 
 impl<'a> Scratch<'a> {
     /// An existing folder belongs to someone else and is rejected.
-    fn new(path: &'a Path) -> Result<Self, RunError> {
-        fs::create_dir(path).map(|()| Self(path)).map_err(|error| RunError::unwritable(path, error))
+    fn new(path: &'a Path, marker: &'a Marker) -> Result<Self, RunError> {
+        fs::create_dir(path).map(|()| Self(path, marker)).map_err(|error| RunError::unwritable(path, error))
     }
 }
 
 impl Drop for Scratch<'_> {
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(self.0);
+        let _ = self.1.remove(self.0);
     }
 }
 

@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use seafix_component::{Fault, read_text};
+use seafix_component::{Fault, PartialFile, is_plain_name, read_text};
 use serde::{Deserialize, Serialize};
 
 use seafix_data::dataset::sha256;
@@ -146,6 +146,15 @@ impl Manifest {
         if !manifest.format.starts_with("seafix-manifest/2") {
             return Err(Fault::new("not a manifest of this version", &file).value(manifest.format).remedy(FORMAT));
         }
+        // Manifests come from others, too, and names become paths.
+        let logs = manifest.trials.iter().find(|trial| trial.log != format!("{}.mcap", trial.name)).map(|one| &one.log);
+        let names = manifest.trials.iter().map(|trial| &trial.name).chain(manifest.outputs.keys());
+        if let Some(name) =
+            logs.or_else(|| names.into_iter().find(|name| !is_plain_name(name) || name.starts_with('.')))
+        {
+            let fault = Fault::new("a manifest with a name that is no file name in its folder", &file);
+            return Err(fault.value(format!("`{name}`")).remedy("make the run again"));
+        }
         Ok(manifest)
     }
 
@@ -153,14 +162,11 @@ impl Manifest {
     pub(crate) fn write(&mut self, folder: &Path, state: &str) -> Result<(), RunError> {
         state.clone_into(&mut self.state);
         let text = serde_json::to_string_pretty(self).expect("a manifest has plain values") + "\n";
-        let (file, partial) = (folder.join(NAME), folder.join(format!("{NAME}.partial")));
-        let write = || {
-            let mut file = std::fs::File::create(&partial)?;
-            file.write_all(text.as_bytes())?;
-            file.sync_all()
-        };
-        write().map_err(|error| RunError::unwritable(&partial, error))?;
-        std::fs::rename(&partial, &file).map_err(|error| RunError::unwritable(&file, error))
+        let file = folder.join(NAME);
+        let (partial, mut open) = PartialFile::create(&file).map_err(|error| RunError::unwritable(&file, error))?;
+        let written = open.write_all(text.as_bytes()).and_then(|()| open.sync_all());
+        written.map_err(|error| RunError::unwritable(partial.unfinished(), error))?;
+        partial.finish().map_err(|error| RunError::unwritable(&file, error))
     }
 
     /// The faults of output files that differ from the manifest.

@@ -6,7 +6,7 @@ use seafix_component::Fault;
 
 use crate::run::{
     assemble,
-    folder::Claim,
+    folder::{self, Claim},
     manifest::{self, Manifest},
     observer::Observer,
     options::Options,
@@ -21,6 +21,8 @@ use crate::run::{
 /// [`RunError`]: folders without shards, shards of different runs, missing or damaged pieces, or an output that cannot
 /// be written.
 pub fn merge(folders: &[PathBuf], options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
+    folder::inspect(options).map_err(RunError::Output)?;
+    folder::input_inside(options, folders.iter().cloned()).map_err(RunError::Output)?;
     let (mut manifest, pieces) = gather(folders).map_err(|fault| RunError::Input(vec![fault]))?;
     manifest.shard = None;
     let name = folders

@@ -12,10 +12,13 @@ mod estimate;
 mod folder;
 mod group;
 mod identity;
+mod inputs;
 mod kept;
+mod lock;
 pub(crate) mod manifest;
 mod merge;
 mod observer;
+mod open_inputs;
 mod options;
 mod outcome;
 mod partition;
@@ -29,6 +32,7 @@ pub use kept::{Remade, remake};
 pub use manifest::{changed_outputs, check_run, is_run, kept_identity};
 pub use merge::merge;
 pub use observer::{Observer, Silent};
+pub use open_inputs::inputs;
 pub use options::{Existing, Options, Shard};
 pub use outcome::{Finished, RunError};
 
@@ -49,6 +53,7 @@ use store::Store;
 /// interruption.
 pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Finished, RunError> {
     folder::inspect(options).map_err(RunError::Output)?;
+    folder::input_inside(options, plan.inputs()).map_err(RunError::Output)?;
     let groups = group::open(plan, options.separate)?;
     groups.iter().flat_map(|group| group.sequence.warnings()).for_each(|warning| observer.warns(warning));
     let pieces = partition::cut(&groups);
@@ -67,14 +72,14 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
     let full = || mine.iter().all(|piece| Store::of(&claim.folder).sound(piece.number).is_some());
     if let Some(finished) = claim.finished.as_ref().filter(|_| options.shard.is_none() || full()) {
         if options.shard.is_none() {
-            Store::of(&claim.folder).remove()?;
+            Store::of(&claim.folder).remove(&claim.marker)?;
         }
         return Ok(Finished { rows: finished.rows, folder: claim.folder, kept: true });
     }
     observer.begins(frames(&mine), partition::bytes(&groups, &mine), &claim.folder);
     // The manifest is written first: a folder without it holds no run.
     manifest.write(&claim.folder, "running")?;
-    let store = Store::open(&claim.folder)?;
+    let store = Store::open(&claim.folder, claim.marker.clone())?;
     let (made, missing): (Vec<&Piece>, Vec<&Piece>) =
         mine.into_iter().partition(|piece| store.sound(piece.number).is_some());
     if !made.is_empty() {
@@ -97,6 +102,6 @@ pub fn run(plan: &Plan, options: &Options, observer: &dyn Observer) -> Result<Fi
         return Err(RunError::Interrupted(claim.folder));
     }
     manifest.write(&claim.folder, "finished")?;
-    store.remove()?;
+    store.remove(&claim.marker)?;
     Ok(Finished { folder: claim.folder, rows: manifest.rows, kept: false })
 }

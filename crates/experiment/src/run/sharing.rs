@@ -52,13 +52,23 @@ impl Sharing {
     }
 }
 
+/// A guided front end depends on the priors of the targets as well. They are those of the frame without navigation;
+/// with it they are the trial's own.
 fn same_front_end(a: &Trial, b: &Trial) -> bool {
+    let target = |trial: &Trial| trial.resolved.pipeline.target;
+    let alone = |trial: &Trial| trial.navigation_stack.is_none();
+    let same_priors = !a.stages.is_guided() || alone(a) && alone(b) && target(a) == target(b);
     let stages = |trial: &Trial| {
         let Pipeline { filters, detector, locator, descriptor, matcher, refinement, triangulator, .. } =
             trial.resolved.pipeline.clone();
         (filters, detector, locator, descriptor, matcher, refinement, triangulator)
     };
-    stages(a) == stages(b)
+    let lines = |trial: &Trial| {
+        let Pipeline { edges, segment_detector, segment_fit, segment_matcher, lines, .. } =
+            trial.resolved.pipeline.clone();
+        (edges, segment_detector, segment_fit, segment_matcher, lines)
+    };
+    same_priors && stages(a) == stages(b) && lines(a) == lines(b)
 }
 
 /// Searches are shared only without navigation, because they then start from the same priors. With expanding gates the

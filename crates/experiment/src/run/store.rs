@@ -11,6 +11,7 @@ use std::{
 };
 
 use rayon::prelude::*;
+use seafix_component::{Marker, create_real_folder};
 use seafix_log::Writer;
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +27,9 @@ const FORMAT: &str = "seafix-piece/1";
 #[derive(Debug, Clone)]
 pub(super) struct Store {
     folder: PathBuf,
+    /// The folder of the run, and its marker if pieces are written.
+    run: PathBuf,
+    marker: Option<Marker>,
 }
 
 /// The description of a complete piece.
@@ -93,21 +97,27 @@ pub(super) fn pose_graph(trial: &str) -> String {
     format!("{trial}{POSE_GRAPH}")
 }
 
+/// The folder of the pieces in that of the run.
+pub(super) const FOLDER: &str = "pieces";
+
 const CSV: &str = "rows.csv";
 const PARQUET: &str = "rows.parquet";
 const SEAL: &str = "seal.json";
 
+/// The files of a piece that do not depend on trials.
+pub(super) const FIXED: [&str; 3] = [CSV, PARQUET, SEAL];
+
 impl Store {
     /// Opens the pieces below the folder of a run, and creates their folder.
-    pub(super) fn open(run: &Path) -> Result<Self, RunError> {
-        let store = Self::of(run);
-        fs::create_dir_all(&store.folder).map_err(|error| RunError::unwritable(&store.folder, error))?;
+    pub(super) fn open(run: &Path, marker: Marker) -> Result<Self, RunError> {
+        let store = Self { marker: Some(marker), ..Self::of(run) };
+        create_real_folder(&store.folder).map_err(|error| RunError::unwritable(&store.folder, error))?;
         Ok(store)
     }
 
     /// The pieces of a run that is only read.
     pub(super) fn of(run: &Path) -> Self {
-        Self { folder: run.join("pieces") }
+        Self { folder: run.join(FOLDER), run: run.to_owned(), marker: None }
     }
 
     fn at(&self, number: usize) -> PathBuf {
@@ -149,14 +159,9 @@ impl Store {
             .collect()
     }
 
-    /// Removes all pieces.
-    pub(super) fn remove(&self) -> Result<(), RunError> {
-        match fs::remove_dir_all(&self.folder) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(RunError::unwritable(&self.folder, error))
-            }
-            _ => Ok(()),
-        }
+    /// Removes the files of all pieces that `marker` lists.
+    pub(super) fn remove(&self, marker: &Marker) -> Result<(), RunError> {
+        marker.clear(&self.run, FOLDER).map_err(RunError::Output)
     }
 }
 
@@ -171,8 +176,12 @@ pub(super) struct Output {
 }
 
 /// A piece in progress.
+///
+/// A piece that fails is removed on drop; one that is stopped stays for `seafix recover`.
 pub(super) struct Draft {
     number: usize,
+    store: Store,
+    done: bool,
     partial: PathBuf,
     folder: PathBuf,
 }
@@ -183,12 +192,14 @@ impl Draft {
         let folder = store.at(number);
         let partial = folder.with_extension("partial");
         for old in [&folder, &partial] {
-            if old.exists() {
-                fs::remove_dir_all(old).map_err(|error| RunError::unwritable(old, error))?;
+            if let (Some(marker), Some(name)) = (&store.marker, old.file_name().filter(|_| old.exists())) {
+                let part = format!("{FOLDER}/{}", name.to_string_lossy());
+                marker.clear(&store.run, &part).map_err(RunError::Output)?;
             }
         }
+        // Files that are not ours stay, and the name is then taken.
         fs::create_dir(&partial).map_err(|error| RunError::unwritable(&partial, error))?;
-        Ok(Self { number, partial, folder })
+        Ok(Self { number, store: store.clone(), partial, folder, done: false })
     }
 
     /// The path of a trial's log.
@@ -197,16 +208,17 @@ impl Draft {
     }
 
     /// Closes the logs of a stopped piece: they can be read, but the piece is incomplete.
-    pub(super) fn abandon(self, outputs: Vec<Output>) -> Result<(), RunError> {
+    pub(super) fn abandon(mut self, outputs: Vec<Output>) -> Result<(), RunError> {
         for Output { mut log, thinned, .. } in outputs {
             log.totals(&thinned.totals)?;
             log.finish()?;
         }
+        self.done = true;
         Ok(())
     }
 
     /// Closes the logs of a complete piece, writes its rows, and renames its folder.
-    pub(super) fn seal(self, first: usize, end: usize, outputs: Vec<Output>) -> Result<(), RunError> {
+    pub(super) fn seal(mut self, first: usize, end: usize, outputs: Vec<Output>) -> Result<(), RunError> {
         let at = |name: &str| self.partial.join(name);
         let mut files: Vec<String> = vec![CSV.to_owned(), PARQUET.to_owned()];
         let (mut trials, mut length, mut groups) = (Vec::new(), 0, 0);
@@ -236,7 +248,17 @@ impl Draft {
         let seal = Seal { format: FORMAT.to_owned(), piece: self.number, first, end, trials, files };
         let text = serde_json::to_string(&seal).expect("a seal has plain values") + "\n";
         fs::write(at(SEAL), text).map_err(|error| RunError::unwritable(&at(SEAL), error))?;
-        fs::rename(&self.partial, &self.folder).map_err(|error| RunError::unwritable(&self.folder, error))
+        fs::rename(&self.partial, &self.folder).map_err(|error| RunError::unwritable(&self.folder, error))?;
+        self.done = true;
+        Ok(())
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if let (false, Some(marker), Some(name)) = (self.done, &self.store.marker, self.partial.file_name()) {
+            let _ = marker.clear(&self.store.run, &format!("{FOLDER}/{}", name.to_string_lossy()));
+        }
     }
 }
 

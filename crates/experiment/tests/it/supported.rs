@@ -138,7 +138,14 @@ fn the_log_and_the_table_hold_the_numbers_of_the_fix() {
         let pairs: Vec<Correspondence> = (0..9).map(|k| Correspondence { model: k, cloud: k }).collect();
         let candidates = Candidates::from_pairs(9, (0..9).map(|k| (k, k)));
         let (tolerance, prior) = (Tolerance::Sigmas(3.0), None);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior,
+            edges: Default::default(),
+        };
         let attempt = judge_labelled(&problem, pairs, &StereoReprojection::default(), &acceptance, Some(&rig));
         let Answer::Fix(fix) = attempt.outcome else { panic!("{:?}", attempt.outcome) };
         let (message, it) = (&fix.integrity, target.integrity.as_ref().unwrap());

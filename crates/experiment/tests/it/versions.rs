@@ -24,7 +24,8 @@ use seafix_referencing::{
 };
 use seafix_simulation::{Purpose, Stream};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, Descriptors, FILTERS, Image, Keypoint, LOCATORS, MATCHERS, Pair, REFINEMENTS,
+    DESCRIPTORS, DETECTORS, Descriptors, FILTERS, FitScratch, FittedSegment, Image, Keypoint, LOCATORS, LineRules,
+    MATCHERS, Pair, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, SegmentMatch, SegmentView,
     TRIANGULATORS, Threads, UncertainPixel, View,
 };
 
@@ -54,7 +55,7 @@ fn rests_on(part: &str) -> &'static [&'static str] {
             "shared acceptance" => &["shared geometry", "search", "solver"],
             // The fingerprint of these two is that of a table.
             "shared simulation" => &["shared geometry", "shared log"],
-            "shared renderer" => &["shared geometry", "shared simulation", "shared log"],
+            "shared renderer" => &["shared geometry", "shared simulation", "shared log", "search", "shared acceptance"],
             // These parts are tested in a complete run.
             _ => &[""],
         },
@@ -201,6 +202,26 @@ fn fingerprints() -> BTreeMap<String, Line> {
         let mut cloud = Vec::new();
         triangulator.triangulate_into(&seen, &world.rig, &mut cloud);
         fingerprint(&(cloud, seen.iter().map(|seen| triangulator.point(&world.rig, seen)).collect::<Vec<_>>()))
+    });
+    each(&SEGMENT_DETECTORS, &mut add, |detector| {
+        fingerprint(&[&world.views[0].0, &board].map(|image| detector.detect(image, world.rig.left())))
+    });
+    each(&SEGMENT_MATCHERS, &mut add, |matcher| {
+        let detector = SEGMENT_DETECTORS.build(&Choice::named("a-contrario")).unwrap();
+        let (fit, mut scratch) = (SegmentFit::default(), FitScratch::default());
+        let (left, right) = &world.views[0];
+        let mut fitted = |image: &Image, camera: &Pinhole| -> Vec<FittedSegment> {
+            let found = detector.detect(image, camera);
+            found.iter().filter_map(|segment| fit.fit(image, camera, segment, &mut scratch)).collect()
+        };
+        let segments = [fitted(left, world.rig.left()), fitted(right, world.rig.right())];
+        let (left, right) =
+            (SegmentView { image: left, segments: &segments[0] }, SegmentView { image: right, segments: &segments[1] });
+        let found = matcher.matches(&left, &right, &world.rig);
+        let line = |found: &SegmentMatch| {
+            LineRules::default().line(&world.rig, &segments[0][found.left], &segments[1][found.right])
+        };
+        fingerprint(&found.iter().map(|found| (found.left, found.right, line(found))).collect::<Vec<_>>())
     });
     each(&SEARCHES, &mut add, |search| {
         let mut stream = Stream::new(3, 0, 0, Purpose::Search);
@@ -505,6 +526,7 @@ impl World {
             candidates: all,
             tolerance: Tolerance::Sigmas(3.0),
             prior: Some(prior),
+            edges: Default::default(),
         }
     }
 

@@ -110,7 +110,7 @@ fn the_shortest_list_is_one_that_files_know() {
     assert_eq!(shortest(&[0.0, 0.0, 0.0, 0.0, 0.2]), 5);
     assert_eq!(shortest(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0]), 8);
     let camera = camera(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]);
-    assert_eq!(camera.distortion().coefficients(), &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]);
+    assert_eq!(camera.distortion().coefficients()[..8], [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]);
     assert_eq!(camera.distortion().shortest(), &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8]);
 }
 

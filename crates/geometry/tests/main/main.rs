@@ -4,6 +4,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its table has failed")]
 
+mod fisheye;
 mod lens;
 mod motion;
 mod rig;

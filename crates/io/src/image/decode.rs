@@ -1,4 +1,4 @@
-//! Decoding of PNG, JPEG and PNM files, recognised by their first bytes.
+//! Decoding of PNG, JPEG, TIFF and PNM files, recognised by their first bytes.
 
 use std::{io::Cursor, path::Path};
 
@@ -7,20 +7,11 @@ use seafix_component::Fault;
 use zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions};
 use zune_jpeg::JpegDecoder;
 
-use super::pnm;
-
-/// The samples of an image, as stored in its file.
-#[derive(Debug)]
-pub(super) struct Samples {
-    /// The samples row by row, with the channels of a pixel together.
-    pub(super) values: Vec<u16>,
-    /// The number of channels: 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
-    pub(super) channels: usize,
-    /// Whether a sample has 16 bits rather than 8.
-    pub(super) deep: bool,
-    /// The value of white, if the file states it.
-    pub(super) white: Option<u16>,
-}
+use super::{
+    pnm,
+    samples::{Samples, damaged},
+    tiff,
+};
 
 /// The width and height in the header of an image file.
 ///
@@ -40,6 +31,7 @@ pub(super) fn size(bytes: &[u8]) -> Result<[u32; 2], String> {
             let side = |side: usize| u32::try_from(side).map_err(|error| error.to_string());
             Ok([side(width)?, side(height)?])
         }
+        bytes if tiff::is_one(bytes) => tiff::size(bytes),
         [b'P', b'1'..=b'7', ..] => pnm::Header::read(bytes).map(|header| header.size),
         _ => Err("an unknown format".to_owned()),
     }
@@ -53,6 +45,7 @@ pub(super) fn samples(bytes: &[u8], path: &Path, limit: u64) -> Result<Samples, 
     let decoded = match bytes {
         [0x89, b'P', b'N', b'G', ..] => png_samples(bytes, limit),
         [0xFF, 0xD8, ..] => jpeg_samples(bytes, limit),
+        bytes if tiff::is_one(bytes) => tiff::samples(bytes, limit),
         _ => {
             let header = pnm::Header::read(bytes).map_err(|cause| damaged(path, cause))?;
             within(limit, header.count().saturating_mul(2)).map_err(|cause| damaged(path, cause))?;
@@ -60,12 +53,6 @@ pub(super) fn samples(bytes: &[u8], path: &Path, limit: u64) -> Result<Samples, 
         }
     };
     decoded.map_err(|cause| damaged(path, cause))
-}
-
-/// The fault of a file that is no image.
-pub(super) fn damaged(path: &Path, cause: String) -> Fault {
-    let remedy = "give PNG, JPEG or PNM, grey or colour, 8 or 16 bits";
-    Fault::new("an image that cannot be decoded", path).value(cause).remedy(remedy)
 }
 
 fn png_samples(bytes: &[u8], limit: u64) -> Result<Samples, String> {

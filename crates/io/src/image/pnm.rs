@@ -4,7 +4,7 @@ use std::path::Path;
 
 use seafix_component::Fault;
 
-use super::decode::{Samples, damaged};
+use super::samples::{Samples, damaged};
 
 /// The header of a Netpbm file.
 #[derive(Debug)]

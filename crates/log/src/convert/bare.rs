@@ -6,8 +6,11 @@
 
 use prost::bytes::Bytes;
 
-use super::{Malformed, frame_record};
-use crate::{FrameRecord, PixelPair, proto};
+use super::{fields::Malformed, frame::frame_record};
+use crate::{
+    proto,
+    record::{FrameRecord, PixelPair},
+};
 
 /// A [`proto::Frame`] without its prior.
 #[derive(Clone, PartialEq, prost::Message)]
@@ -70,7 +73,7 @@ pub(crate) fn bare_frame_record(message: BareFrame) -> Result<FrameRecord, Malfo
         navigation: message.navigation,
     })?;
     let unknown = [f64::NAN; 3];
-    let point = |pixels| crate::CloudPoint { at: unknown, covariance: [unknown; 3], pixels };
+    let point = |pixels| crate::record::CloudPoint { at: unknown, covariance: [unknown; 3], pixels };
     frame.cloud = seen.into_iter().map(point).collect();
     Ok(frame)
 }

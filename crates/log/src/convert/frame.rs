@@ -1,10 +1,13 @@
 //! A frame without its images, results and times, which are messages of their own.
 
 use super::{
-    Malformed, flat, matrix,
+    fields::{Malformed, flat, matrix},
     navigation::{navigation_message, navigation_record},
 };
-use crate::{CloudPoint, FrameRecord, PixelPair, PriorRecord, TruthRecord, VisiblePoint, proto};
+use crate::{
+    proto,
+    record::{CloudPoint, FrameRecord, PixelPair, PriorRecord, TruthRecord, VisiblePoint},
+};
 
 /// The message that closes `frame`.
 pub(crate) fn frame_message(frame: &FrameRecord) -> proto::Frame {

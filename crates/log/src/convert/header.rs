@@ -1,7 +1,10 @@
 //! The header of a trial.
 
-use super::{Malformed, flat, matrix, matrix_if_any, required};
-use crate::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader, proto};
+use super::fields::{Malformed, flat, matrix, matrix_if_any, required};
+use crate::{
+    proto,
+    record::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader},
+};
 
 /// The message that holds `header`.
 pub(crate) fn header_message(header: &TrialHeader) -> proto::TrialHeader {
@@ -63,7 +66,8 @@ fn component_message(component: Component) -> proto::Component {
 
 fn camera_message(camera: CameraRecord) -> proto::Camera {
     let [width, height] = camera.size;
-    proto::Camera { width, height, matrix: flat(&camera.matrix), distortion: camera.distortion }
+    let (matrix, equidistant) = (flat(&camera.matrix), camera.equidistant);
+    proto::Camera { width, height, matrix, distortion: camera.distortion, equidistant }
 }
 
 pub(super) fn target_message(target: TargetModel) -> proto::Target {
@@ -120,6 +124,7 @@ fn camera_record(message: proto::Camera) -> Result<CameraRecord, Malformed> {
         size: [message.width, message.height],
         matrix: matrix("camera.matrix", &message.matrix)?,
         distortion: message.distortion,
+        equidistant: message.equidistant,
     })
 }
 

@@ -1,11 +1,13 @@
 //! What a method was given.
 
 use super::{
-    Malformed, flat,
+    fields::{Malformed, flat, matrix, required},
     header::{target_message, target_record},
-    matrix, required,
 };
-use crate::{AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState, proto};
+use crate::{
+    proto,
+    record::{AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState},
+};
 
 /// The message that holds the inputs of `frame`.
 pub(crate) fn inputs_message(frame: &FrameRecord, inputs: &Inputs) -> proto::Inputs {

@@ -1,7 +1,10 @@
 //! The points of interest in view.
 
-use super::Malformed;
-use crate::{FrameRecord, PointOfInterest, proto};
+use super::fields::Malformed;
+use crate::{
+    proto,
+    record::{FrameRecord, PointOfInterest},
+};
 
 /// The message of the points of `frame`.
 pub(crate) fn inspection_message(frame: &FrameRecord) -> proto::Inspection {

@@ -1,7 +1,10 @@
 //! What a navigator knew.
 
-use super::{Malformed, flat, matrix, matrix_if_any};
-use crate::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, proto};
+use super::fields::{Malformed, flat, matrix, matrix_if_any};
+use crate::{
+    proto,
+    record::{NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep},
+};
 
 /// The message that holds `navigation`.
 pub(super) fn navigation_message(navigation: &NavigationRecord) -> proto::Navigation {

@@ -1,9 +1,12 @@
 //! What came of the attempts of a frame: results, candidates, evaluations, times.
 
-use super::{Malformed, flat, matrix, matrix_if_any};
+use super::fields::{Malformed, flat, matrix, matrix_if_any};
 use crate::{
-    Alternative, Evaluation, FrameRecord, FrameTimes, Integrity, Outcome, Pair, SharedStages, TargetRecord,
-    TargetTimes, proto,
+    proto,
+    record::{
+        Alternative, BestPose, Evaluation, FrameRecord, FrameTimes, Integrity, Outcome, Pair, SharedStages,
+        TargetRecord, TargetTimes,
+    },
 };
 
 /// The message that holds target `index` of `frame`, without candidates, evaluation and times.
@@ -35,6 +38,13 @@ pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::Refere
         pair_tests: target.pair_tests,
         residual_rms: target.residual_rms,
         integrity: target.integrity.as_ref().map(integrity_message),
+        p_absent: target.p_absent,
+        p_wrong: target.p_wrong,
+        best: target.best.as_ref().map(|best| proto::BestPose {
+            object_from_camera: flat(&best.object_from_camera),
+            covariance: best.covariance.as_ref().map(flat).unwrap_or_default(),
+            pairs: pair_messages(&best.pairs),
+        }),
     }
 }
 
@@ -76,6 +86,13 @@ pub(crate) fn result_record(
             score: other.score,
         })
     };
+    let best = |best: proto::BestPose| {
+        Ok(BestPose {
+            object_from_camera: matrix("best.object_from_camera", &best.object_from_camera)?,
+            covariance: matrix_if_any("best.covariance", &best.covariance)?,
+            pairs: pair_records(&best.pairs),
+        })
+    };
     Ok(TargetRecord {
         object: message.object,
         search: message.search,
@@ -92,6 +109,9 @@ pub(crate) fn result_record(
         optimal: message.optimal,
         consensus_bound: message.consensus_bound,
         nfa: message.nfa,
+        p_absent: message.p_absent,
+        p_wrong: message.p_wrong,
+        best: message.best.map(best).transpose()?,
         pair_tests: message.pair_tests,
         residual_rms: message.residual_rms,
         integrity: message.integrity.as_ref().map(Integrity::of),

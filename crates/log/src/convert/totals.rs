@@ -1,6 +1,9 @@
 //! What the frames of a trial add up to.
 
-use crate::{Region, Totals, proto};
+use crate::{
+    proto,
+    record::{Region, Totals},
+};
 
 /// The message that holds `totals`.
 pub(crate) fn totals_message(totals: &Totals) -> proto::Totals {

@@ -247,7 +247,7 @@ pub struct Rig {
     #[prost(double, repeated, tag = "5")]
     pub right_from_left_rotation: ::prost::alloc::vec::Vec<f64>,
 }
-/// A pinhole camera with plumb_bob distortion.
+/// A camera with plumb_bob distortion, or with an equidistant lens.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Camera {
     #[prost(uint32, tag = "1")]
@@ -257,9 +257,12 @@ pub struct Camera {
     /// 3 x 3: fx 0 cx, 0 fy cy, 0 0 1.
     #[prost(double, repeated, tag = "3")]
     pub matrix: ::prost::alloc::vec::Vec<f64>,
-    /// k1 k2 p1 p2 \[k3 [k4 k5 k6]\].
+    /// k1 k2 p1 p2 \[k3 [k4 k5 k6 [s1 s2 s3 s4]\]], of an equidistant lens k1 k2 k3 k4.
     #[prost(double, repeated, tag = "4")]
     pub distortion: ::prost::alloc::vec::Vec<f64>,
+    /// Whether the lens is equidistant (Kannala-Brandt).
+    #[prost(bool, tag = "5")]
+    pub equidistant: bool,
 }
 /// One thing searched for: an object, or the whole site.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -720,6 +723,15 @@ pub struct ReferencingResult {
     /// What supports the fix beyond its covariance; absent unless referenced.
     #[prost(message, optional, tag = "20")]
     pub integrity: ::core::option::Option<Integrity>,
+    /// Probability that the object is absent; absent for labelled points.
+    #[prost(double, optional, tag = "21")]
+    pub p_absent: ::core::option::Option<f64>,
+    /// Probability that the pose is not the object's: absence and other poses together.
+    #[prost(double, optional, tag = "22")]
+    pub p_wrong: ::core::option::Option<f64>,
+    /// The best pose of an answer that is no fix; absent if there is none.
+    #[prost(message, optional, tag = "23")]
+    pub best: ::core::option::Option<BestPose>,
 }
 /// What supports a fix beyond its covariance.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -753,6 +765,18 @@ pub struct Integrity {
     pub scale_error: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "10")]
     pub scale_error_sigma: ::core::option::Option<f64>,
+}
+/// The best pose of an answer that is no fix.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct BestPose {
+    /// 4 x 4, p_object = object_from_camera * p_camera.
+    #[prost(double, repeated, tag = "1")]
+    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
+    /// 6 x 6, as that of a fix; empty if the pairs determine none.
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+    #[prost(message, repeated, tag = "3")]
+    pub pairs: ::prost::alloc::vec::Vec<Pair>,
 }
 /// A point of the target and the cloud point believed to be it, by their indices.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]

@@ -10,10 +10,15 @@ use std::{
 
 use rayon::prelude::*;
 
-use crate::{FrameRecord, LogError, Totals, TrialHeader, convert, topic};
+use crate::{
+    convert,
+    error::LogError,
+    record::{FrameRecord, Totals, TrialHeader},
+    topic,
+};
 pub(crate) use pending::Pending;
-pub(crate) use source::Message;
 pub use source::looks_like;
+pub(crate) use source::{Message, foreign};
 use source::{Source, Take};
 
 /// A whole trial, as its log has it.
@@ -207,8 +212,13 @@ impl Reader {
             _ if images.wanted(stamp) => Take::Full,
             _ => Take::Mark,
         };
-        let mut messages = Vec::new();
+        let (mut messages, mut bytes) = (Vec::new(), 0);
         while let Some(message) = self.source.next_message(take)? {
+            bytes += message.data.len() + size_of::<Message>();
+            if bytes > self.source.limit() {
+                let what = format!("the frame at {} ns has more than {bytes} bytes", message.log_time);
+                return Err(LogError::TooLarge { path: self.source.path().to_owned(), what });
+            }
             if &*message.topic == topic::TOTALS {
                 self.totals = Some(convert::totals_record(message.decode(self.source.path(), "Totals")?));
                 continue;
@@ -251,10 +261,4 @@ impl Iterator for Reader {
         self.ended = !matches!(frame, Some(Ok(_)));
         frame
     }
-}
-
-/// The error that `message` is not what its topic promises.
-pub(crate) fn foreign(path: &Path, message: &Message, what: &str) -> LogError {
-    let what = format!("message {} on {} at {} ns: {what}", message.sequence, message.topic, message.log_time);
-    LogError::Foreign { path: path.to_owned(), what }
 }

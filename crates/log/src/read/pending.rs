@@ -2,10 +2,16 @@
 
 use std::path::Path;
 
-use crate::proto::foxglove::CompressedImage;
+use crate::{
+    convert,
+    error::LogError,
+    png,
+    proto::{self, foxglove::CompressedImage},
+    record::{Evaluation, FrameRecord, GreyImage},
+    topic,
+};
 
-use super::{foreign, source::Message};
-use crate::{Evaluation, FrameRecord, GreyImage, LogError, convert, png, proto, topic};
+use super::source::{Message, foreign};
 
 /// What has come of the frame that is being read.
 #[derive(Debug, Default)]

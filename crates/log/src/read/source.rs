@@ -16,8 +16,7 @@ use mcap::{
 };
 use prost::bytes::Bytes;
 
-use super::foreign;
-use crate::{LogError, proto, topic};
+use crate::{chunk::limit, error::LogError, parse::parse_record, proto, topic};
 
 /// A message as it stands in the file.
 #[derive(Debug)]
@@ -87,6 +86,7 @@ pub(super) struct Source {
     path: PathBuf,
     file: BufReader<File>,
     reader: LinearReader,
+    limit: usize,
     schemas: HashMap<u16, Arc<str>>,
     channels: HashMap<u16, Channel>,
     fed: u64,
@@ -114,8 +114,7 @@ impl Source {
         }
         let size = file.seek(SeekFrom::End(0)).map_err(io)?;
         file.seek(SeekFrom::Start(0)).map_err(io)?;
-        // What one record may claim: images are compressed already, so nothing honest grows more.
-        let limit = usize::try_from(size.saturating_mul(4).saturating_add(32 << 20)).unwrap_or(usize::MAX);
+        let limit = limit(size);
         let reader = LinearReader::new_with_options(
             LinearReaderOptions::default()
                 .with_prevalidate_chunk_crcs(true)
@@ -128,6 +127,7 @@ impl Source {
             path: path.to_owned(),
             file,
             reader,
+            limit,
             schemas: HashMap::new(),
             channels: HashMap::new(),
             fed: 0,
@@ -140,6 +140,11 @@ impl Source {
 
     pub(super) fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// Maximum size of the messages of one frame (bytes).
+    pub(super) fn limit(&self) -> usize {
+        self.limit
     }
 
     pub(super) fn recovered(&self) -> Option<&str> {
@@ -164,7 +169,7 @@ impl Source {
                     self.fed += read as u64;
                     continue;
                 }
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => mcap::parse_record(opcode, data),
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => parse_record(opcode, data),
             };
             let record = match record {
                 Ok(record) => record,
@@ -216,7 +221,11 @@ impl Source {
 /// What a file that does not begin like an MCAP file looks like, and what to do about it.
 pub fn looks_like(start: &[u8]) -> String {
     let known: [(&[u8], &str); 5] = [
-        (b"#ROSBAG", "it looks like a ROS 1 bag; convert it with `mcap convert IN.bag OUT.mcap`"),
+        (
+            b"#ROSBAG",
+            // Messages shorten a text of more than 120 letters.
+            "a ROS 1 bag; PyPI's `rosbags-convert --src IN.bag --dst OUT --dst-storage mcap --dst-typestore ros2_humble`",
+        ),
         (
             b"SQLite format 3",
             "it looks like a ROS 2 bag in SQLite; convert it with `ros2 bag convert` or `mcap convert`",
@@ -247,4 +256,10 @@ fn read_error(path: &Path, error: McapError, fed: u64, messages: u64, last_ns: u
         }
         error => LogError::Damaged { path, what: format!("{error}, before byte {fed}") },
     }
+}
+
+/// The error that `message` is not what its topic promises.
+pub(crate) fn foreign(path: &Path, message: &Message, what: &str) -> LogError {
+    let what = format!("message {} on {} at {} ns: {what}", message.sequence, message.topic, message.log_time);
+    LogError::Foreign { path: path.to_owned(), what }
 }

@@ -1,6 +1,13 @@
 //! What one stereo pair gave.
 
-use super::{Inputs, Matrix3, Matrix4, NavigationRecord, PointOfInterest, TargetModel, TargetRecord, TrialHeader};
+use super::{
+    header::{TargetModel, TrialHeader},
+    inputs::Inputs,
+    inspection::PointOfInterest,
+    matrix::{Matrix3, Matrix4},
+    navigation::NavigationRecord,
+    target::TargetRecord,
+};
 
 /// One frame: what was seen, what was known, and what came of every attempted target.
 #[derive(Debug, Clone, PartialEq, Default)]

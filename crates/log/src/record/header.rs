@@ -1,6 +1,6 @@
 //! What is the same for every frame of a trial.
 
-use super::{Matrix3, Matrix4};
+use super::matrix::{Matrix3, Matrix4};
 
 /// What a trial is: its question, its configuration, its cameras and what it looks for.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,15 +85,17 @@ pub struct RigRecord {
     pub rectified: bool,
 }
 
-/// One calibrated camera, pinhole with `plumb_bob` distortion.
+/// One calibrated camera, with `plumb_bob` distortion or an equidistant lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraRecord {
     /// Width and height of its images (px).
     pub size: [u32; 2],
     /// The camera matrix K: fx 0 cx, 0 fy cy, 0 0 1.
     pub matrix: Matrix3,
-    /// Distortion coefficients k1 k2 p1 p2 \[k3 \[k4 k5 k6\]\].
+    /// Distortion coefficients k1 k2 p1 p2 \[k3 \[k4 k5 k6 \[s1 s2 s3 s4\]\]\], or k1 k2 k3 k4 of an equidistant lens.
     pub distortion: Vec<f64>,
+    /// Whether the lens is equidistant (Kannala–Brandt).
+    pub equidistant: bool,
 }
 
 /// One thing searched for: an object, or the whole site.

@@ -1,6 +1,9 @@
 //! What a method was given, to the last bit.
 
-use super::{Matrix3, Matrix4, Matrix6, TargetModel};
+use super::{
+    header::TargetModel,
+    matrix::{Matrix3, Matrix4, Matrix6},
+};
 
 /// What a frame's method was given and its judge knew beyond what [`FrameRecord`](super::FrameRecord) holds, to the last
 /// bit: enough to run another method on the same.

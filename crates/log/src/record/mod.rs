@@ -4,6 +4,7 @@ mod frame;
 mod header;
 mod inputs;
 mod inspection;
+mod matrix;
 mod mirror;
 mod navigation;
 mod region;
@@ -16,16 +17,8 @@ pub use frame::{
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use inspection::PointOfInterest;
+pub use matrix::{Matrix3, Matrix4, Matrix6};
 pub use navigation::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use region::Region;
-pub use target::{Alternative, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
+pub use target::{Alternative, BestPose, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;
-
-/// Three rows of three numbers.
-pub type Matrix3 = [[f64; 3]; 3];
-
-/// Four rows of four numbers; a rigid motion `a_from_b` for column vectors.
-pub type Matrix4 = [[f64; 4]; 4];
-
-/// Six rows of six numbers; a covariance of ξ = (φ, ρ), rotation first.
-pub type Matrix6 = [[f64; 6]; 6];

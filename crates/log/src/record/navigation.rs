@@ -1,6 +1,9 @@
 //! What a navigator knew after a pair, and what it did.
 
-use super::{Matrix4, Matrix6, mirror::mirror};
+use super::{
+    matrix::{Matrix4, Matrix6},
+    mirror::mirror,
+};
 
 /// How an event ends that says how far an object stands from where it was surveyed, after the distance.
 pub const ELSEWHERE: &str = "m from its place";

@@ -1,6 +1,6 @@
 //! Where fixes stand in the diagram of integrity.
 
-use super::{Outcome, TargetRecord};
+use super::target::{Outcome, TargetRecord};
 
 /// The region of the Stanford diagram that a fix is in, by its error e, its protection level p and the alert limit a, all of
 /// the position (m) (Tossaint and others, *The Stanford–ESA integrity diagram*, Navigation 2007).

@@ -2,7 +2,10 @@
 
 use std::{fmt, str::FromStr};
 
-use super::{Matrix4, Matrix6, mirror::mirror};
+use super::{
+    matrix::{Matrix4, Matrix6},
+    mirror::mirror,
+};
 
 /// One row of the results: a frame, a target, and what came of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +42,12 @@ pub struct TargetRecord {
     pub consensus_bound: Option<u64>,
     /// Expected number of chance sets at least as large as the one found.
     pub nfa: Option<f64>,
+    /// Probability that the object is absent; `None` for labelled points.
+    pub p_absent: Option<f64>,
+    /// Probability that the pose of the fix, or of `best`, is not the object's.
+    pub p_wrong: Option<f64>,
+    /// The best pose of an answer that is no fix.
+    pub best: Option<BestPose>,
     /// Pair tests that the search spent.
     pub pair_tests: Option<u64>,
     /// Root mean square of C·H − P over the pairs (m).
@@ -71,6 +80,9 @@ impl TargetRecord {
             optimal: None,
             consensus_bound: None,
             nfa: None,
+            p_absent: None,
+            p_wrong: None,
+            best: None,
             pair_tests: None,
             residual_rms: None,
             integrity: None,
@@ -153,6 +165,17 @@ pub struct Alternative {
     pub pairs: Vec<Pair>,
     /// How well it explains the data; larger is better.
     pub score: f64,
+}
+
+/// The best pose of an answer that is no fix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BestPose {
+    /// The pose.
+    pub object_from_camera: Matrix4,
+    /// Its covariance, as that of a fix; `None` if the pairs determine none.
+    pub covariance: Option<Matrix6>,
+    /// Its pairs.
+    pub pairs: Vec<Pair>,
 }
 
 mirror! {

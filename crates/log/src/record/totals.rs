@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{FrameRecord, Outcome, Region};
+use super::{frame::FrameRecord, region::Region, target::Outcome};
 
 /// Sums over every frame of a trial, of which the log may hold a part.
 #[derive(Debug, Clone, PartialEq, Default)]

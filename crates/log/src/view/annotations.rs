@@ -3,13 +3,15 @@
 
 use std::collections::BTreeSet;
 
-use crate::proto::foxglove::{
-    CircleAnnotation, Color, ImageAnnotations, KeyValuePair, Point2, PointsAnnotation, TextAnnotation,
-    points_annotation,
+use crate::{
+    proto::foxglove::{
+        CircleAnnotation, Color, ImageAnnotations, KeyValuePair, Point2, PointsAnnotation, TextAnnotation,
+        points_annotation,
+    },
+    record::{FrameRecord, TrialHeader},
 };
 
-use super::{colour, colour_message, timestamp};
-use crate::{FrameRecord, TrialHeader};
+use super::values::{colour, colour_message, timestamp};
 
 /// The marks in the left (0) or right (1) image.
 pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize) -> ImageAnnotations {

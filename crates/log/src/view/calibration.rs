@@ -1,9 +1,11 @@
 //! The cameras.
 
-use crate::proto::foxglove::CameraCalibration;
+use crate::{
+    proto::foxglove::CameraCalibration,
+    record::{CameraRecord, RigRecord},
+};
 
-use super::{CAMERAS, timestamp};
-use crate::{CameraRecord, RigRecord};
+use super::{names::CAMERAS, values::timestamp};
 
 /// The calibrations of both cameras.
 ///
@@ -19,7 +21,13 @@ pub(crate) fn calibrations(rig: &RigRecord, stamp_ns: u64) -> [CameraCalibration
 fn calibration(camera: &CameraRecord, frame_id: &str, baseline: f64, stamp_ns: u64) -> CameraCalibration {
     let k = camera.matrix;
     let mut d = camera.distortion.clone();
-    d.resize(if d.len() > 5 { 8 } else { 5 }, 0.0);
+    let length = match d.len() {
+        _ if camera.equidistant => 4,
+        0..=5 => 5,
+        6..=8 => 8,
+        _ => 12,
+    };
+    d.resize(length, 0.0);
     let mut p: Vec<f64> = k.iter().flat_map(|row| [row[0], row[1], row[2], 0.0]).collect();
     // `0.0 -` rather than a negation: a baseline of zero must not become −0.
     p[3] = 0.0 - k[0][0] * baseline;
@@ -28,7 +36,12 @@ fn calibration(camera: &CameraRecord, frame_id: &str, baseline: f64, stamp_ns: u
         frame_id: frame_id.to_owned(),
         width: camera.size[0],
         height: camera.size[1],
-        distortion_model: if d.len() == 8 { "rational_polynomial" } else { "plumb_bob" }.to_owned(),
+        distortion_model: match d.len() {
+            4 => "kannala_brandt",
+            5 => "plumb_bob",
+            _ => "rational_polynomial",
+        }
+        .to_owned(),
         d,
         k: k.as_flattened().to_vec(),
         r: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

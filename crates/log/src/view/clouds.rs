@@ -2,12 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use crate::proto::foxglove::{
-    PackedElementField, PointCloud, Pose, Quaternion, Vector3, packed_element_field::NumericType,
+use crate::{
+    proto::foxglove::{PackedElementField, PointCloud, Pose, Quaternion, Vector3, packed_element_field::NumericType},
+    record::{FrameRecord, TrialHeader},
 };
 
-use super::{CAMERAS, SPS, colour, rigid::Places, timestamp};
-use crate::{FrameRecord, TrialHeader};
+use super::{
+    names::{CAMERAS, SPS},
+    rigid::Places,
+    values::{colour, timestamp},
+};
 
 /// Three coordinates, one number that tells points apart, and a colour.
 struct Dot {

@@ -2,7 +2,7 @@
 
 use crate::proto::foxglove::CompressedImage;
 
-use super::{CAMERAS, timestamp};
+use super::{names::CAMERAS, values::timestamp};
 
 /// The image of the left (0) or right (1) camera, as PNG.
 pub(crate) fn compressed(side: usize, png: Vec<u8>, stamp_ns: u64) -> CompressedImage {

@@ -1,9 +1,10 @@
 //! Rigid motions out of records, checked.
 
-use crate::proto::foxglove::{Pose, Quaternion, Vector3};
+use crate::{
+    proto::foxglove::{Pose, Quaternion, Vector3},
+    record::{FrameRecord, Matrix4, TargetModel, TrialHeader},
+};
 use seafix_geometry::{Body, Camera, Frame, Object, RightCamera, Site, Transform, World};
-
-use crate::{FrameRecord, Matrix4, TargetModel, TrialHeader};
 
 /// The motion of a matrix, or what is wrong with it.
 fn motion<A: Frame, B: Frame>(name: &str, m: &Matrix4) -> Result<Transform<A, B>, String> {

@@ -1,12 +1,17 @@
 //! The model as a scene: a ball and a name a feature point.
 
-use crate::proto::{
-    Duration,
-    foxglove::{KeyValuePair, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, TextPrimitive, Vector3},
+use crate::{
+    proto::{
+        Duration,
+        foxglove::{KeyValuePair, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, TextPrimitive, Vector3},
+    },
+    record::{TargetModel, TrialHeader},
 };
 
-use super::{colour, colour_message, object_frame, timestamp};
-use crate::{TargetModel, TrialHeader};
+use super::{
+    names::object_frame,
+    values::{colour, colour_message, timestamp},
+};
 
 /// Diameter of the ball that marks a point (m).
 const DIAMETER: f64 = 0.03;

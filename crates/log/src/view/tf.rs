@@ -1,15 +1,18 @@
 //! The tree of frames, and the vehicle in it.
 
-use crate::proto::foxglove::{FrameTransform, FrameTransforms, PoseInFrame};
+use crate::{
+    proto::foxglove::{FrameTransform, FrameTransforms, PoseInFrame},
+    record::FrameRecord,
+    topic,
+};
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Frame, Transform, World};
 
 use super::{
-    AUV, AUV_PRIOR, AUV_TRUTH, CAMERAS, SPS, WORLD, object_frame,
+    names::{AUV, AUV_PRIOR, AUV_TRUTH, CAMERAS, SPS, WORLD, object_frame},
     rigid::{Places, parts, pose},
-    timestamp,
+    values::timestamp,
 };
-use crate::{FrameRecord, topic};
 
 fn edge<A: Frame, B: Frame>(parent: &str, child: &str, parent_from_child: &Transform<A, B>) -> FrameTransform {
     let (translation, rotation) = parts(parent_from_child);

@@ -1,19 +1,25 @@
 //! Writing a trial's log.
 
+mod preamble;
 mod sink;
 
-use std::{collections::BTreeMap, path::Path};
+use std::path::Path;
 
 use crate::{
-    FrameRecord, LogError, Totals, TrialHeader, check, convert, png, topic,
+    check, convert,
+    error::LogError,
+    png,
+    record::{FrameRecord, Totals, TrialHeader},
+    topic,
     view::{self, Places},
 };
+pub(crate) use preamble::Preamble;
 use sink::{Sink, Use};
 
 /// Writes the log of one trial.
 ///
-/// The file stands under `NAME.mcap.partial` until [`Writer::finish`]; a writer that is dropped before
-/// leaves it there.
+/// The file is called `NAME.mcap.partial` until [`Writer::finish`]; a writer that is dropped before removes it. A killed
+/// process leaves it.
 #[derive(Debug)]
 pub struct Writer {
     sink: Sink,
@@ -151,46 +157,28 @@ impl Writer {
         self.sink.metadata(&mark.name, mark.metadata)
     }
 
-    /// Completes the log: index, check sums, onto the disk, renamed to its own name.
+    /// Completes the log: a second copy of the header in the last chunk, index, checksums, sync, final name.
     ///
     /// # Errors
-    /// [`LogError`] when any of it fails; the `.partial` then stays.
+    /// [`LogError`] when any of it fails; the unfinished file is then removed.
     pub fn finish(mut self) -> Result<(), LogError> {
         if self.last.is_none() {
             self.begin(0)?;
         }
+        self.sink.spare(self.last.unwrap_or(0), &convert::header_message(&self.header))?;
         self.sink.finish()
     }
 
-    /// What stands before the first frame.
+    /// Writes the records before the first frame, as chunks of their own: damage there costs no frame.
     fn begin(&mut self, stamp: u64) -> Result<(), LogError> {
-        let (header, sink) = (&self.header, &mut self.sink);
-        sink.metadata("run", summary(header))?;
-        sink.attach("configuration.toml", &header.configuration, stamp)?;
-        sink.attach("site.toml", &header.site, stamp)?;
-        sink.put(topic::HEADER, stamp, &convert::header_message(header))?;
-        for (topic, calibration) in topic::CALIBRATIONS.into_iter().zip(view::calibrations(&header.rig, stamp)) {
-            sink.put(topic, stamp, &calibration)?;
+        let (preamble, sink) = (Preamble::of(&self.header, &self.places, stamp), &mut self.sink);
+        sink.metadata(Preamble::METADATA, preamble.metadata)?;
+        for (name, text) in preamble.attachments {
+            sink.attach(name, text, stamp)?;
         }
-        sink.put(topic::TF, stamp, &view::fixed_transforms(&self.places, stamp))?;
-        sink.put(topic::SCENE_MODEL, stamp, &view::model_scene(header, stamp))?;
-        sink.put(topic::MODEL, stamp, &view::model_cloud(header, &self.places, stamp))
+        for (topic, schema, message) in &preamble.messages {
+            sink.put_bytes(topic, *schema, stamp, message)?;
+        }
+        sink.end_chunk()
     }
-}
-
-/// The metadata record `run`: what a person wants to know without opening a message.
-fn summary(header: &TrialHeader) -> BTreeMap<String, String> {
-    let own = [
-        ("run", &header.run),
-        ("trial", &header.trial),
-        ("title", &header.title),
-        ("question", &header.question),
-        ("command", &header.command),
-        ("source", &header.source),
-    ];
-    let own = own.into_iter().map(|(key, value)| (key.to_owned(), value.clone()));
-    let axes = header.axes.iter().map(|axis| (format!("axis.{}", axis.key), axis.value.clone()));
-    let seeds = header.seeds.iter().map(|(name, value)| (format!("seed.{name}"), value.to_string()));
-    let versions = header.versions.iter().map(|(name, value)| (format!("version.{name}"), value.clone()));
-    own.chain(axes).chain(seeds).chain(versions).collect()
 }

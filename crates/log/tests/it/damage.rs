@@ -49,7 +49,7 @@ fn other_files_are_named_for_what_they_are() {
     let path = folder.path().join("x.mcap");
     for (bytes, expected) in [
         (&b""[..], "empty"),
-        (b"#ROSBAG V2.0\n", "mcap convert"),
+        (b"#ROSBAG V2.0\n", "rosbags-convert"),
         (b"SQLite format 3\0", "ROS 2"),
         (b"PK\x03\x04abcd", "zip"),
         (b"hello", "bytes [68"),

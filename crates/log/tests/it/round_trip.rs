@@ -126,14 +126,14 @@ fn totals_come_back_after_the_last_frame() {
 }
 
 #[test]
-fn a_dropped_writer_leaves_a_partial() {
+fn a_dropped_writer_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.mcap");
     let mut writer = Writer::create(&path, &synthetic::header()).unwrap();
     writer.frame(&synthetic::frame(0)).unwrap();
     drop(writer);
     assert!(!path.exists());
-    assert!(folder.path().join("t.mcap.partial").exists());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

@@ -24,6 +24,7 @@ pub(crate) fn header() -> TrialHeader {
         size: [64, 48],
         matrix: [[50.0, 0.0, 31.5], [0.0, 50.0, 23.5], [0.0, 0.0, 1.0]],
         distortion: vec![0.1, 0.01, 0.0, 0.0],
+        equidistant: true,
     };
     let target = |id: &str, x: f64| TargetModel {
         id: id.to_owned(),
@@ -131,6 +132,12 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
     let mut refused = TargetRecord::refused("B", "maximum-clique", "kabsch", "too-few");
     refused.explanation = "2 points".to_owned();
+    (refused.p_absent, refused.p_wrong) = (Some(0.25), Some(0.5));
+    refused.best = Some(BestPose {
+        object_from_camera: at(0.1, 0.2, -4.0),
+        covariance: Some(covariance),
+        pairs: vec![Pair { model: 3, cloud: 2 }, Pair { model: 0, cloud: 4 }],
+    });
     let odd = number % 2 == 1;
     FrameRecord {
         frame: number,

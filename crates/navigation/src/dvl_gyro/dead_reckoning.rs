@@ -6,15 +6,15 @@ use nalgebra::{Matrix4, Matrix6, SVector, Vector4};
 use seafix_geometry::{Body, Camera, Covariance6, Transform};
 
 use super::{
-    DvlGyro,
     integral::{DeviceSignals, IntegratedPose},
+    settings::DvlGyro,
     signal::{Signal, seconds},
 };
 use crate::{
-    CorrelatedError, Device, Lost, NotAfter, OdometryOutcome, OdometrySession, OdometryTrajectory, Reading,
-    RelativeMotion, Segment, StereoPair, Waypoint,
-    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
-    odometry::Stamps,
+    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedError, CorrelatedSensitivities},
+    odometry::{NotAfter, OdometrySession, Stamps, StereoPair},
+    odometry_trajectory::{Lost, OdometryOutcome, OdometryTrajectory, RelativeMotion, Segment, Waypoint},
+    reading::{Device, Reading},
 };
 
 /// The state of one session.

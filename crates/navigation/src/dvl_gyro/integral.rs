@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use seafix_geometry::{Body, Transform, so3};
 
 use super::{
-    DvlGyro,
+    settings::DvlGyro,
     signal::{Signal, Value, seconds},
 };
 

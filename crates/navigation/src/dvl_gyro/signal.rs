@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Reading;
+use crate::reading::Reading;
 
 /// The signal of a device: linear interpolation between readings, constant extrapolation beyond them.
 #[derive(Debug, Clone, Default)]
@@ -107,7 +107,7 @@ pub(super) fn seconds(from: u64, to: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Device;
+    use crate::reading::Device;
 
     fn message(stamp_ns: u64, x: f64) -> Reading {
         let covariance = Matrix3::identity() * 1e-6;

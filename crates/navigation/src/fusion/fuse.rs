@@ -1,13 +1,13 @@
 //! Fusion of fix and known pose by their covariances, with considered model errors.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Contradiction, Fusion,
     join::{consider_states, gate},
+    rule::{Contradiction, Fusion},
 };
-use crate::ObjectPose;
+use crate::chain::ObjectPose;
 
 /// The Schmidt–Kalman update: it gates a fix by its innovation, then takes the minimum-variance pose.
 ///
@@ -18,7 +18,7 @@ use crate::ObjectPose;
 ///
 /// Fixes treated as independent would make a pose after sixty fixes eight times more accurate than after one, although
 /// the model error is unchanged.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fuse {
     /// The fraction of correct fixes that passes the gate, between 0 and 1.

@@ -1,14 +1,14 @@
 //! Covariance intersection of fix and known pose.
 
 use nalgebra::Matrix6;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Contradiction, Fusion,
     join::{carried_back, gate, joined},
+    rule::{Contradiction, Fusion},
 };
-use crate::ObjectPose;
+use crate::chain::ObjectPose;
 
 /// Covariance intersection: it gates a fix by its innovation, then combines both poses under unknown correlation.
 ///
@@ -16,7 +16,7 @@ use crate::ObjectPose;
 /// accounts for the model's errors only; the others have no known covariance. The intersection Σ⁻¹ = ω Σ_known⁻¹ + (1 −
 /// ω) Σ_fix⁻¹, with the ω of minimum det Σ, is at least as large as the true covariance for every correlation of the
 /// two inputs.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields)]
 pub struct Intersect {
     /// The fraction of correct fixes that passes the gate, between 0 and 1; see [`Fuse`](super::Fuse).

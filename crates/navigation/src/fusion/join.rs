@@ -4,8 +4,8 @@ use nalgebra::{Matrix6, Vector6};
 use seafix_geometry::{Covariance6, right_jacobian_inverse};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::Contradiction;
-use crate::{ConsiderStates, ObjectPose};
+use super::rule::Contradiction;
+use crate::{chain::ObjectPose, consider_states::ConsiderStates};
 
 /// The χ² gate of a fix: rᵀ S⁻¹ r ≤ χ²₆(`confidence`) with r = log(T_known⁻¹ T_fix).
 ///

@@ -1,13 +1,13 @@
 //! Replacement of the known pose by the fix.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
-use super::{Contradiction, Fusion};
-use crate::ObjectPose;
+use super::rule::{Contradiction, Fusion};
+use crate::chain::ObjectPose;
 
 /// Plain replacement: every fix is accepted, and the previous pose is discarded.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields)]
 pub struct Replace {}
 

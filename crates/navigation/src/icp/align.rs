@@ -5,8 +5,11 @@ use std::collections::HashMap;
 use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Transform, so3};
 
-use super::{Distance, Icp, grid::Grid};
-use crate::Lost;
+use super::{
+    grid::Grid,
+    settings::{Distance, Icp},
+};
+use crate::odometry_trajectory::Lost;
 
 /// The gate of a partner: the 99 % quantile of χ²₃.
 const GATE: f64 = 11.345;

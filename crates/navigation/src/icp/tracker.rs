@@ -7,14 +7,13 @@ use seafix_geometry::{Camera, Covariance6, StereoRig, Transform, World};
 use seafix_vision::{FrontEnd, FrontEndOutput, Threads};
 
 use super::{
-    Icp,
     align::{Ground, Registered},
+    settings::Icp,
 };
 use crate::{
-    CorrelatedError, Lost, NotAfter, OdometryOutcome, OdometrySession, OdometryTrajectory, RelativeMotion, Segment,
-    StereoPair, Waypoint,
-    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
-    odometry::Stamps,
+    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedError, CorrelatedSensitivities},
+    odometry::{NotAfter, OdometrySession, Stamps, StereoPair},
+    odometry_trajectory::{Lost, OdometryOutcome, OdometryTrajectory, RelativeMotion, Segment, Waypoint},
     times::Times,
     unusable::RawImages,
 };

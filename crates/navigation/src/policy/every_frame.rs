@@ -1,12 +1,12 @@
 //! A fix in every frame.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
-use super::{Policy, Situation};
+use super::situation::{Policy, Situation};
 
 /// The policy that tries a fix in every frame.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields)]
 pub struct EveryFrame {}
 

@@ -1,12 +1,12 @@
 //! A fix whenever an object should be in view.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
-use super::{Policy, Situation};
+use super::situation::{Policy, Situation};
 
 /// The policy that tries a fix when the known pose puts an object in view.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields)]
 pub struct InView {}
 

@@ -1,12 +1,12 @@
 //! A fix at fixed intervals of time.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{Policy, Situation};
+use super::situation::{Policy, Situation};
 
 /// The policy that tries a fix when the last one is older than `seconds`.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields)]
 pub struct Interval {
     /// Minimum age of the last fix (s), 0 or more.

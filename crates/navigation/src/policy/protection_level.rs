@@ -1,16 +1,16 @@
 //! A fix when the predicted protection level exceeds a limit.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{Policy, Situation};
+use super::situation::{Policy, Situation};
 
 /// The policy that tries a fix when the predicted protection level exceeds `limit`.
 ///
 /// The protection level is √χ²₃(1 − risk) times the standard deviation along the least accurate axis: an upper bound of
 /// the radius that the position error exceeds with probability `risk`.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields)]
 pub struct ProtectionLevel {
     /// Maximum protection level (m), above 0.

@@ -1,12 +1,12 @@
 //! A fix at fixed intervals of the path length.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{Policy, Situation};
+use super::situation::{Policy, Situation};
 
 /// The policy that tries a fix when the vehicle has travelled `metres` since the last one.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields)]
 pub struct Travelled {
     /// Minimum path length since the last fix (m), 0 or more.

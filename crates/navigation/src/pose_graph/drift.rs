@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
-use super::NoCovariance;
+use super::graph::NoCovariance;
 use crate::{
-    CorrelatedError, RelativeMotion,
-    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
+    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedError, CorrelatedSensitivities},
+    odometry_trajectory::RelativeMotion,
 };
 
 /// Dimension of a motion's error together with the correlated errors at its end.

@@ -14,10 +14,14 @@ use seafix_geometry::{Camera, Covariance6, Frame, Object, Pixel, Point, Transfor
 use seafix_vision::{Descriptors, Keypoint, Table};
 use serde::{Deserialize, Serialize};
 
-use super::{FixEdge, KeyFrame, OdometryEdge, PoseGraph, PoseNode, PriorPose, Recognition, drift::Drift};
+use super::{
+    FixEdge, OdometryEdge, PoseGraph, PoseNode, PriorPose, drift::Drift, keyframe::KeyFrame, recognition::Recognition,
+};
 use crate::{
-    CorrelatedError, Navigated, ObjectPlacement, ObjectPose, RelativeMotion,
-    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
+    chain::ObjectPose,
+    correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedError, CorrelatedSensitivities},
+    navigated::{Navigated, ObjectPlacement},
+    odometry_trajectory::RelativeMotion,
 };
 
 const FORMAT: &str = "seafix-pose-graph/2";

@@ -11,8 +11,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::drift::{self, Drift, Numbers, SIDES, Square, Units};
 use crate::{
-    RelativeMotion,
     correlated_error::{CORRELATED, CorrelatedCovariance, CorrelatedSensitivities},
+    odometry_trajectory::RelativeMotion,
 };
 
 /// A pose of the graph; object frames are relabelled as camera frames at the interface.

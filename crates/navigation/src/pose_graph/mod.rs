@@ -15,7 +15,11 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix6;
 use seafix_geometry::{Camera, Covariance6, Transform, World};
 
-use crate::{Navigated, ObjectPlacement, ObjectPose, RelativeMotion};
+use crate::{
+    chain::ObjectPose,
+    navigated::{Navigated, ObjectPlacement},
+    odometry_trajectory::RelativeMotion,
+};
 
 pub use footprint::Footprint;
 pub use graph::{FactorGraph, GraphSolution, NoCovariance};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use seafix_component::{Choice, in_range};
+use seafix_component::{Choice, Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform, UncertainPoint};
 use seafix_referencing::Observations;
 use seafix_vision::{FrontEndOutput, Image, Threads, View, Workspace};
@@ -10,10 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use super::keyframe::{KeyFrame, StereoFeatures};
 use crate::{
-    ObjectPose, RelativeMotion, Stereo, StereoPair,
+    chain::ObjectPose,
     fusion::{Contradiction, gate},
+    odometry::StereoPair,
+    odometry_trajectory::RelativeMotion,
     stereo::{
-        StereoStages,
+        Stereo, StereoStages,
         consensus::{Consensus, Rules, consensus, seen_again},
         front_end::{Seen, in_common},
         pose::{Found, joint, refine},
@@ -31,7 +33,7 @@ use crate::{
 ///
 /// Source: Fischler and Bolles, *Random sample consensus*, 1981; Moisan and Stival, *A probabilistic criterion to
 /// detect rigid point matches*, IJCV 2004.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Recognition {
     /// Image filters, in the order of their application.
@@ -49,8 +51,10 @@ pub struct Recognition {
     /// The triangulator.
     pub triangulator: Choice,
     /// The matcher between the current pair and a key frame, by descriptors alone.
+    #[setting(component = "matcher")]
     pub between: Choice,
     /// The minimal solver of RANSAC, for three points.
+    #[setting(component = "solver")]
     pub minimal: Choice,
     /// The solver for all inliers of RANSAC.
     pub solver: Choice,
@@ -325,7 +329,7 @@ impl<'a> PlaceRecognizer<'a> {
             return Err(NotRecognized::FewMatches { found: matches, needed });
         }
         let points = pairs.iter().map(|&(kept, seen)| seen_again(&keyframe.points[kept], &stereo_features.cloud[seen]));
-        let data = Observations { points: points.collect(), rig: Some(self.rig) };
+        let data = Observations { points: points.collect(), edges: Vec::new(), rig: Some(self.rig) };
         let rules = Rules { px: settings.consensus_px, confidence: 0.999, draws: settings.draws };
         let guesses = [candidate.prior.motion.relabel()];
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed ^ stereo_features.stamp_ns ^ ((index as u64) << 48));

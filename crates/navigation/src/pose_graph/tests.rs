@@ -12,10 +12,16 @@ use seafix_geometry::{
 use seafix_vision::{Descriptors, Keypoint, Table, Threads};
 
 use super::{
-    LoopCandidate, NotRecognized, PlaceRecognizer, PoseEstimate, PoseGraph, PoseGraphSettings, Recognition,
-    StereoFeatures, Traverse,
+    PoseGraph,
+    keyframe::StereoFeatures,
+    recognition::{LoopCandidate, NotRecognized, PlaceRecognizer, Recognition},
+    traverse::{PoseEstimate, PoseGraphSettings, Traverse},
 };
-use crate::{Navigated, ObjectPlacement, ObjectPose, RelativeMotion};
+use crate::{
+    chain::ObjectPose,
+    navigated::{Navigated, ObjectPlacement},
+    odometry_trajectory::RelativeMotion,
+};
 
 /// Length of a descriptor.
 const LENGTH: usize = 32;

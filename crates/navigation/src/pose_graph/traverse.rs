@@ -3,19 +3,26 @@
 use std::collections::BTreeMap;
 
 use nalgebra::{Point2, Vector2};
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, Point, StereoRig, Transform, World};
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Closed, FixEdge, Footprint, KeyFrame, LoopCandidate, NotRecognized, OdometryEdge, PlaceRecognizer, PoseGraph,
-    PoseNode, PriorPose, Recognition, Recognized, StereoFeatures, in_world,
+    Closed, FixEdge, OdometryEdge, PoseGraph, PoseNode, PriorPose,
+    footprint::Footprint,
+    in_world,
+    keyframe::{KeyFrame, StereoFeatures},
+    recognition::{LoopCandidate, NotRecognized, PlaceRecognizer, Recognition, Recognized},
 };
-use crate::{Navigated, ObjectPlacement, RelativeMotion, StereoPair};
+use crate::{
+    navigated::{Navigated, ObjectPlacement},
+    odometry::StereoPair,
+    odometry_trajectory::RelativeMotion,
+};
 
 /// The settings that control adding and matching of key frames.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PoseGraphSettings {
     /// Coverage threshold, above 0 and at most 1.
@@ -33,7 +40,8 @@ pub struct PoseGraphSettings {
     pub min_loop_distance: f64,
     /// Minimum coverage of the view by a candidate key frame, above 0 and at most 1.
     ///
-    /// The coverage is the largest one within the position uncertainty.
+    /// It is the coverage after the view is moved towards the key frame by at most three standard deviations of their
+    /// distance.
     pub min_overlap: f64,
     /// Minimum time (s) between two visits of an object or key frame.
     ///

@@ -126,7 +126,7 @@ pub(crate) fn competitor(
 
 /// A selection of the points.
 pub(crate) fn subset<'a>(data: &Observations<'a>, indices: &[usize]) -> Observations<'a> {
-    Observations { points: indices.iter().map(|&index| data.points[index]).collect(), rig: data.rig }
+    Observations { points: indices.iter().map(|&index| data.points[index]).collect(), edges: Vec::new(), rig: data.rig }
 }
 
 fn judge(data: &Observations<'_>, rig: &StereoRig, rules: &Rules, motion: Transform<Object, Camera>) -> Consensus {

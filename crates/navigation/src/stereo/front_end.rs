@@ -3,8 +3,8 @@
 use seafix_geometry::{MeasuredPoint, Pixel, StereoRig};
 use seafix_vision::{Descriptors, FrontEndOutput, Image, Keypoint, Match, Matcher, View, Workspace};
 
-use super::StereoStages;
-use crate::StereoPair;
+use super::settings::StereoStages;
+use crate::odometry::StereoPair;
 
 /// The processed images of one pair.
 #[derive(Debug)]

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{CONFIDENCE, coordinates};
-use crate::{ModelPoint, Problem, candidates::chi_square};
+use super::coordinates::{CONFIDENCE, coordinates};
+use crate::{chi_square::chi_square, problem::Problem, site::model::ModelPoint};
 
 /// Number of motions, for each model point, that may map a model onto itself: a ring of n points has 2n, a grid of 27
 /// has 24.
@@ -112,7 +112,7 @@ mod tests {
     use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 
     use super::*;
-    use crate::{Candidates, Tolerance};
+    use crate::{candidates::Candidates, problem::Tolerance};
 
     /// A cloud that contains the model, with random pairs.
     fn expected(model: &[Vector3<f64>], pairs: usize, size: usize, seed: u64) -> (f64, usize) {
@@ -126,7 +126,14 @@ mod tests {
         let candidates = Candidates::from_pairs(model.len(), sampled.iter().copied());
         let points: Vec<ModelPoint> = model.iter().map(|at| ModelPoint::exact("", Point::from(*at))).collect();
         let tolerance = Tolerance::Fixed(0.04);
-        let problem = Problem { model: &points, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &points,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let met = (0..model.len()).filter(|&i| candidates.lists[i].contains(&i)).count();
         (expected_at(&problem, size, &Transform::identity()), met)
     }

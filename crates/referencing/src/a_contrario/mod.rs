@@ -31,10 +31,10 @@
 //! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid point matches*,
 //! 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
 
-mod coincidence;
-mod dimension;
+pub(crate) mod coincidence;
+pub(crate) mod coordinates;
 mod null;
-mod sample;
+pub(crate) mod sample;
 mod sequence;
 mod shape;
 mod subsets;
@@ -42,12 +42,15 @@ mod subsets;
 use std::{cell::OnceCell, cmp::Ordering};
 
 use nalgebra::Vector3;
-use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
+use seafix_geometry::{Camera, Object, Transform};
 
-use crate::{Correspondence, Kabsch, Observations, Problem, Solver, candidates::chi_square, solve::likelihood};
-pub(crate) use coincidence::Shuffled;
+use crate::{
+    chi_square::chi_square,
+    observations::Observations,
+    problem::{Correspondence, Problem},
+    solve::{kabsch::Kabsch, likelihood, solver::Solver},
+};
 use coincidence::expected_at;
-pub(crate) use dimension::dimension;
 use null::Null;
 use sequence::QuasiRandom;
 use shape::{Noise, Shape};
@@ -67,9 +70,6 @@ const IMPOSSIBLE: f64 = 1e-7;
 const HOPELESS: f64 = 1e-30;
 const FIRST_SAMPLES: usize = 2;
 
-/// Confidence of the χ² test that sets must pass.
-const CONFIDENCE: f64 = 0.999;
-
 /// The NFA of a set of this size: the expected number of sets that pass the χ² test.
 ///
 /// It counts one-to-one sets of `found.len()` pairs or more if no candidate is true. Infinite below three pairs; NaN
@@ -82,8 +82,9 @@ pub(crate) fn expected_sets(problem: &Problem<'_>, found: &[Correspondence]) -> 
     AContrario::of(problem, found).beside(anywhere)
 }
 
-/// The expected number of sets with at most the residual of `found`. Among frames without the object, a fraction ε
-/// shows a set with a number below ε for each size.
+/// The expected number of random sets with at most the residual of `found`.
+///
+/// For each size, at most a fraction ε of the frames without the object has a set with a number below ε.
 pub fn expected_sets_as_good(problem: &Problem<'_>, found: &[Correspondence]) -> f64 {
     AContrario::of(problem, found).sets_as_good()
 }
@@ -129,12 +130,6 @@ impl<'a> AContrario<'a> {
     fn best(&self) -> (f64, Option<Transform<Object, Camera>>) {
         *self.best.get_or_init(|| best(self.problem, self.found))
     }
-}
-
-/// Whether the null model shuffles partners: pairs are given without a prior, and not every possible pair.
-pub(crate) fn shuffled(problem: &Problem<'_>) -> bool {
-    let lists = &problem.candidates.lists;
-    problem.prior.is_none() && lists.iter().any(|list| !list.is_empty() && list.len() < problem.cloud.len())
 }
 
 /// The number of false alarms: the expected number of admissible one-to-one sets no worse than a given one, if no
@@ -262,10 +257,7 @@ fn best(problem: &Problem<'_>, pairs: &[Correspondence]) -> (f64, Option<Transfo
     }
 }
 
-/// The measured place of a point in the camera frame.
-fn coordinates(point: &MeasuredPoint) -> Vector3<f64> {
-    point.position.at.coords
-}
-
 #[cfg(test)]
 mod tests;
+
+use coordinates::{CONFIDENCE, shuffled};

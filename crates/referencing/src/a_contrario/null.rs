@@ -3,8 +3,16 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::MeasuredPoint;
 
-use super::{coordinates, sample::spread_sample, sequence::QuasiRandom, shuffled};
-use crate::{Correspondence, Prior, PriorBound, Problem, candidates::chi_square, parts::Parts};
+use super::{
+    coordinates::{coordinates, shuffled},
+    sample::spread_sample,
+    sequence::QuasiRandom,
+};
+use crate::{
+    chi_square::chi_square,
+    parts::Parts,
+    problem::{Correspondence, Prior, PriorBound, Problem},
+};
 
 /// Confidence of the gates of a Gaussian prior, the default of [`crate::Gate`].
 const CONFIDENCE: f64 = 0.99;
@@ -67,7 +75,7 @@ impl<'a> Null<'a> {
 /// proportions.
 fn gates(problem: &Problem<'_>, prior: &Prior) -> Vec<GateVolume> {
     let camera_from_object = prior.object_from_camera.inverse();
-    let gate = |(point, list): (&crate::ModelPoint, &Vec<usize>)| {
+    let gate = |(point, list): (&crate::site::model::ModelPoint, &Vec<usize>)| {
         let centre = camera_from_object * point.at;
         let half = match &prior.bound {
             PriorBound::Box(half) => Vector3::repeat(*half),

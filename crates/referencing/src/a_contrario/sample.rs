@@ -3,13 +3,13 @@
 use nalgebra::Vector3;
 use seafix_geometry::MeasuredPoint;
 
-use super::coordinates;
+use super::coordinates::coordinates;
 
 /// Decimates the points to at most `max`, evenly spaced by distance from their centroid, in this order.
 ///
 /// The sample does not depend on the numbering of the points, nor on a rigid motion of the cloud, except for distances
 /// equal to seven digits (sums in another order may differ in the last), which the coordinates order.
-pub(super) fn spread_sample(cloud: &[MeasuredPoint], points: &mut Vec<usize>, max: usize) {
+pub(crate) fn spread_sample(cloud: &[MeasuredPoint], points: &mut Vec<usize>, max: usize) {
     let place = |j: usize| coordinates(&cloud[j]);
     let centroid = points.iter().map(|&j| place(j)).sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let distance = |j: usize| (place(j) - centroid).norm_squared() as f32;

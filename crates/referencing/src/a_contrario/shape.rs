@@ -8,7 +8,7 @@ use super::{
     null::{GateVolume, Null, any, density},
     sequence::QuasiRandom,
 };
-use crate::{Problem, Tolerance};
+use crate::problem::{Problem, Tolerance};
 
 /// Minimum standard deviation of a measurement (m).
 const FLOOR: f64 = 1e-9;

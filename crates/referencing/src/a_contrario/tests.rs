@@ -4,7 +4,13 @@ use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Covariance6, Point, Transform, UncertainPoint};
 
 use super::*;
-use crate::{Candidates, ModelPoint, Prior, PriorBound, Tolerance, search::mirrored};
+use crate::{
+    candidates::Candidates,
+    problem::{Prior, PriorBound, Tolerance},
+    search::mirrored,
+    site::model::ModelPoint,
+};
+use seafix_geometry::MeasuredPoint;
 
 const PLACES: [[f64; 3]; 7] = [
     [0.0, 0.0, 0.0],
@@ -69,6 +75,7 @@ impl Frame {
             candidates: &self.candidates,
             tolerance: Tolerance::Fixed(tolerance),
             prior: self.prior.as_ref(),
+            edges: Default::default(),
         }
     }
 }

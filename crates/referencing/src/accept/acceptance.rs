@@ -1,34 +1,22 @@
 //! The limits of the acceptance tests.
 
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
+use super::max_p_wrong::MaxPWrong;
+
 /// The limits of the tests by which an identified set becomes a fix.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Acceptance {
     /// Minimum number of identified points, 3 or more.
     pub min_points: usize,
-    /// Largest number of false alarms (NFA): the expected number of random sets of the same size.
+    /// Largest probability that the pose is not the object's: a number, or a preset.
     ///
-    /// For a search that weighs evidence, it counts random sets as good as the one found.
-    pub max_nfa: f64,
-    /// Largest posterior probability of the object's absence, for a model of eight points; used by searches that weigh
-    /// evidence.
-    ///
-    /// For a larger model of n points the limit depends on the clutter. If the cloud fills space, the limit is (n +
-    /// 1)/9 times larger, at most 0.01, since random evidence is that much rarer. If the cloud lies on lines and
-    /// surfaces (less than 2.3 dimensions, by the distances of neighbours), the odds are ((n + 1)/9)^2.5 times smaller,
-    /// since each point's evidence is overestimated there. A repeated pattern that resembles the object has the former
-    /// limit in every cloud.
-    pub absence: f64,
-    /// Largest NFA at which a pose is accepted although its probability of absence exceeds [`absence`](Self::absence).
-    ///
-    /// It applies to putative pairs without a prior whose cloud fills space; the probability of absence must be at most
-    /// 0.05.
-    pub rare: f64,
-    /// Largest posterior probability that a present object has another pose; used by searches that weigh evidence.
-    pub doubt: f64,
+    /// `strict` is 1e-5, for autonomous use without a second check; `balanced` is 1e-3, the default, for a navigator
+    /// that fuses fixes behind a gate; `permissive` is 2e-2, for studies. The probability includes the object's absence
+    /// and its other poses.
+    pub max_p_wrong: MaxPWrong,
     /// Confidence of the χ² tests of residuals and prior; a correct set fails with one minus this probability.
     pub confidence: f64,
     /// Alert limit: the distance (m, RMS over the model points) beyond which two poses are different answers.
@@ -49,16 +37,18 @@ pub struct Acceptance {
     pub wrong_match_rate: f64,
     /// Assumed fraction of accepted sets with two wrong matches; zero excludes the case from the protection levels.
     pub two_wrong_rate: f64,
+    /// Assumed fraction of objects with a part displaced against the rest; the protection levels depend on it.
+    ///
+    /// Zero excludes the case, from the levels and from the test of consistency
+    /// ([`RejectionReason::Inconsistent`](super::RejectionReason::Inconsistent)).
+    pub moved_part_rate: f64,
 }
 
 impl Default for Acceptance {
     fn default() -> Self {
         Self {
             min_points: 3,
-            max_nfa: 1e-3,
-            absence: 2e-5,
-            rare: 3e-5,
-            doubt: 0.01,
+            max_p_wrong: MaxPWrong::Balanced,
             confidence: 0.999,
             alert_limit: 0.10,
             alert_fraction: 0.05,
@@ -66,11 +56,19 @@ impl Default for Acceptance {
             risk: 1e-4,
             wrong_match_rate: 0.1,
             two_wrong_rate: 0.0,
+            moved_part_rate: 0.1,
         }
     }
 }
 
 impl Acceptance {
+    /// The Bayes factor of a displaced part beyond which the parts of an object are inconsistent.
+    ///
+    /// An object as modelled exceeds it with a probability of at most one minus the confidence (Markov's inequality).
+    pub(super) fn max_bayes_factor(&self) -> f64 {
+        1.0 / (1.0 - self.confidence)
+    }
+
     /// Checks the range of every setting.
     ///
     /// # Errors
@@ -80,11 +78,9 @@ impl Acceptance {
         let check = || {
             in_range(self.min_points >= 3, "min-points", self.min_points, "3 or more")?;
             // A NaN is rejected as well.
-            let budget = self.max_nfa > 0.0 && self.max_nfa.is_finite();
-            in_range(budget, "max-nfa", self.max_nfa, "a positive number")?;
-            for (name, value) in [("absence", self.absence), ("rare", self.rare), ("doubt", self.doubt)] {
-                in_range(value > 0.0 && value < 1.0, name, value, "a probability between 0 and 1")?;
-            }
+            let p = self.max_p_wrong.value();
+            let range = "a probability above 0, at most 1, or strict, balanced or permissive";
+            in_range(p > 0.0 && p <= 1.0, "max-p-wrong", p, range)?;
             let confident = self.confidence > 0.0 && self.confidence < 1.0;
             in_range(confident, "confidence", self.confidence, "a number between 0 and 1")?;
             let alert = self.alert_limit > 0.0 && self.alert_limit.is_finite();
@@ -98,7 +94,9 @@ impl Acceptance {
             let rate = self.wrong_match_rate > 0.0 && self.wrong_match_rate <= 1.0;
             in_range(rate, "wrong-match-rate", self.wrong_match_rate, "a fraction above 0, at most 1")?;
             let two = self.two_wrong_rate >= 0.0 && self.two_wrong_rate <= 1.0;
-            in_range(two, "two-wrong-rate", self.two_wrong_rate, "a fraction from 0 to 1")
+            in_range(two, "two-wrong-rate", self.two_wrong_rate, "a fraction from 0 to 1")?;
+            let moved = self.moved_part_rate >= 0.0 && self.moved_part_rate <= 1.0;
+            in_range(moved, "moved-part-rate", self.moved_part_rate, "a fraction from 0 to 1")
         };
         check().map_err(|message| format!("acceptance: {message}"))
     }
@@ -115,7 +113,8 @@ mod tests {
         let message = Acceptance { min_points: 2, ..good.clone() }.check().unwrap_err();
         assert_eq!(message, "acceptance: min-points = 2; give 3 or more");
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Acceptance { max_nfa: bad, ..good.clone() }.check().is_err(), "max-nfa = {bad}");
+            let number = MaxPWrong::Number(bad);
+            assert!(Acceptance { max_p_wrong: number, ..good.clone() }.check().is_err(), "max-p-wrong = {bad}");
             assert!(Acceptance { confidence: bad, ..good.clone() }.check().is_err(), "confidence = {bad}");
             assert!(Acceptance { alert_limit: bad, ..good.clone() }.check().is_err(), "alert-limit = {bad}");
         }

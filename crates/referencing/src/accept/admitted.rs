@@ -5,7 +5,11 @@ use std::collections::BTreeMap;
 use nalgebra::Matrix3;
 
 use super::judge::Judge;
-use crate::{Correspondence, PriorBound, a_contrario::shuffled, candidates::chi_square};
+use crate::{
+    a_contrario::coordinates::shuffled,
+    chi_square::chi_square,
+    problem::{Correspondence, PriorBound},
+};
 
 /// Tolerance at the edge of a box prior, in standard deviations of the measurement.
 const BOX_EDGE: f64 = 4.0;

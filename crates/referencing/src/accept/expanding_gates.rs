@@ -1,7 +1,13 @@
 //! Expanding gates: the search is repeated with larger gates, then without a prior.
 
-use super::{Attempt, Outcome, RejectionReason};
-use crate::{Prior, PriorBound, Rejected};
+use super::{
+    outcome::{Attempt, Outcome},
+    rejection::RejectionReason,
+};
+use crate::{
+    problem::{Prior, PriorBound},
+    search::identification::Rejected,
+};
 
 /// Growth factors of the gates, in order.
 const GROWTH: [f64; 2] = [2.0, 4.0];
@@ -41,7 +47,6 @@ fn nothing(outcome: &Outcome) -> bool {
         Outcome::Rejected(rejection) => match rejection {
             RejectionReason::Search(why) => !matches!(why, Rejected::Budget { .. } | Rejected::TooLarge { .. }),
             RejectionReason::TooFew { .. }
-            | RejectionReason::AContrario { .. }
             | RejectionReason::Absent { .. }
             | RejectionReason::Residuals { .. }
             | RejectionReason::Behind { .. }
@@ -49,7 +54,8 @@ fn nothing(outcome: &Outcome) -> bool {
             RejectionReason::Imprecise { .. }
             | RejectionReason::Hinge { .. }
             | RejectionReason::Attitude { .. }
-            | RejectionReason::Stretched { .. } => false,
+            | RejectionReason::Stretched { .. }
+            | RejectionReason::Inconsistent { .. } => false,
         },
     }
 }

@@ -2,13 +2,18 @@
 
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{Alternative, RejectionReason};
-use crate::{Correspondence, Degenerate, solve::likelihood::Likelihood};
+use super::rejection::RejectionReason;
+use crate::{
+    alternative::Alternative,
+    problem::Correspondence,
+    solve::{degeneracy::Degenerate, likelihood::residuals::Likelihood},
+};
 
 /// A set of pairs with its pose.
 #[derive(Clone)]
 pub(super) struct Hypothesis {
     pub(super) pairs: Vec<Correspondence>,
+    pub(super) edges: Vec<Correspondence>,
     /// The solver's pose.
     pub(super) pose: Transform<Object, Camera>,
     /// The maximum-likelihood pose nearby, with its cost.
@@ -23,14 +28,21 @@ pub(super) struct Hypothesis {
 }
 
 impl Hypothesis {
+    /// The degrees of freedom of χ²: three for each point and four for each edge, less six.
+    pub(super) fn dof(&self) -> usize {
+        (3 * self.pairs.len() + 4 * self.edges.len()).saturating_sub(6)
+    }
+}
+
+impl Hypothesis {
     pub(super) fn alternative(self) -> Alternative {
-        Alternative { object_from_camera: self.pose, pairs: self.pairs, score: self.score }
+        Alternative { object_from_camera: self.pose, pairs: self.pairs, edges: self.edges, score: self.score }
     }
 }
 
 /// The order by falling score; equal scores are ordered by their pairs.
 pub(super) fn by_score(a: &Hypothesis, b: &Hypothesis) -> std::cmp::Ordering {
-    b.score.total_cmp(&a.score).then_with(|| a.pairs.cmp(&b.pairs))
+    b.score.total_cmp(&a.score).then_with(|| a.pairs.cmp(&b.pairs)).then_with(|| a.edges.cmp(&b.edges))
 }
 
 /// The reason for which a hypothesis fails.

@@ -1,14 +1,27 @@
 //! The integrity of a fix: protection levels that include wrong matches.
 
-use nalgebra::Matrix3;
-use seafix_geometry::{Camera, Covariance6, Object, Transform, so3};
+use nalgebra::Matrix6;
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
-use super::{Acceptance, transfer::Transfer};
+use super::{acceptance::Acceptance, transfer::Transfer};
 use crate::{
-    Observations, ScaleError,
-    candidates::chi_square,
-    solve::likelihood::{leave_out::Deletions, scale_error::isotropic},
+    observations::Observations,
+    solve::likelihood::{
+        leave_out::Deletions,
+        mixed::ENOUGH,
+        scale_error::{ScaleError, isotropic},
+    },
 };
+use consistency::Hypotheses;
+pub(super) use protection::semi_axes;
+use protection::{apart, block, longer_than, radius};
+
+pub(crate) mod consistency;
+mod parts;
+mod protection;
+
+pub use consistency::Consistency;
+pub use protection::Protection;
 
 /// The grade of redundancy for wrong matches, by the number of points.
 ///
@@ -35,6 +48,24 @@ impl Redundancy {
         }
     }
 
+    /// The grade of points and edges: by the number of features that can be spared, whichever they are.
+    ///
+    /// Three points, two points and an edge, or two edges determine a pose; a point counts two of six, an edge three.
+    pub(super) fn of_features(points: usize, edges: usize) -> Self {
+        if edges == 0 {
+            return Self::of(points);
+        }
+        let enough = |spared: usize| {
+            let of_edges = spared.min(edges);
+            2 * points.saturating_sub(spared - of_edges) + 3 * (edges - of_edges) >= ENOUGH
+        };
+        match (enough(1), enough(2)) {
+            (false, _) => Self::Unmonitored,
+            (true, false) => Self::Detectable,
+            (true, true) => Self::Excludable,
+        }
+    }
+
     /// The name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -43,41 +74,6 @@ impl Redundancy {
             Self::Excludable => "excludable",
         }
     }
-}
-
-/// Protection levels: radii that the errors of a fix exceed with at most the stated risk.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Protection {
-    /// The level of the camera's position in the object frame (m).
-    pub position: f64,
-    /// The level of the attitude (rad).
-    pub attitude: f64,
-}
-
-impl Protection {
-    /// The fault-free radii: errors with this covariance exceed each with the given probability.
-    pub(super) fn quiet(covariance: &Covariance6<Object, Camera>, probability: f64) -> Self {
-        let (position, attitude) = semi_axes(covariance);
-        let quiet = radius(probability);
-        Self { position: quiet * position, attitude: quiet * attitude }
-    }
-
-    /// Raises the levels to cover another pose with the same precision as `quiet`.
-    pub(super) fn cover(&mut self, quiet: &Self, fix: &Transform<Object, Camera>, other: &Transform<Object, Camera>) {
-        let (moved, turned) = apart(fix, other);
-        *self = self.max(&Self { position: moved + quiet.position, attitude: turned + quiet.attitude });
-    }
-
-    /// The larger radii of two.
-    pub(super) fn max(&self, other: &Self) -> Self {
-        Self { position: self.position.max(other.position), attitude: self.attitude.max(other.attitude) }
-    }
-}
-
-/// The distance between two camera poses: position (m) and attitude (rad).
-fn apart(one: &Transform<Object, Camera>, other: &Transform<Object, Camera>) -> (f64, f64) {
-    let moved = (one.translation() - other.translation()).norm();
-    (moved, so3::angle(&(one.rotation().inverse() * other.rotation())))
 }
 
 /// The integrity of a fix beyond its covariance.
@@ -112,6 +108,10 @@ pub struct Integrity {
     pub protection: Option<Protection>,
     /// The scale error between measurement and model; `None` with fewer than four points, since any three fit.
     pub scale_error: Option<ScaleError>,
+    /// The evidence that a part of the object is displaced against the rest.
+    ///
+    /// `None` with fewer than four points, or if [`Acceptance::moved_part_rate`] is zero.
+    pub consistency: Option<Consistency>,
 }
 
 /// Solution separation and the protection levels that follow from it.
@@ -133,16 +133,23 @@ pub(super) struct Separation {
     /// The error is in metres (RMS, one sigma), infinite if the point is indispensable. `None` with fewer than four
     /// points.
     pub(super) hinge: Option<(usize, f64)>,
+    /// The consistency of the object's parts, as [`Integrity::consistency`].
+    pub(super) consistency: Option<Consistency>,
+    /// The increase of the fix's covariance by displaced parts, if their evidence is significant.
+    pub(super) spread: Option<Matrix6<f64>>,
 }
 
 /// Protection levels by solution separation (Blanch and others, *Baseline advanced RAIM user algorithm*, 2015).
 ///
 /// If the points of a set I are wrong matches, the pose x_I without them is undisturbed, and the error of the fix x is
 /// at most |x − x_I| + K σ_I. The separation is used as computed, without a threshold; K σ_I is the radius that x_I
-/// exceeds with its fraction of the risk divided by the rate of such sets. Half of the risk is allotted to the
-/// fault-free case, the other half to one wrong match, or in equal parts to one and to two. Radii are the largest
+/// exceeds with its fraction of the risk divided by the rate of such sets. A third of the risk is allotted to the
+/// fault-free case, a third to a displaced part of the object ([`Hypotheses`]), the rest to one wrong match, or in equal
+/// parts to one and to two. Without the case of a displaced part the others have half each. Radii are the largest
 /// semi-axis times √χ²₃. x_I is the maximum-likelihood pose for every solver. Sets of two require five points, and six
 /// for a level, since any three remaining points fit.
+///
+/// `alert` is the alert limit (m), the largest displacement of a part that is assumed.
 ///
 /// No radius holds if all points are mistaken: the probability `misidentified` of that case is subtracted from the risk
 /// first, and there is no level if nothing remains.
@@ -152,25 +159,28 @@ pub(super) fn protection(
     covariance: &Covariance6<Object, Camera>,
     acceptance: &Acceptance,
     transfer: &Transfer,
+    alert: f64,
     misidentified: f64,
 ) -> Separation {
-    let n = data.points.len();
-    if Redundancy::of(n) == Redundancy::Unmonitored {
+    let n = data.points.len() + data.edges.len();
+    if Redundancy::of_features(data.points.len(), data.edges.len()) == Redundancy::Unmonitored {
         return Separation::default();
     }
     let left = acceptance.risk - misidentified;
     // A NaN leaves nothing.
     let identified = left > 0.0;
     let risk = if identified { left } else { acceptance.risk };
-    let own = Protection::quiet(covariance, 0.5 * risk);
-    let even = || isotropic(&data.points, pose);
-    let Some(deletions) = Deletions::of(data) else {
+    let rate = acceptance.moved_part_rate;
+    let part = if rate > 0.0 { 1.0 / 3.0 } else { 0.5 } * risk;
+    let own = Protection::quiet(covariance, part);
+    let even = || isotropic(&data.points, pose).filter(|_| data.points.len() > 3);
+    let Some(deletions) = Deletions::near(data, pose) else {
         return Separation { scale_error: even(), hinge: Some((0, f64::INFINITY)), ..Separation::default() };
     };
     let scale_error = deletions.scale_error.or_else(even);
     let mut watch = Watch { pose, transfer, deletions, level: own, spared: true, hinge: None };
     let twice = acceptance.two_wrong_rate > 0.0;
-    let fraction = if twice { 0.25 } else { 0.5 } * risk;
+    let fraction = if twice { 0.5 } else { 1.0 } * part;
     let ones = (0..n).map(|out| [out]);
     let one = watch.farthest(ones, (fraction / acceptance.wrong_match_rate).min(1.0));
     let two = (twice && n >= 5).then_some(()).and_then(|()| {
@@ -178,7 +188,17 @@ pub(super) fn protection(
         watch.farthest(twos, (fraction / acceptance.two_wrong_rate).min(1.0))
     });
     let available = identified && watch.spared && (!twice || n >= 6);
-    Separation { one, two, protection: available.then_some(watch.level), scale_error, hinge: watch.hinge }
+    let Watch { deletions, mut level, hinge, .. } = watch;
+    let places = deletions.places.clone();
+    let hypotheses =
+        (rate > 0.0).then(|| Hypotheses::of(&deletions, &places, alert, transfer.rms(covariance))).flatten();
+    let consistency = hypotheses.as_ref().map(Hypotheses::consistency);
+    if let Some(hypotheses) = hypotheses.as_ref().filter(|_| available) {
+        hypotheses.cover(&mut level, &deletions, pose, rate, part);
+    }
+    let significant = consistency.is_some_and(|found| found.bayes_factor > acceptance.max_bayes_factor());
+    let spread = hypotheses.filter(|_| significant).map(|all| all.spread(&deletions, pose, covariance, rate));
+    Separation { one, two, protection: available.then_some(level), scale_error, hinge, consistency, spread }
 }
 
 /// The exclusion of points from a fix, and the maxima so far.
@@ -234,37 +254,9 @@ impl Watch<'_> {
     }
 }
 
-/// The largest semi-axis of a covariance, if it may exceed `limit`; the root of the matrix's norm bounds it.
-fn longer_than(limit: f64, covariance: &Matrix3<f64>) -> Option<f64> {
-    /// Upper bound of the rounding of the norm.
-    const ROUNDED: f64 = 1.0 + 1e-12;
-    // A NaN is included.
-    (!(covariance.norm().sqrt() * ROUNDED <= limit)).then(|| semi_axis(covariance))
-}
-
-/// The largest semi-axis of a covariance.
-fn semi_axis(covariance: &Matrix3<f64>) -> f64 {
-    covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
-}
-
-/// The block of the attitude (`first` = 0) or of the position (3).
-fn block(covariance: &Covariance6<Object, Camera>, first: usize) -> Matrix3<f64> {
-    covariance.matrix.fixed_view::<3, 3>(first, first).into()
-}
-
 /// Largest standard deviation of the attitude (rad) for a level; beyond it other local minima are near, and no Gaussian
 /// radius bounds the error.
 const WEAK: f64 = 0.035;
-
-/// The largest standard deviations of position (m) and attitude (rad) over all directions.
-pub(super) fn semi_axes(covariance: &Covariance6<Object, Camera>) -> (f64, f64) {
-    (semi_axis(&block(covariance, 3)), semi_axis(&block(covariance, 0)))
-}
-
-/// The radius, in standard deviations, that a three-dimensional normal vector exceeds with this probability.
-fn radius(probability: f64) -> f64 {
-    chi_square(3, 1.0 - probability).sqrt()
-}
 
 #[cfg(test)]
 mod tests;

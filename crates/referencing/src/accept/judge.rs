@@ -1,23 +1,32 @@
 //! The tests of a set of pairs and of its alternatives.
 
-use nalgebra::Vector3;
+use std::collections::BTreeSet;
+
+use nalgebra::{Matrix6, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, StereoRig, Transform};
 
 use super::{
-    Acceptance, Alternative, Fix, Outcome, RejectionReason,
+    acceptance::Acceptance,
+    apart::rms_apart,
     hypothesis::{Fallen, Hypothesis, by_score},
     integrity::{Integrity, Protection, Redundancy, protection, semi_axes},
-    rms_apart,
+    outcome::{BestPose, Fix, Outcome},
+    probability::Probability,
+    rejection::RejectionReason,
     transfer::Transfer,
 };
 use crate::{
-    Correspondence, Degenerate, Identification, ModelPoint, Observations, Prior, PriorBound, Problem, Solver,
-    a_contrario::expected_sets,
-    candidates::chi_square,
-    search::elsewhere,
+    alternative::Alternative,
+    chi_square::chi_square,
+    observations::Observations,
+    problem::{Correspondence, Prior, PriorBound, Problem},
+    search::{grow::elsewhere, identification::Identification},
+    site::model::ModelPoint,
     solve::{
-        AlternativePose,
-        likelihood::{self, Likelihood},
+        covariance::association::association,
+        degeneracy::Degenerate,
+        likelihood::{self, descent::Linearized, initial_poses::AlternativePose, mixed::Mixed, residuals::Likelihood},
+        solver::Solver,
     },
 };
 
@@ -33,29 +42,27 @@ pub(super) struct Judge<'a> {
     /// Whether a search selected the sets, so that false alarms are possible.
     pub(super) searched: bool,
     pub(super) rig: Option<&'a StereoRig>,
+    /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
+    pub(super) near: Option<Transform<Object, Camera>>,
 }
 
 impl Judge<'_> {
-    pub(super) fn size(&self, pairs: &[Correspondence]) -> Result<(), RejectionReason> {
+    /// Whether points and edges are enough: the required number of features, and at least those that fix a pose.
+    pub(super) fn size(&self, pairs: &[Correspondence], edges: &[Correspondence]) -> Result<(), RejectionReason> {
         let needed = self.acceptance.min_points.max(self.solver.minimum());
-        match pairs.len() {
+        let edges = if self.solver.takes_edges() { edges.len() } else { 0 };
+        match pairs.len() + edges {
             enough if enough >= needed => Ok(()),
             few => Err(RejectionReason::TooFew { found: few, needed }),
         }
     }
 
+    /// Whether a set that a search counted is improbable to be a false alarm.
     pub(super) fn a_contrario(&self, pairs: &[Correspondence]) -> Result<(), RejectionReason> {
-        if !self.searched {
-            return Ok(());
+        match self.searched {
+            true => self.present(Probability::counted(self.problem, pairs).wrong, pairs.len()),
+            false => Ok(()),
         }
-        self.rare(pairs.len(), expected_sets(self.problem, pairs))
-    }
-
-    /// Whether the NFA of a set of this size is within its limit.
-    pub(super) fn rare(&self, size: usize, expected: f64) -> Result<(), RejectionReason> {
-        let budget = self.acceptance.max_nfa;
-        // A NaN is rejected as well.
-        if expected <= budget { Ok(()) } else { Err(RejectionReason::AContrario { size, expected, budget }) }
     }
 
     /// The outcome of the set and its alternatives: one pose, several, or none.
@@ -71,8 +78,10 @@ impl Judge<'_> {
             }
         };
         let mut full: Vec<(usize, Hypothesis)> = Vec::new();
-        for (place, pairs) in std::iter::once(&found.pairs).chain(&found.alternatives).enumerate() {
-            match self.hypothesis(pairs) {
+        let others = found.alternatives.iter().map(|pairs| (pairs, &[][..]));
+        let sets = std::iter::once((&found.pairs, &found.edges[..])).chain(others);
+        for (place, (pairs, edges)) in sets.enumerate() {
+            match self.hypothesis_of(pairs, edges) {
                 Ok(hypothesis) => full.push((place, hypothesis)),
                 Err(degenerate) => fell(place, Fallen::Degenerate(degenerate)),
             }
@@ -163,20 +172,51 @@ impl Judge<'_> {
         (Outcome::Fix(fix), Some(other))
     }
 
-    fn observations(&self, pairs: &[Correspondence]) -> Observations<'_> {
-        Observations::of(pairs, self.problem.model, self.problem.cloud, self.rig)
+    /// The pose of a rejected set, for users with a threshold of their own; `None` if the pairs determine none.
+    pub(super) fn best_pose(&self, pairs: &[Correspondence], edges: &[Correspondence]) -> Option<BestPose> {
+        let data = self.observations(pairs, edges);
+        let pose = self.solve(&data).ok()?;
+        let covariance = self.solver.covariance(&data, &pose).ok();
+        Some(BestPose { object_from_camera: pose, covariance, pairs: pairs.to_vec(), edges: edges.to_vec() })
+    }
+
+    fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        match &self.near {
+            Some(near) => self.solver.solve_near(data, near),
+            None => self.solver.solve(data),
+        }
+    }
+
+    /// The observations of the pairs; without edges for a solver that does not take them.
+    fn observations(&self, pairs: &[Correspondence], edges: &[Correspondence]) -> Observations<'_> {
+        let points = Observations::of(pairs, self.problem.model, self.problem.cloud, self.rig);
+        if edges.is_empty() || !self.solver.takes_edges() {
+            return points;
+        }
+        points.with_edges(edges, self.problem.edges.model, self.problem.model, self.problem.edges.lines)
     }
 
     /// The pose of the pairs: the best of the solver's alternatives that pass residuals, prior and visibility, with the
     /// rest as alternatives.
     pub(super) fn hypothesis(&self, pairs: &[Correspondence]) -> Result<Hypothesis, Degenerate> {
-        let data = self.observations(pairs);
-        let pose = self.solver.solve(&data)?;
+        self.hypothesis_of(pairs, &[])
+    }
+
+    /// The pose of points and edges, as [`hypothesis`](Self::hypothesis).
+    pub(super) fn hypothesis_of(
+        &self,
+        pairs: &[Correspondence],
+        edges: &[Correspondence],
+    ) -> Result<Hypothesis, Degenerate> {
+        let edges = if self.solver.takes_edges() { edges } else { &[] };
+        let data = self.observations(pairs, edges);
+        let pose = self.solve(&data)?;
         let likelihood = likelihood::maximum(&data, &pose);
         let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
         let of = |pose, likelihood: Likelihood| {
             let score = -0.5 * (likelihood.cost + fewer + self.off_prior(&likelihood.pose));
-            Hypothesis { pairs: pairs.to_vec(), pose, likelihood, score, covariance: None, alternatives: Vec::new() }
+            let (pairs, edges) = (pairs.to_vec(), edges.to_vec());
+            Hypothesis { pairs, edges, pose, likelihood, score, covariance: None, alternatives: Vec::new() }
         };
         let own = of(pose, likelihood);
         let others = self.solver.alternatives(&data, &pose, chi_square(1, self.acceptance.confidence));
@@ -207,7 +247,7 @@ impl Judge<'_> {
 
     /// Whether a rigid motion explains the set within its noise (χ² test).
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
-        let dof = 3 * hypothesis.pairs.len() - 6;
+        let dof = hypothesis.dof();
         let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(dof, self.acceptance.confidence));
         // A NaN is rejected as well.
         if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
@@ -234,10 +274,31 @@ impl Judge<'_> {
         if let Some(known) = hypothesis.covariance {
             return Ok(known);
         }
-        let data = self.observations(&hypothesis.pairs);
-        let covariance = self.solver.covariance(&data, &hypothesis.pose).map_err(Fallen::Degenerate)?;
+        let covariance = self.covariance_of(hypothesis).map_err(Fallen::Degenerate)?;
         hypothesis.covariance = Some(covariance);
         Ok(covariance)
+    }
+
+    /// The covariance of a pose by noise and, if a search selected the pairs, by data association.
+    fn covariance_of(&self, hypothesis: &Hypothesis) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        let Hypothesis { pairs, edges, pose, .. } = hypothesis;
+        let data = self.observations(pairs, edges);
+        let covariance = self.solver.covariance(&data, pose)?;
+        if !self.searched || pairs.is_empty() {
+            return Ok(covariance);
+        }
+        let of_edges = match edges.is_empty() {
+            true => Matrix6::zeros(),
+            false => information_of_edges(&data, pose)?,
+        };
+        let taken: BTreeSet<usize> = pairs.iter().map(|pair| pair.cloud).collect();
+        let others = pairs.iter().map(|pair| {
+            let list = self.problem.candidates.lists[pair.model].iter().filter(|cloud| !taken.contains(cloud));
+            list.map(|&cloud| self.problem.cloud[cloud].position).collect()
+        });
+        let others: Vec<Vec<_>> = others.collect();
+        let detected = pairs.len() as f64 / self.problem.model.len() as f64;
+        Ok(Covariance6::new(covariance.matrix + association(&data, pose, &others, detected, &of_edges)))
     }
 
     /// Whether the pose agrees with the prior.
@@ -264,9 +325,10 @@ impl Judge<'_> {
         let camera = hypothesis.pose.translation();
         let angle = |point: &ModelPoint| point.incidence_angle(&camera).unwrap_or(0.0);
         let points = hypothesis.pairs.iter().map(|pair| &self.problem.model[pair.model]);
-        let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b))).expect("a rejected set has points");
-        let (point, max) = (worst.id.clone(), ModelPoint::max_incidence_angle());
-        Err(Fallen::Refused(RejectionReason::Behind { point, angle: angle(worst), max }))
+        let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b)));
+        let (point, angle) = worst.map_or_else(Default::default, |worst| (worst.id.clone(), angle(worst)));
+        let max = ModelPoint::max_incidence_angle();
+        Err(Fallen::Refused(RejectionReason::Behind { point, angle, max }))
     }
 
     /// The distance of the identified model points from their prior positions, relative to its limit.
@@ -300,13 +362,25 @@ impl Judge<'_> {
     /// It applies to sets that a search selected. If the visible points of a large model are few, close together or in
     /// a row, many wrong poses are possible; a clutter point near one of them makes a wrong pose look precise. Three
     /// points cannot be tested: each is needed.
-    fn without_any_one(&self, hypothesis: &Hypothesis, hinge: Option<(usize, f64)>) -> Result<(), RejectionReason> {
+    ///
+    /// `all` is the predicted error of the complete set, whose own test it passed. A pose does not depend on a point
+    /// whose exclusion changes the predicted error by less than [`CARRIED`]: otherwise a pose of hundreds of points that
+    /// is just precise enough would fail by the loss of any of them.
+    fn without_any_one(
+        &self,
+        hypothesis: &Hypothesis,
+        hinge: Option<(usize, f64)>,
+        all: f64,
+    ) -> Result<(), RejectionReason> {
         let Some((place, rms)) = hinge.filter(|_| self.searched) else { return Ok(()) };
         // A NaN is rejected as well.
-        if 2.0 * rms <= self.alert_limit {
+        if 2.0 * rms <= self.alert_limit || rms <= (1.0 + CARRIED) * all {
             return Ok(());
         }
-        let point = self.problem.model[hypothesis.pairs[place].model].id.clone();
+        let point = match place.checked_sub(hypothesis.pairs.len()) {
+            None => self.problem.model[hypothesis.pairs[place].model].id.clone(),
+            Some(edge) => self.problem.edges.model[hypothesis.edges[edge].model].id.clone(),
+        };
         Err(RejectionReason::Hinge { point, rms, limit: self.alert_limit })
     }
 
@@ -332,6 +406,16 @@ impl Judge<'_> {
         }
     }
 
+    /// Whether no part of the object is significantly displaced, or the effect on the pose within the alert limit.
+    ///
+    /// `rms` is the predicted error of the model points, which includes the displacement.
+    fn consistent(&self, integrity: &Integrity, points: usize, rms: f64) -> Result<(), RejectionReason> {
+        let limit = self.acceptance.max_bayes_factor();
+        let significant = integrity.consistency.filter(|found| found.bayes_factor > limit);
+        let Some(consistency) = significant.filter(|_| !(2.0 * rms <= self.alert_limit)) else { return Ok(()) };
+        Err(RejectionReason::Inconsistent { consistency, points, limit, rms, alert_limit: self.alert_limit })
+    }
+
     /// Raises the protection levels to cover other poses within the alert limit.
     ///
     /// It covers poses whose probability relative to the fix is at least [`COVERED`] of the risk.
@@ -344,28 +428,32 @@ impl Judge<'_> {
 
     /// Raises the protection levels to this probability of misidentification; levels raised before are kept.
     pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
-        let data = self.observations(&fix.pairs);
+        let data = self.observations(&fix.pairs, &fix.edges);
         let pose = &fix.object_from_camera;
         let transfer = Transfer::of(self.problem.model, pose);
-        let level = protection(&data, pose, &fix.covariance, self.acceptance, &transfer, misidentified).protection;
+        let level =
+            protection(&data, pose, &fix.covariance, self.acceptance, &transfer, self.alert_limit, misidentified)
+                .protection;
         let known = fix.integrity.protection.take();
         fix.integrity.protection = known.zip(level).map(|(known, level)| known.max(&level));
         fix.integrity.misidentified = Some(misidentified);
     }
 
     fn fix(&self, hypothesis: Hypothesis, misidentified: Option<f64>) -> Outcome {
-        let data = self.observations(&hypothesis.pairs);
-        let known = hypothesis.covariance.map_or_else(|| self.solver.covariance(&data, &hypothesis.pose), Ok);
+        let data = self.observations(&hypothesis.pairs, &hypothesis.edges);
+        let known = hypothesis.covariance.map_or_else(|| self.covariance_of(&hypothesis), Ok);
         let covariance = match known {
             Ok(covariance) => covariance,
             Err(why) => return Outcome::Degenerate(why),
         };
         let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
         let mistaken = misidentified.unwrap_or(0.0);
-        let left_out = protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, mistaken);
-        let dof = 3 * hypothesis.pairs.len() - 6;
+        let left_out =
+            protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, self.alert_limit, mistaken);
+        let covariance = left_out.spread.map_or(covariance, |spread| Covariance6::new(covariance.matrix + spread));
+        let dof = hypothesis.dof();
         let integrity = Integrity {
-            redundancy: Redundancy::of(hypothesis.pairs.len()),
+            redundancy: Redundancy::of_features(hypothesis.pairs.len(), hypothesis.edges.len()),
             chi2: hypothesis.likelihood.cost,
             dof,
             chi2_limit: chi_square(dof, self.acceptance.confidence),
@@ -374,9 +462,12 @@ impl Judge<'_> {
             misidentified,
             protection: left_out.protection,
             scale_error: left_out.scale_error,
+            consistency: left_out.consistency,
         };
-        let stands = self.without_any_one(&hypothesis, left_out.hinge);
-        if let Err(rejection) = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity)) {
+        let features = hypothesis.pairs.len() + hypothesis.edges.len();
+        let stands = self.without_any_one(&hypothesis, left_out.hinge, transfer.rms(&covariance));
+        let stands = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity));
+        if let Err(rejection) = stands.and_then(|()| self.consistent(&integrity, features, transfer.rms(&covariance))) {
             return Outcome::Rejected(rejection);
         }
         Outcome::Fix(Box::new(Fix {
@@ -388,12 +479,24 @@ impl Judge<'_> {
             score: hypothesis.score,
             integrity,
             pairs: hypothesis.pairs,
+            edges: hypothesis.edges,
         }))
     }
 }
 
+/// The information of the edges alone on the pose, their model errors independent.
+fn information_of_edges(data: &Observations<'_>, pose: &Transform<Object, Camera>) -> Result<Matrix6<f64>, Degenerate> {
+    let all = Mixed::of(data, None, data.rig)?.each(pose)?;
+    Ok(all[data.points.len()..].iter().map(Linearized::information).sum())
+}
+
 /// Fraction of the risk: poses near the fix with a smaller relative probability need no coverage.
 const COVERED: f64 = 0.01;
+
+/// Fraction of the predicted error by which the exclusion of a point changes it if a pose depends on the point.
+///
+/// One of k equal points changes it by 1/(2k): by 13 % for four, 5 % for ten.
+const CARRIED: f64 = 0.05;
 
 /// Number of standard deviations that are added to the scale error.
 const UNDERSTATED: f64 = 2.0;

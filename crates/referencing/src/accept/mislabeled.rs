@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use statrs::function::beta::beta_reg;
 
 use super::{hypothesis::Hypothesis, judge::Judge};
-use crate::{Correspondence, search::fraction};
+use crate::{problem::Correspondence, search::pose::fraction};
 
 impl Judge<'_> {
     /// The likelihood ratio of the proposed pairs: `other` correct over `own` correct.

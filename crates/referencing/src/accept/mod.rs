@@ -1,37 +1,47 @@
 //! Acceptance: the tests between a search's result and a fix or a rejection.
 
 use rand::Rng;
-use seafix_geometry::{Camera, Object, StereoRig, Transform};
+use seafix_geometry::StereoRig;
 
 use crate::{
-    BoundingBox, Correspondence, Degenerate, Identification, ModelPoint, Problem, Rejected, Search, Solver,
     a_contrario::AContrario,
-    site::diameter,
-    solve::{ON_A_LINE, second_ratio},
+    problem::{Correspondence, Problem},
+    search::identification::{Identification, Rejected, Search},
+    site::{bounding_box::BoundingBox, model::ModelPoint, target::diameter},
+    solve::{
+        degeneracy::{Degenerate, ON_A_LINE, second_ratio},
+        solver::Solver,
+    },
 };
 
-mod absence;
-mod acceptance;
+pub(crate) mod acceptance;
 mod admitted;
+pub(crate) mod apart;
 mod exclusion;
-mod expanding_gates;
+pub(crate) mod expanding_gates;
 mod hypothesis;
-mod integrity;
+pub(crate) mod integrity;
 mod judge;
+pub(crate) mod max_p_wrong;
 mod mislabeled;
-mod outcome;
+pub(crate) mod outcome;
 mod posterior_gate;
+pub(crate) mod probability;
 mod rejection;
 mod self_symmetry;
 mod transfer;
 
+pub use crate::alternative::Alternative;
 pub use acceptance::Acceptance;
+pub use apart::rms_apart;
 pub use expanding_gates::{search_with_expanding_gates, wider};
-pub use integrity::{Integrity, Protection, Redundancy};
-pub use outcome::{Alternative, Attempt, Fix, Outcome};
+pub use integrity::{Consistency, Integrity, Protection, Redundancy};
+pub use max_p_wrong::MaxPWrong;
+pub use outcome::{Attempt, BestPose, Fix, Outcome};
 pub use rejection::RejectionReason;
 
 use judge::Judge;
+use probability::{Evidence, Probability};
 
 /// One attempt at a fix after Stage 1: search (Stage 2), rigid motion, acceptance tests.
 ///
@@ -69,37 +79,71 @@ pub fn judge(
         }
     };
     let alert_limit = alert_limit(problem.model, acceptance);
+    let found = match solver.takes_edges() {
+        true => found,
+        false => Identification { edges: Vec::new(), ..found },
+    };
     let largest = std::iter::once(&found.pairs).chain(&found.alternatives).map(Vec::len).max().unwrap_or(0);
-    let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig };
+    let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
+    let near = best.map(|best| best.object_from_camera);
+    let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig, near };
     let a_contrario = AContrario::of(problem, &found.pairs);
-    let likely = judge.size(&found.pairs).and_then(|()| match found.posterior {
-        Some(_) => Ok(()),
-        None => judge.a_contrario(&found.pairs),
-    });
-    let (outcome, runner_up) = match (likely, &found.posterior) {
-        (Ok(()), Some(posterior)) => judge.weighted(&found, posterior, &a_contrario),
-        (Ok(()), None) => judge.poses(&found, None),
+    let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario);
+    let mut probability = evidence.probability();
+    let sized = judge.size(&found.pairs, &found.edges);
+    let (outcome, runner_up) = match (sized, &found.posterior) {
+        (Ok(()), Some(posterior)) => {
+            let (outcome, runner_up, of_outcome) = judge.weighted(&found, posterior, &evidence, probability);
+            probability = of_outcome;
+            (outcome, runner_up)
+        }
+        (Ok(()), None) => match judge.present(probability.wrong, found.pairs.len()) {
+            Ok(()) => judge.poses(&found, None),
+            Err(rejection) => (Outcome::Rejected(rejection), None),
+        },
         (Err(rejection), _) => (Outcome::Rejected(rejection), None),
     };
-    let outcome = judge.distinguished(outcome, found.posterior.is_some());
+    // The search compares the poses of edges with those of a self-symmetry itself.
+    let outcome = match found.edges.is_empty() {
+        true => judge.distinguished(outcome, found.posterior.is_some(), &mut probability),
+        false => outcome,
+    };
     let (outcome, runner_up) = match (outcome, runner_up) {
         (Outcome::Fix(fix), None) if found.posterior.is_none() => judge.against_elsewhere(fix),
         known => known,
     };
+    if let (Outcome::Ambiguous(all), None) = (&outcome, &found.posterior) {
+        probability = probability.among(all.len());
+    }
     let outcome = match &found.undecided {
         Some(why @ Rejected::Mirrored { .. }) => Outcome::Rejected(why.clone().into()),
         Some(why) if !settled(&outcome, found.optimal) => Outcome::Rejected(why.clone().into()),
         _ => outcome,
     };
-    let outcome = on_a_line(problem).map_or(outcome, Outcome::Degenerate);
+    let line = if found.edges.is_empty() { on_a_line(problem) } else { None };
+    let outcome = line.map_or(outcome, Outcome::Degenerate);
     let nfa = match &outcome {
-        Outcome::Fix(fix) if fix.pairs != found.pairs => AContrario::of(problem, &fix.pairs).sets_as_good(),
+        _ if !found.edges.is_empty() => evidence.nfa(),
+        Outcome::Fix(fix) if fix.pairs != found.pairs => {
+            if found.posterior.is_none() {
+                probability = Probability::counted(problem, &fix.pairs);
+            }
+            AContrario::of(problem, &fix.pairs).sets_as_good()
+        }
         _ => a_contrario.sets_as_good(),
+    };
+    let best = match &outcome {
+        Outcome::Fix(_) | Outcome::Degenerate(_) => None,
+        Outcome::Ambiguous(all) => all.first().and_then(|first| judge.best_pose(&first.pairs, &first.edges)),
+        Outcome::Rejected(_) => judge.best_pose(&found.pairs, &found.edges),
     };
     // A proof for the complete set does not hold for a subset.
     let thinned = matches!(&outcome, Outcome::Fix(fix) if fix.pairs.len() < found.pairs.len());
     Attempt {
         nfa: Some(nfa),
+        p_absent: Some(probability.absent),
+        p_wrong: Some(probability.wrong),
+        best,
         outcome,
         runner_up,
         optimal: found.optimal && !thinned,
@@ -108,6 +152,7 @@ pub fn judge(
         copies_sought: found.posterior.as_ref().and_then(|posterior| posterior.copies_sought),
         evidence_gap: found.posterior.as_ref().and_then(|posterior| posterior.evidence_gap),
         identified: found.pairs,
+        identified_edges: found.edges,
     }
 }
 
@@ -122,16 +167,25 @@ pub fn judge_labelled(
     rig: Option<&StereoRig>,
 ) -> Attempt {
     let alert_limit = alert_limit(problem.model, acceptance);
-    let judge = Judge { problem, solver, acceptance, alert_limit, largest: pairs.len(), searched: false, rig };
+    let judge =
+        Judge { problem, solver, acceptance, alert_limit, largest: pairs.len(), searched: false, rig, near: None };
     let consensus_bound = pairs.len();
     let found = Identification::unproved(pairs, consensus_bound, 0);
-    let (outcome, runner_up) = match judge.size(&found.pairs) {
+    let (outcome, runner_up) = match judge.size(&found.pairs, &found.edges) {
         Ok(()) => judge.poses(&found, None),
         Err(rejection) => (Outcome::Rejected(rejection), None),
     };
+    let best = match &outcome {
+        Outcome::Rejected(_) => judge.best_pose(&found.pairs, &found.edges),
+        _ => None,
+    };
     Attempt {
         outcome,
+        p_absent: None,
+        p_wrong: None,
+        best,
         identified: found.pairs,
+        identified_edges: found.edges,
         runner_up,
         optimal: false,
         consensus_bound: None,
@@ -170,16 +224,7 @@ pub(crate) fn alert_limit(model: &[ModelPoint], acceptance: &Acceptance) -> f64 
 fn settled(outcome: &Outcome, optimal: bool) -> bool {
     match outcome {
         Outcome::Ambiguous(_) => true,
-        Outcome::Rejected(
-            RejectionReason::TooFew { .. } | RejectionReason::AContrario { .. } | RejectionReason::Absent { .. },
-        ) => optimal,
+        Outcome::Rejected(RejectionReason::TooFew { .. } | RejectionReason::Absent { .. }) => optimal,
         _ => false,
     }
-}
-
-/// The RMS distance (m) between the model points as two poses place them.
-pub fn rms_apart(model: &[ModelPoint], a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> f64 {
-    let (a, b) = (a.inverse(), b.inverse());
-    let sum: f64 = model.iter().map(|point| (a * point.at - b * point.at).norm_squared()).sum();
-    (sum / model.len().max(1) as f64).sqrt()
 }

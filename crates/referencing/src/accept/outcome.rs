@@ -5,8 +5,10 @@ use std::fmt;
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
 
-use super::{Integrity, RejectionReason};
-use crate::{Correspondence, Degenerate, Rejected};
+use super::{integrity::Integrity, probability::Probability, rejection::RejectionReason};
+use crate::{
+    alternative::Alternative, problem::Correspondence, search::identification::Rejected, solve::degeneracy::Degenerate,
+};
 
 /// A fix: the camera's pose relative to the target, with covariance and integrity.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +19,8 @@ pub struct Fix {
     pub covariance: Covariance6<Object, Camera>,
     /// The identified pairs.
     pub pairs: Vec<Correspondence>,
+    /// The identified edges: model edge and measured line.
+    pub edges: Vec<Correspondence>,
     /// The indices into `pairs` of the points that determine the pose: all of them, or the three of the triad.
     pub used: Vec<usize>,
     /// The residual C·H − P of each pair (m, object frame).
@@ -25,9 +29,9 @@ pub struct Fix {
     pub residual_rms: f64,
     /// The score of the pose; larger is better.
     ///
-    /// A counting search scores −χ²/2 of residuals and prior, minus χ²₃(confidence)/2 for each pair fewer than in the
-    /// largest set: a truncated χ², by which sets of different sizes compare. A search that weighs evidence scores the
-    /// log evidence (nats).
+    /// For a counting search it is −χ²/2 of residuals and prior, minus χ²₃(confidence)/2 for each pair that the
+    /// largest tested set has in addition: a truncated χ², which makes sets of different sizes comparable. For a
+    /// search that weighs evidence it is the log evidence (nats).
     pub score: f64,
     /// The integrity of the fix: redundancy, residual test, solution separation, protection levels.
     pub integrity: Integrity,
@@ -46,19 +50,26 @@ impl Fix {
 
     /// The fix as one of several alternatives.
     pub(super) fn alternative(self) -> Alternative {
-        Alternative { object_from_camera: self.object_from_camera, pairs: self.pairs, score: self.score }
+        Alternative {
+            object_from_camera: self.object_from_camera,
+            pairs: self.pairs,
+            edges: self.edges,
+            score: self.score,
+        }
     }
 }
 
-/// An alternative pose that explains the data nearly as well.
+/// The best pose of an answer that is no fix.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Alternative {
+pub struct BestPose {
     /// The camera's pose in the object frame.
     pub object_from_camera: Transform<Object, Camera>,
+    /// The covariance of the pose; `None` if the pairs determine none.
+    pub covariance: Option<Covariance6<Object, Camera>>,
     /// The pairs that support the pose.
     pub pairs: Vec<Correspondence>,
-    /// The score of the pose, defined as [`Fix::score`].
-    pub score: f64,
+    /// The edges that support the pose.
+    pub edges: Vec<Correspondence>,
 }
 
 /// The outcome of one attempt at a fix.
@@ -99,9 +110,19 @@ impl Outcome {
     pub fn explanation(&self) -> Option<String> {
         match self {
             Self::Fix(_) => None,
-            Self::Ambiguous(alternatives) => Some(format!("{} poses fit; narrow the prior", alternatives.len())),
+            Self::Ambiguous(alternatives) => Some(format!("{} poses fit", alternatives.len())),
             Self::Rejected(rejection) => Some(rejection.to_string()),
             Self::Degenerate(degenerate) => Some(degenerate.to_string()),
+        }
+    }
+
+    /// What helps against the missing pose, in one phrase; `None` for a fix.
+    pub fn remedy(&self) -> Option<&'static str> {
+        match self {
+            Self::Fix(_) => None,
+            Self::Ambiguous(_) => Some("narrow the prior"),
+            Self::Rejected(rejection) => Some(rejection.remedy()),
+            Self::Degenerate(degenerate) => Some(degenerate.remedy()),
         }
     }
 }
@@ -113,13 +134,16 @@ impl fmt::Display for Outcome {
             (Self::Fix(fix), _) => {
                 write!(
                     f,
-                    "{}: {} points, position ± {:.1} mm",
+                    "{}: {} points{}, position ± {:.1} mm",
                     self.name(),
                     fix.pairs.len(),
+                    if fix.edges.is_empty() { String::new() } else { format!(", {} edges", fix.edges.len()) },
                     1e3 * fix.position_sigma()
                 )
             }
-            (_, Some(explanation)) => write!(f, "{}: {explanation}", self.name()),
+            (_, Some(explanation)) => {
+                write!(f, "{}: {explanation}; {}", self.name(), self.remedy().unwrap_or_default())
+            }
             (_, None) => f.write_str(self.name()),
         }
     }
@@ -130,8 +154,21 @@ impl fmt::Display for Outcome {
 pub struct Attempt {
     /// The outcome.
     pub outcome: Outcome,
+    /// The probability that the object is absent; `None` for labelled points, which need no search.
+    pub p_absent: Option<f64>,
+    /// The probability that the pose is not the object's: absence and other poses together.
+    ///
+    /// It belongs to the pose of the fix or, without one, to [`best`](Self::best). One without any pose; `None` for
+    /// labelled points.
+    pub p_wrong: Option<f64>,
+    /// The best pose of an answer that is no fix, for a threshold of the user's own.
+    ///
+    /// `None` for a fix, and if the search or its pairs determine no pose.
+    pub best: Option<BestPose>,
     /// The set that the search returned, accepted or rejected; empty if it returned none.
     pub identified: Vec<Correspondence>,
+    /// The edges of that set.
+    pub identified_edges: Vec<Correspondence>,
     /// The best pose beyond the alert limit from the answer; not accepted, for comparison only.
     pub runner_up: Option<Alternative>,
     /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
@@ -182,7 +219,11 @@ impl Attempt {
         Self {
             optimal: why.is_proved(),
             outcome: Outcome::Rejected(why.into()),
+            p_absent: Some(Probability::NOTHING_FOUND.absent),
+            p_wrong: Some(Probability::NOTHING_FOUND.wrong),
+            best: None,
             identified: Vec::new(),
+            identified_edges: Vec::new(),
             runner_up: None,
             consensus_bound,
             nfa: None,

@@ -1,48 +1,63 @@
 //! The acceptance of a search that weighs evidence.
 
-use super::{Alternative, Outcome, absence::Absence, judge::Judge};
-use crate::{Explanation, Identification, Posterior, a_contrario::AContrario};
+use super::{
+    judge::Judge,
+    outcome::Outcome,
+    probability::{Evidence, Probability},
+    rejection::RejectionReason,
+};
+use crate::{
+    alternative::Alternative,
+    search::{
+        identification::Identification,
+        posterior::{Explanation, Posterior},
+    },
+};
 
 impl Judge<'_> {
-    /// The outcome of a search that weighs evidence.
+    /// The outcome of a search that weighs evidence, and the probabilities of its pose.
     ///
-    /// A pose is accepted if absence and other poses are improbable, no second copy of the object exists, and the NFA
-    /// is small.
+    /// A pose is accepted if it is improbable to be wrong and no second copy of the object exists.
     pub(super) fn weighted(
         &self,
         found: &Identification,
         posterior: &Posterior,
-        a_contrario: &AContrario<'_>,
-    ) -> (Outcome, Option<Alternative>) {
-        let probabilities = posterior.probabilities(self.problem.model, self.alert_limit);
-        let elsewhere = posterior.elsewhere(self.problem.model, self.alert_limit);
+        evidence: &Evidence<'_>,
+        probability: Probability,
+    ) -> (Outcome, Option<Alternative>, Probability) {
+        let max = self.acceptance.max_p_wrong;
         let runner_up = posterior.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
-        let absence = Absence::of(self, found, &probabilities, a_contrario);
-        // Two sets that each explain the object are copies; neither is clutter of the other.
-        let even = probabilities.absent - probabilities.clutter;
-        if absence.rejection(even).is_none()
+        let with_copies = evidence.with_copies();
+        let suffices = |ln_evidence: f64| evidence.is_copy(ln_evidence, max.value());
+        if max.allows(with_copies.absent)
             && let Some(best) = posterior.explanations.first()
-            && let Some(copy) = posterior.copy(self.problem.model, self.alert_limit, absence.max().max(even))
+            && let Some(copy) = posterior.copy(self.problem.model, self.alert_limit, suffices)
         {
-            return (Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]), None);
+            let copies = Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]);
+            return (copies, None, with_copies.among(2));
         }
-        if let Some(rejection) = absence.rejection(probabilities.absent) {
-            return (Outcome::Rejected(rejection), runner_up);
+        if let Err(rejection) = self.present(probability.absent, found.pairs.len()) {
+            return (Outcome::Rejected(rejection), runner_up, probability);
         }
-        if let Err(rejection) = self.rare(found.pairs.len(), a_contrario.sets_as_good()) {
-            return (Outcome::Rejected(rejection), runner_up);
-        }
-        // A NaN is rejected as well.
-        if !(probabilities.elsewhere <= self.acceptance.doubt * (1.0 - probabilities.absent)) {
+        if !max.allows(probability.wrong) {
+            let elsewhere = posterior.elsewhere(self.problem.model, self.alert_limit);
+            if elsewhere.is_empty() {
+                let rejection = self.improbable(probability.wrong, found.pairs.len());
+                return (Outcome::Rejected(rejection), runner_up, probability);
+            }
             let all = posterior.explanations.first().into_iter().chain(elsewhere);
-            return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None);
+            return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None, probability);
         }
-        let (mut outcome, _) = self.poses(found, Some(probabilities.elsewhere + probabilities.absent));
+        let (mut outcome, _) = self.poses(found, Some(probability.wrong));
+        if let Outcome::Ambiguous(all) = &outcome {
+            let probability = probability.among(all.len());
+            return (outcome, runner_up, probability);
+        }
         if let (Outcome::Fix(fix), Some(best)) = (&mut outcome, posterior.explanations.first()) {
             // The solver sees only the pairs: its pose must agree with the pose whose evidence was computed.
             if self.apart(&fix.object_from_camera, &best.object_from_camera) {
                 let solved = fix.clone().alternative();
-                return (Outcome::Ambiguous(vec![best.alternative(), solved]), None);
+                return (Outcome::Ambiguous(vec![best.alternative(), solved]), None, probability.among(2));
             }
             fix.score = best.ln_evidence;
             let near = posterior.explanations[1..]
@@ -51,6 +66,19 @@ impl Judge<'_> {
             let near = near.filter(|(_, other)| !self.apart(&fix.object_from_camera, other));
             self.cover(fix, near.collect::<Vec<_>>().into_iter());
         }
-        (outcome, runner_up)
+        (outcome, runner_up, probability)
+    }
+
+    /// Whether the object's absence, or a pose in general, is improbable enough for a pose of `identified` points.
+    pub(super) fn present(&self, probability: f64, identified: usize) -> Result<(), RejectionReason> {
+        match self.acceptance.max_p_wrong.allows(probability) {
+            true => Ok(()),
+            false => Err(self.improbable(probability, identified)),
+        }
+    }
+
+    fn improbable(&self, p_wrong: f64, identified: usize) -> RejectionReason {
+        let (model, max) = (self.problem.model.len(), self.acceptance.max_p_wrong);
+        RejectionReason::Absent { p_wrong, max, identified, model }
     }
 }

@@ -1,20 +1,18 @@
 //! The reasons for which an answer is rejected.
 
-use crate::{Rejected, ScaleError};
+use super::{integrity::consistency::Consistency, max_p_wrong::MaxPWrong};
+use crate::{search::identification::Rejected, solve::likelihood::scale_error::ScaleError};
 
 /// The reason for which a set or its pose is rejected.
 ///
-/// Its `Display` is one line: the failed test, its numbers, and a remedy.
+/// Its `Display` is one line: the failed test and its numbers. [`remedy`](Self::remedy) says what helps.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RejectionReason {
     /// The search returned no set.
     #[error(transparent)]
     Search(#[from] Rejected),
     /// The set has fewer points than required.
-    #[error(
-        "too few identified points: {found} found, {needed} required; bring more of the object into view or widen the \
-         prior"
-    )]
+    #[error("too few identified points: {found} found, {needed} required")]
     TooFew {
         /// The number of identified points.
         found: usize,
@@ -22,33 +20,22 @@ pub enum RejectionReason {
         /// solver's minimum.
         needed: usize,
     },
-    /// The number of false alarms of the set is too large (a-contrario test).
-    #[error("{}", a_contrario(.size, .expected, .budget))]
-    AContrario {
-        /// The number of points of the set.
-        size: usize,
-        /// The number of false alarms (NFA): the expected number of random sets of this size.
-        expected: f64,
-        /// The largest accepted NFA, [`Acceptance::max_nfa`](crate::Acceptance::max_nfa).
-        budget: f64,
-    },
-    /// The posterior probability that the object is absent is too large.
-    #[error(
-        "object possibly absent: its absence has a probability of {probability:.2e}, the limit is {limit:.1e}; narrow \
-         the prior or bring more of the object into view"
-    )]
+    /// The probability that the pose is not the object's is too large.
+    #[error("{}", absent(.p_wrong, .max, .identified, .model))]
     Absent {
-        /// The posterior probability of absence.
-        probability: f64,
-        /// The limit that applies to this model and cloud; it derives from
-        /// [`Acceptance::absence`](crate::Acceptance::absence).
-        limit: f64,
+        /// The probability of absence, or that of absence and other poses together.
+        ///
+        /// A NaN, if the noise of a point is not a number.
+        p_wrong: f64,
+        /// The largest accepted probability, [`Acceptance::max_p_wrong`](crate::Acceptance::max_p_wrong).
+        max: MaxPWrong,
+        /// The number of identified points.
+        identified: usize,
+        /// The number of model points.
+        model: usize,
     },
     /// The residuals are larger than the noise of the points explains (χ² test).
-    #[error(
-        "residuals too large: χ² = {chi2:.1}, the limit is {limit:.1}; check calibration, object model and point \
-         covariances"
-    )]
+    #[error("residuals too large: χ² = {chi2:.1}, the limit is {limit:.1}")]
     Residuals {
         /// The χ² of the residuals, Σ rᵀ S⁻¹ r, at the maximum-likelihood pose.
         chi2: f64,
@@ -59,7 +46,7 @@ pub enum RejectionReason {
     /// Twice the predicted error of the model points exceeds the alert limit.
     #[error(
         "pose too imprecise: the model points have a predicted error of {rms:.3} m (RMS, one sigma), twice that \
-         exceeds the alert limit of {limit:.3} m; identify more points or move closer"
+         exceeds the alert limit of {limit:.3} m"
     )]
     Imprecise {
         /// The predicted error of the model points (m, RMS over the points, one sigma).
@@ -84,7 +71,7 @@ pub enum RejectionReason {
     /// Points near a line leave the rotation about it undetermined: it moves no point, but it moves the vehicle.
     #[error(
         "attitude too imprecise: its worst axis has an error of {:.1}° (one sigma), twice that exceeds the limit of \
-         {:.1}°; identify points farther from a common line",
+         {:.1}°",
         .sigma.to_degrees(), .limit.to_degrees()
     )]
     Attitude {
@@ -96,7 +83,7 @@ pub enum RejectionReason {
     /// The pose places the camera behind identified points.
     #[error(
         "camera behind identified points: model point `{point}` would be seen {:.1}° from its normal, the largest \
-         possible angle is {:.1}°; check the normals of the object model",
+         possible angle is {:.1}°",
         .angle.to_degrees(), .max.to_degrees()
     )]
     Behind {
@@ -110,7 +97,7 @@ pub enum RejectionReason {
     /// The scale error between measurement and model may displace the object beyond the alert limit.
     #[error(
         "scale error: measured distances are {:.1} % {} than the model's (one sigma {:.1} %), which may displace the \
-         object by {off:.2} m, the alert limit is {limit:.2} m; check baseline, focal length and survey",
+         object by {off:.2} m, the alert limit is {limit:.2} m",
         100.0 * .scale_error.value.abs(), if .scale_error.value > 0.0 { "longer" } else { "shorter" },
         100.0 * .scale_error.sigma
     )]
@@ -122,11 +109,27 @@ pub enum RejectionReason {
         /// The alert limit (m).
         limit: f64,
     },
-    /// The pose contradicts the prior.
+    /// A part of the object is displaced against the rest, which may displace the pose beyond the alert limit.
     #[error(
-        "pose contradicts the prior: its distance is {off:.3} times the largest allowed; check the prior's pose and \
-         covariance"
+        "inconsistent parts: {} of {points} identified points are displaced by {:.3} m against the others (one sigma \
+         {:.3} m), {:.1e} times as probable as an object as modelled, the limit is {limit:.1e}; the model points have \
+         an error of {rms:.3} m (RMS, one sigma), twice that exceeds the alert limit of {alert_limit:.3} m",
+        .consistency.moved, .consistency.shift, .consistency.sigma, .consistency.bayes_factor
     )]
+    Inconsistent {
+        /// The evidence for the displaced part.
+        consistency: Consistency,
+        /// The number of identified points.
+        points: usize,
+        /// The largest accepted Bayes factor, 1 / (1 − [`Acceptance::confidence`](crate::Acceptance::confidence)).
+        limit: f64,
+        /// The predicted error of the model points, if any part may be displaced (m, RMS, one sigma).
+        rms: f64,
+        /// The alert limit (m).
+        alert_limit: f64,
+    },
+    /// The pose contradicts the prior.
+    #[error("pose contradicts the prior: its distance is {off:.3} times the largest allowed")]
     Prior {
         /// The distance from the prior divided by the largest allowed distance.
         off: f64,
@@ -139,37 +142,52 @@ impl RejectionReason {
         match self {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
-            Self::AContrario { .. } | Self::Absent { .. } => "absent",
+            Self::Absent { .. } => "absent",
             Self::Residuals { .. } | Self::Behind { .. } | Self::Stretched { .. } | Self::Prior { .. } => "gate",
+            Self::Inconsistent { .. } => "inconsistent",
             Self::Imprecise { .. } | Self::Hinge { .. } | Self::Attitude { .. } => "imprecise",
+        }
+    }
+
+    /// The remedy in one phrase.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Search(why) => why.remedy(),
+            Self::TooFew { .. } => "bring more of the object into view or widen the prior",
+            Self::Absent { p_wrong, .. } if p_wrong.is_nan() => "check the point covariances",
+            Self::Absent { .. } => "narrow the prior or bring more of the object into view",
+            Self::Residuals { .. } => "check calibration, object model and point covariances",
+            Self::Imprecise { .. } => "identify more points or move closer",
+            Self::Hinge { .. } => "identify more points",
+            Self::Attitude { .. } => "identify points farther from a common line",
+            Self::Behind { .. } => "check the normals of the object model",
+            Self::Stretched { .. } => "check baseline, focal length and survey",
+            Self::Inconsistent { .. } => "survey the object again, or model the displaced part as an object of its own",
+            Self::Prior { .. } => "check the prior's pose and covariance",
         }
     }
 }
 
-/// The message of [`RejectionReason::AContrario`].
-fn a_contrario(size: &usize, expected: &f64, budget: &f64) -> String {
-    if expected.is_nan() {
-        return format!(
-            "cannot compute the number of false alarms (NFA) of {size} points: the noise of a point is not a number; \
-             check the point covariances"
-        );
+/// The message of [`RejectionReason::Absent`].
+fn absent(p_wrong: &f64, max: &MaxPWrong, identified: &usize, model: &usize) -> String {
+    if p_wrong.is_nan() {
+        return format!("P(wrong) of {identified} points is undefined: the noise of a point is not a number");
     }
+    let p = if *p_wrong < 0.1 { format!("{p_wrong:.1e}") } else { format!("{p_wrong:.2}") };
+    let preset = max.preset().map_or_else(String::new, |preset| format!(" (preset {preset})"));
     format!(
-        "possible false alarm: the expected number of random sets of {size} points (NFA) is {expected:.2e}, the limit \
-         is {budget:.1e}; narrow the prior or identify more points"
+        "P(wrong) is {p}, at most {:.1e} is allowed{preset}; {identified} of {model} points identified",
+        max.value()
     )
 }
 
 /// The message of [`RejectionReason::Hinge`].
 fn hinge(point: &str, rms: &f64, limit: &f64) -> String {
     if !rms.is_finite() {
-        return format!(
-            "pose depends on one point: without model point `{point}` the others determine no pose; identify more \
-             points"
-        );
+        return format!("pose depends on one point: without model point `{point}` the others determine no pose");
     }
     format!(
         "pose depends on one point: if model point `{point}` is a wrong match, the model points have an error of \
-         {rms:.3} m (RMS, one sigma), twice that exceeds the alert limit of {limit:.3} m; identify more points"
+         {rms:.3} m (RMS, one sigma), twice that exceeds the alert limit of {limit:.3} m"
     )
 }

@@ -6,12 +6,17 @@ use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{
-    Outcome,
     admitted::Admitted,
     hypothesis::{Hypothesis, by_score},
     judge::Judge,
+    outcome::Outcome,
+    probability::Probability,
 };
-use crate::{Correspondence, Kabsch, Observations, Solver};
+use crate::{
+    observations::Observations,
+    problem::Correspondence,
+    solve::{kabsch::Kabsch, solver::Solver},
+};
 
 /// Maximum number of pairs of model points for the first two measured points; beyond it no symmetry is sought.
 const MAX_BASES: usize = 1_000_000;
@@ -23,12 +28,15 @@ impl Judge<'_> {
     /// If a motion maps the identified model points onto other model points, the poses before and after it explain the
     /// same measurements. Candidates, residuals, precision, prior and visible sides decide between them as between any
     /// sets; an assignment that passes all tests is an alternative. A search that weighs evidence accepts the fix if
-    /// all alternatives together have at most the probability [`Acceptance::doubt`](super::Acceptance::doubt), by the
-    /// likelihood of the pairs and the prior, and their probability is deducted from the risk of the protection levels.
-    /// Other searches accept no alternative. An assignment outside the candidates is weighted by the probability that
-    /// the proposer confused the points ([`Judge::mislabeled`]).
-    pub(super) fn distinguished(&self, mut outcome: Outcome, weighs: bool) -> Outcome {
+    /// the probability of all alternatives, by the likelihood of the pairs and the prior, leaves P(wrong) within
+    /// [`Acceptance::max_p_wrong`](super::Acceptance::max_p_wrong); it is deducted from the risk of the protection
+    /// levels. Other searches accept no alternative. An assignment outside the candidates is weighted by the
+    /// probability that the proposer confused the points ([`Judge::mislabeled`]).
+    ///
+    /// `probability` becomes that of the outcome.
+    pub(super) fn distinguished(&self, mut outcome: Outcome, weighs: bool, probability: &mut Probability) -> Outcome {
         let Outcome::Fix(fix) = &mut outcome else { return outcome };
+        let max = self.acceptance.max_p_wrong;
         let admitted = self.admitted(&fix.pairs);
         let sets = self.symmetric_sets(&fix.pairs, &admitted);
         if sets.is_empty() {
@@ -55,13 +63,15 @@ impl Judge<'_> {
             let mislabeled = if admitted.proposed { self.mislabeled(&own, other) } else { 1.0 };
             let of_other = mislabeled * fraction(other);
             weight += of_other;
-            weighs || mislabeled >= 1.0 || of_other > self.acceptance.doubt
+            weighs || mislabeled >= 1.0 || !max.allows(of_other / (1.0 + of_other))
         });
-        if others.is_empty() || (weighs && weight <= self.acceptance.doubt * (1.0 + weight)) {
+        if weighs {
+            // The search may have counted some of them among the poses elsewhere; counting twice is conservative.
+            *probability = probability.beside(weight / (1.0 + weight));
+        }
+        if others.is_empty() || (weighs && max.allows(probability.wrong)) {
             if weight > 0.0 && weighs {
-                // The search may have counted some of them among the poses elsewhere; counting twice is conservative.
-                let known = fix.integrity.misidentified.unwrap_or(0.0);
-                self.protected(fix, known + weight / (1.0 + weight));
+                self.protected(fix, probability.wrong);
             }
             return outcome;
         }

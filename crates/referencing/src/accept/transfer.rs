@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix3x6, Matrix6};
 use seafix_geometry::{Camera, Covariance6, Object, Transform, so3::skew};
 
-use crate::ModelPoint;
+use crate::site::model::ModelPoint;
 
 /// The second moments of the model points as seen from the camera.
 ///
@@ -47,7 +47,7 @@ mod tests {
     use seafix_geometry::Point;
 
     use super::*;
-    use crate::rms_apart;
+    use crate::accept::apart::rms_apart;
 
     #[test]
     fn moments_are_those_of_every_point() {

@@ -1,12 +1,12 @@
 //! Joint fixes that reject surveys in contradiction to the images.
 
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
+use seafix_geometry::StereoRig;
 
-use super::{JointFix, Member, ObjectObservations, Placement, joint_fix};
-use crate::{Degenerate, candidates::chi_square};
-
-/// The camera's pose relative to an object, with its covariance.
-pub type RelativePose = (Transform<Object, Camera>, Covariance6<Object, Camera>);
+use super::{
+    fix::{JointFix, joint_fix},
+    member::{Member, ObjectObservations, Placement},
+};
+use crate::{chi_square::chi_square, joint::relative_pose::RelativePose, solve::degeneracy::Degenerate};
 
 /// The camera poses of the last instant relative to each object that it observed.
 #[derive(Debug, Clone, PartialEq)]

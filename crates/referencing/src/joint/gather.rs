@@ -3,10 +3,18 @@
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, StereoRig, Transform, World};
 
-use super::{JointFix, Member, ObjectObservations, Placement, joint_fix};
+use super::{
+    fix::{JointFix, joint_fix},
+    member::{Member, ObjectObservations, Placement},
+};
 use crate::{
-    Acceptance, Candidates, Correspondence, Degenerate, Gate, ModelPoint, Observations, Prior, PriorBound, Target,
-    candidates, candidates::chi_square,
+    accept::{acceptance::Acceptance, max_p_wrong::MaxPWrong, probability::by_nfa},
+    candidates::{Candidates, Gate, candidates},
+    chi_square::chi_square,
+    observations::Observations,
+    problem::{Correspondence, Prior, PriorBound},
+    site::{model::ModelPoint, target::Target},
+    solve::degeneracy::Degenerate,
 };
 
 /// The contribution of objects without a fix of their own to a joint fix.
@@ -30,18 +38,15 @@ pub enum Unadded {
         /// The number of points with an ambiguous candidate.
         points: usize,
     },
-    /// The number of false alarms of its pairs is too large (a-contrario test).
-    #[error(
-        "possible false alarm: the NFA of {size} points near their predictions is {expected:.1e}, the limit is \
-         {budget:.1e}"
-    )]
+    /// Its pairs are too probable to be a false alarm (a-contrario test).
+    #[error("P(wrong) of {size} points near their predictions is {p_wrong:.1e}, at most {max} is allowed")]
     AContrario {
         /// The number of pairs.
         size: usize,
-        /// The number of false alarms (NFA): the expected number of random sets of this size or larger.
-        expected: f64,
-        /// The limit, [`Acceptance::max_nfa`].
-        budget: f64,
+        /// The probability by the number of false alarms: the expected number of random sets of this size or larger.
+        p_wrong: f64,
+        /// The limit, [`Acceptance::max_p_wrong`].
+        max: MaxPWrong,
     },
     /// Its points contradict their joint prediction.
     #[error("contradiction: {size} of its points raise χ² by {chi2:.1}, the limit is {limit:.1}")]
@@ -65,8 +70,8 @@ pub enum Unadded {
 /// predicted, with the covariance of both. A cloud point that no fixed object uses is a candidate within the
 /// Mahalanobis gate of [`Acceptance::confidence`] (Bar-Shalom and Fortmann, *Tracking and Data Association*, 1988),
 /// and, if Stage 1 listed candidates, among those `listed`. A set of pairs is added on three conditions: no pair has
-/// another candidate on either side; the NFA is at most [`Acceptance::max_nfa`]; and the joint fix with the pairs
-/// raises χ² by no more than its limit, since an object's points share the survey's error and all points share the
+/// another candidate on either side; the probability of a false alarm, NFA/(1 + NFA), is at most
+/// [`Acceptance::max_p_wrong`]; and the joint fix with the pairs raises χ² by no more than its limit, since an object's points share the survey's error and all points share the
 /// camera's. Objects are added in their order.
 ///
 /// Nothing is added if `fixed` has no joint fix or contradicts itself: the wrong object is unknown then.
@@ -203,10 +208,9 @@ impl Gates {
         if pairs.is_empty() {
             return Err(Unadded::Several { points: self.lists.iter().filter(|list| !list.is_empty()).count() });
         }
-        let (size, budget) = (pairs.len(), acceptance.max_nfa);
-        let expected = self.expected(size, cloud, free, acceptance.confidence);
-        // A NaN is rejected as well.
-        if expected <= budget { Ok(()) } else { Err(Unadded::AContrario { size, expected, budget }) }
+        let (size, max) = (pairs.len(), acceptance.max_p_wrong);
+        let p_wrong = by_nfa(self.expected(size, cloud, free, acceptance.confidence));
+        if max.allows(p_wrong) { Ok(()) } else { Err(Unadded::AContrario { size, p_wrong, max }) }
     }
 
     /// The expected number of random sets of `size` or more points in the gates.
@@ -251,10 +255,13 @@ fn density(near: &[(f64, usize)]) -> f64 {
 mod tests {
     use super::*;
     use crate::joint::{
-        joint_fixes,
+        displaced::joint_fixes,
         tests::{MODEL, SIGMA, instant, normal, pose_of, rig},
     };
-    use crate::{Site, SiteObject, TargetKind};
+    use crate::site::{
+        model::{Site, SiteObject},
+        target::TargetKind,
+    };
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{Pixel, Point, StereoPixels, UncertainPixels, UncertainPoint, triad};
@@ -288,6 +295,7 @@ mod tests {
                 survey_sigma,
                 world_from_object: Some(frame(surveyed)),
                 points: points.iter().enumerate().map(own).collect(),
+                edges: Vec::new(),
                 interest: Vec::new(),
             });
             truly.push(frame(base));
@@ -325,7 +333,7 @@ mod tests {
         }
 
         /// The pose relative to the first object from these pairs.
-        fn fix(&self, all: &[(usize, Vec<Correspondence>)]) -> crate::RelativePose {
+        fn fix(&self, all: &[(usize, Vec<Correspondence>)]) -> crate::joint::relative_pose::RelativePose {
             let mut object_observations = ObjectObservations::default();
             for (object, pairs) in all {
                 let points = &self.targets[*object].points;

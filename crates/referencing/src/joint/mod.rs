@@ -7,158 +7,16 @@
 //! searched at their positions predicted from the other objects.
 
 mod displaced;
+mod fix;
 mod gather;
+pub(crate) mod member;
+mod relative_pose;
 mod system;
 #[cfg(test)]
 mod tests;
 
-use faer::Mat;
-use nalgebra::Matrix6;
-use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
-
-use crate::{
-    Degenerate, Observation, Observations,
-    solve::{least_squares, wide_enough},
-};
-pub use displaced::{JointFixes, RelativePose, Unjoined, joint_fixes};
+pub use displaced::{JointFixes, Unjoined, joint_fixes};
+pub use fix::{JointFix, joint_fix};
 pub use gather::{Gathered, Unadded, gather};
-use system::{JointState, System};
-
-/// The knowledge of an object's pose in the site's frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "one an object: a survey's thirty-six numbers are little beside its points"
-)]
-pub enum Placement {
-    /// The stated pose is exact, as that of the object that defines the site's frame.
-    Exact,
-    /// The stated pose has this covariance of η in `site_from_object_true = site_from_object · Exp(η)`.
-    Surveyed(Covariance6<Object, Object>),
-    /// The pose is unknown, as of a displaced object: only the images determine it.
-    Displaced,
-}
-
-/// An object of the site in a joint fix.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Member {
-    /// The stated pose of the object's frame in the site's frame.
-    pub site_from_object: Transform<Object, Object>,
-    /// The uncertainty of the stated pose.
-    pub placement: Placement,
-}
-
-/// The observed points of one instant.
-///
-/// Each has the index of its object, and model coordinates in that object's frame.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ObjectObservations {
-    /// The points.
-    pub points: Vec<(usize, Observation)>,
-}
-
-impl ObjectObservations {
-    /// Adds observed points of an object.
-    pub fn see(&mut self, object: usize, data: &Observations<'_>) {
-        self.points.extend(data.points.iter().map(|point| (object, *point)));
-    }
-
-    /// The number of observed points of an object.
-    pub fn count(&self, object: usize) -> usize {
-        self.points.iter().filter(|(o, _)| *o == object).count()
-    }
-}
-
-/// The joint fix of all instants.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointFix {
-    /// The camera's pose in the site's frame and its covariance, for each instant.
-    pub site_from_camera: Vec<(Transform<Object, Camera>, Covariance6<Object, Camera>)>,
-    /// The pose of each object in the site's frame and its covariance; zero covariance for an exact pose.
-    pub site_from_object: Vec<(Transform<Object, Object>, Covariance6<Object, Object>)>,
-    /// χ² of pixels and surveys together.
-    pub chi2: f64,
-    /// The degrees of freedom of χ².
-    pub dof: usize,
-    /// The joint covariance of all unknowns.
-    covariance: Mat<f64>,
-    /// The index of each object's block of six unknowns.
-    unknowns: Vec<Option<usize>>,
-}
-
-impl JointFix {
-    /// The camera's pose relative to an object at one instant, with its covariance.
-    ///
-    /// The errors of camera and object pose are correlated, and their common part cancels. With T_sc = T̂_sc Exp(ξ) and
-    /// T_so = T̂_so Exp(η): T_oc = T̂_oc Exp(ξ − Ad(T̂_co) η) to first order.
-    ///
-    /// # Panics
-    ///
-    /// If an index is out of range.
-    pub fn object_from_camera(&self, instant: usize, object: usize) -> RelativePose {
-        let (site_from_camera, own) = &self.site_from_camera[instant];
-        let pose = self.site_from_object[object].0.inverse() * *site_from_camera;
-        let Some(place) = self.unknowns[object] else { return (pose, *own) };
-        let block = |a: usize, b: usize| Matrix6::from_fn(|i, j| self.covariance[(6 * a + i, 6 * b + j)]);
-        let ad = pose.inverse().adjoint();
-        let shared = ad * block(place, instant);
-        let all = own.matrix + ad * block(place, place) * ad.transpose() - shared - shared.transpose();
-        (pose, Covariance6::new(all))
-    }
-}
-
-/// The maximum-likelihood poses of all instants and objects, from pixels and surveys.
-///
-/// It minimises Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η by the Levenberg–Marquardt method on the dense normal equations. Each
-/// instant starts from the unweighted fit of its points, with the objects at their stated poses; a far displaced object
-/// is found from there as long as other objects, or most points, are at their stated poses.
-///
-/// # Errors
-///
-/// [`Degenerate`], for an instant with fewer than three points or with collinear points, points without pixels, a point
-/// behind the camera, or an undetermined motion (a displaced object that no other object relates to the site).
-///
-/// # Panics
-///
-/// If the index of an object is out of range.
-pub fn joint_fix(
-    rig: &StereoRig,
-    members: &[Member],
-    observations_by_frame: &[ObjectObservations],
-) -> Result<JointFix, Degenerate> {
-    let mut poses = Vec::with_capacity(observations_by_frame.len());
-    for object_observations in observations_by_frame {
-        if object_observations.points.iter().any(|(_, point)| point.pixels.is_none()) {
-            return Err(Degenerate::NoPixels);
-        }
-        let in_site = |(object, point): &(usize, Observation)| Observation {
-            model: members[*object].site_from_object * point.model,
-            ..*point
-        };
-        let data = Observations { points: object_observations.points.iter().map(in_site).collect(), rig: Some(rig) };
-        wide_enough(&data)?;
-        poses.push(least_squares(&data.points));
-    }
-    if poses.is_empty() {
-        return Err(Degenerate::TooFew { found: 0, needed: 3 });
-    }
-    let start = JointState { poses, places: members.iter().map(|member| member.site_from_object).collect() };
-    let system = System::new(rig, members, observations_by_frame)?;
-    let (state, chi2) = system.minimize(start)?;
-    let covariance = system.covariance(&state)?;
-    let block = |at: Option<usize>| {
-        at.map_or_else(Matrix6::zeros, |b| Matrix6::from_fn(|i, j| covariance[(6 * b + i, 6 * b + j)]))
-    };
-    Ok(JointFix {
-        site_from_camera: (0..observations_by_frame.len())
-            .map(|f| (state.poses[f], Covariance6::new(block(Some(f)))))
-            .collect(),
-        site_from_object: (0..members.len())
-            .map(|o| (state.places[o], Covariance6::new(block(system.unknown(o)))))
-            .collect(),
-        chi2,
-        dof: system.dof(),
-        unknowns: (0..members.len()).map(|o| system.unknown(o)).collect(),
-        covariance,
-    })
-}
+pub use member::{Member, ObjectObservations, Placement};
+pub use relative_pose::RelativePose;

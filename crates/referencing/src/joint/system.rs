@@ -4,10 +4,17 @@ use faer::{Mat, Side, linalg::solvers::Solve};
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
 
-use super::{Member, ObjectObservations, Placement};
+use super::member::{Member, ObjectObservations, Placement};
 use crate::{
-    Degenerate, Observation,
-    solve::{PixelTarget, PixelTerms, Term, converged, inverse, rounding},
+    observations::Observation,
+    solve::{
+        degeneracy::{Degenerate, converged},
+        likelihood::{
+            descent::Term,
+            normal::{inverse, rounding},
+            pixel_terms::{PixelTerms, TermTarget as PixelTarget},
+        },
+    },
 };
 
 /// All unknowns: the pose of each instant and of each object.

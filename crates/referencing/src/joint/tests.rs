@@ -7,7 +7,11 @@ use seafix_geometry::{
 };
 
 use super::*;
-use crate::{Solver, StereoReprojection};
+use crate::solve::{solver::Solver, stereo_reprojection::StereoReprojection};
+use crate::{
+    observations::{Observation, Observations},
+    solve::degeneracy::Degenerate,
+};
 
 pub(super) const MODEL: [[f64; 3]; 5] =
     [[0.0, 0.0, 0.0], [0.5, 0.1, 0.0], [0.1, 0.6, 0.1], [0.2, 0.2, 0.4], [-0.4, 0.3, 0.2]];
@@ -60,7 +64,8 @@ pub(super) fn object_observations(
 fn one_object_alone_is_the_fix_of_one_object() {
     let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(1));
     let seen = object_observations(&rig, &[pose_of(0.0, 0.0)], 1, 1.0, &mut rng);
-    let data = Observations { points: seen.points.iter().map(|(_, p)| *p).collect(), rig: Some(&rig) };
+    let data =
+        Observations { points: seen.points.iter().map(|(_, p)| *p).collect(), edges: Vec::new(), rig: Some(&rig) };
     let expected = StereoReprojection::default().solve(&data).unwrap();
     let covariance = StereoReprojection::default().covariance(&data, &expected).unwrap();
     let member = Member { site_from_object: pose_of(0.0, 0.0), placement: Placement::Exact };
@@ -163,7 +168,9 @@ fn relative_to_each_object_the_fix_is_better_than_its_own() {
             nees[object] += xi.dot(&covariance.matrix.cholesky().unwrap().solve(&xi)) / f64::from(draws);
             joint[object] += xi.fixed_rows::<3>(3).norm_squared();
             let own = seen[1].points.iter().filter(|(o, _)| *o == object).map(|(_, p)| *p).collect();
-            let own = StereoReprojection::default().solve(&Observations { points: own, rig: Some(&rig) }).unwrap();
+            let own = StereoReprojection::default()
+                .solve(&Observations { points: own, edges: Vec::new(), rig: Some(&rig) })
+                .unwrap();
             alone[object] += own.error_to(&truth).fixed_rows::<3>(3).norm_squared();
         }
     }
@@ -238,7 +245,7 @@ fn no_direction_is_known_worse_than_from_the_object_alone() {
         let fixes = joint_fixes(&rig, &members, std::slice::from_ref(&seen), 0.999).unwrap();
         for object in 0..3 {
             let own: Vec<Observation> = seen.points.iter().filter(|(o, _)| *o == object).map(|(_, p)| *p).collect();
-            let data = Observations { points: own, rig: Some(&rig) };
+            let data = Observations { points: own, edges: Vec::new(), rig: Some(&rig) };
             let Ok(pose) = StereoReprojection::default().solve(&data) else { continue };
             let alone = StereoReprojection::default().covariance(&data, &pose).unwrap().matrix;
             let joint = fixes.object_from_camera[object].unwrap().1.matrix;

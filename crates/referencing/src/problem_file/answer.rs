@@ -3,26 +3,23 @@
 use std::{path::Path, time::Instant};
 
 use rand::Rng;
-use seafix_geometry::{Camera, Object, Transform};
+use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::Serialize;
 
-use super::{CoherenceProblem, read};
-use crate::{
-    Acceptance, Alternative, Correspondence, Integrity, Observations, Outcome, Search, Solver, accept::alert_limit,
+use super::{
+    input::{CoherenceProblem, read},
+    method::Method,
 };
-
-/// The search, solver and acceptance that answer a problem.
-#[derive(Debug, Clone, Copy)]
-pub struct Method<'a> {
-    /// The search and its registered name.
-    pub search: (&'a str, &'a dyn Search),
-    /// The solver and its registered name.
-    pub solver: (&'a str, &'a dyn Solver),
-    /// The limits of the acceptance tests.
-    pub acceptance: &'a Acceptance,
-    /// Whether to repeat the search with expanding gates ([`CoherenceProblem::attempt_with_expanding_gates`]).
-    pub expand_gates: bool,
-}
+use crate::{
+    accept::{
+        alert_limit,
+        integrity::Integrity,
+        outcome::{Attempt, BestPose, Outcome},
+    },
+    alternative::Alternative,
+    observations::Observations,
+    problem::Correspondence,
+};
 
 /// The printed form of a pose other than the answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,6 +32,28 @@ pub struct OtherPose {
     pub pairs: Vec<[usize; 2]>,
     /// The score of the pose; larger is better.
     pub score: f64,
+}
+
+/// The printed form of the best pose of an answer that is no fix.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Best {
+    /// The pose, camera_from_object.
+    #[serde(rename = "T_cam_obj")]
+    pub t_cam_obj: [[f64; 4]; 4],
+    /// The pairs (model, cloud).
+    pub pairs: Vec<[usize; 2]>,
+    /// The covariance, of object_from_camera; null if the pairs determine none.
+    pub covariance: Option<[[f64; 6]; 6]>,
+}
+
+impl From<&BestPose> for Best {
+    fn from(best: &BestPose) -> Self {
+        Self {
+            t_cam_obj: rows(&best.object_from_camera),
+            pairs: indices(&best.pairs),
+            covariance: best.covariance.as_ref().map(rows6),
+        }
+    }
 }
 
 /// The printed form of a fix's integrity.
@@ -117,6 +136,11 @@ pub struct Answer {
     pub reason: Option<&'static str>,
     /// The reason for a missing pose as a sentence.
     pub explanation: Option<String>,
+    /// What helps against the missing pose, in one phrase.
+    pub remedy: Option<&'static str>,
+    /// The likely cause of a missing pose with its remedy, if one is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diagnosis: Option<String>,
     /// The pose of a fix, camera_from_object.
     #[serde(rename = "T_cam_obj")]
     pub t_cam_obj: Option<[[f64; 4]; 4]>,
@@ -134,11 +158,13 @@ pub struct Answer {
     pub behind: Vec<usize>,
     /// The rejected pairs (model, cloud), if there is no fix; after an exhausted budget, the best so far.
     pub unbelieved: Option<Vec<[usize; 2]>>,
+    /// The best pose of an answer that is no fix; null if its pairs determine none.
+    pub best: Option<Best>,
     /// The integrity of a fix.
     pub integrity: Option<Support>,
     /// The poses between which the data do not decide.
     pub alternatives: Vec<OtherPose>,
-    /// The best rejected pose.
+    /// The best other pose, acceptable or not; for an ambiguous outcome the second alternative.
     pub runner_up: Option<OtherPose>,
     /// The score of the best pose minus that of the next.
     pub margin: Option<f64>,
@@ -147,6 +173,10 @@ pub struct Answer {
     pub optimal: bool,
     /// The proved upper bound of the number of pairs of an admissible set.
     pub consensus_bound: Option<usize>,
+    /// The probability that the object is absent.
+    pub p_absent: Option<f64>,
+    /// The probability that the pose of the fix, or of `best`, is not the object's: absence and other poses together.
+    pub p_wrong: Option<f64>,
     /// The number of false alarms (NFA) of the set.
     pub nfa: Option<f64>,
     /// The number of pair tests of the search.
@@ -185,12 +215,22 @@ pub enum Line {
 /// Answers a problem that came from `file`.
 pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng: &mut dyn Rng) -> Answer {
     let start = Instant::now();
-    let (search, solver) = (method.search.1, method.solver.1);
-    let attempt = match method.expand_gates {
-        true => problem.attempt_with_expanding_gates(search, solver, method.acceptance, rng),
-        false => problem.attempt(search, solver, method.acceptance, rng),
-    };
+    let attempt = problem.attempt_within(problem.tolerance(), method, rng);
     let time_ms = start.elapsed().as_secs_f64() * 1e3;
+    let parts = (method.search.1, method.solver.1, method.acceptance);
+    let diagnosis = problem.diagnosis(&attempt, parts, rng);
+    Answer { diagnosis, ..printed(&attempt, problem, file, method, time_ms) }
+}
+
+/// The printed form of an attempt at a problem that came from `file`, without diagnosis.
+pub fn printed(
+    attempt: &Attempt,
+    problem: &CoherenceProblem,
+    file: &Path,
+    method: &Method<'_>,
+    time_ms: f64,
+) -> Answer {
+    let solver = method.solver.1;
     let fix = match &attempt.outcome {
         Outcome::Fix(fix) => Some(fix),
         _ => None,
@@ -201,9 +241,10 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         outcome: attempt.outcome.name(),
         reason: attempt.outcome.reason(),
         explanation: attempt.outcome.explanation(),
+        remedy: attempt.outcome.remedy(),
+        diagnosis: None,
         t_cam_obj: fix.map(|fix| rows(&fix.object_from_camera)),
-        covariance: fix
-            .map(|fix| std::array::from_fn(|row| std::array::from_fn(|column| fix.covariance.matrix[(row, column)]))),
+        covariance: fix.map(|fix| rows6(&fix.covariance)),
         pairs: fix.map(|fix| indices(&fix.pairs)),
         scale: fix.and_then(|fix| solver.scale(&Observations::of(&fix.pairs, &problem.model, &problem.cloud, None))),
         behind: fix.map_or_else(Vec::new, |fix| {
@@ -211,6 +252,7 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
             clouds.filter(|&cloud| !(problem.cloud[cloud].position.at.coords.z > 0.0)).collect()
         }),
         unbelieved: (fix.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
+        best: attempt.best.as_ref().map(Best::from),
         integrity: fix.map(|fix| {
             let (risk, limit) = (method.acceptance.risk, alert_limit(&problem.model, method.acceptance));
             Support::of(&fix.integrity, risk, limit)
@@ -226,6 +268,8 @@ pub fn answer(problem: &CoherenceProblem, file: &Path, method: &Method<'_>, rng:
         margin: attempt.margin(),
         optimal: attempt.optimal,
         consensus_bound: attempt.consensus_bound,
+        p_absent: attempt.p_absent.filter(|p| p.is_finite()),
+        p_wrong: attempt.p_wrong.filter(|p| p.is_finite()),
         nfa: attempt.nfa.filter(|expected| expected.is_finite()),
         pair_tests: attempt.pair_tests,
         copies_sought: attempt.copies_sought,
@@ -264,6 +308,11 @@ impl OtherPose {
 fn rows(object_from_camera: &Transform<Object, Camera>) -> [[f64; 4]; 4] {
     let matrix = object_from_camera.inverse().matrix();
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+}
+
+/// The covariance of object_from_camera, row by row.
+fn rows6(covariance: &Covariance6<Object, Camera>) -> [[f64; 6]; 6] {
+    std::array::from_fn(|row| std::array::from_fn(|column| covariance.matrix[(row, column)]))
 }
 
 fn indices(pairs: &[Correspondence]) -> Vec<[usize; 2]> {

@@ -2,32 +2,32 @@
 
 use std::path::Path;
 
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::Matrix4;
 use rand::Rng;
-use seafix_component::{Fault, counted, number, read_text};
-use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
+use seafix_component::{Fault, read_text};
+use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
-use super::json::{RawPrior, Source};
+use super::{
+    json::{FORMAT, RawPrior, Source},
+    method::Method,
+    parts::{Noise, Parts},
+};
 use crate::{
-    Acceptance, Attempt, BoundingBox, Candidates, Gate, ModelPoint, Prior, PriorBound, Problem, Rejected, Search,
-    Solver, Tolerance, candidates, compute_fix, search_with_expanding_gates,
-    site::{COINCIDENT, diameter, nearest_two},
+    accept::{acceptance::Acceptance, compute_fix, expanding_gates::search_with_expanding_gates, outcome::Attempt},
+    candidates::{Candidates, Gate, candidates},
+    problem::{Prior, PriorBound, Problem, Tolerance},
+    search::identification::{Rejected, Search},
+    site::model::ModelPoint,
+    solve::solver::Solver,
 };
 
-/// The format that this reader supports.
-pub const FORMAT: &str = "coherence-problem/1";
 /// The maximum number of listed candidate pairs; no search could use more.
 const MAX_CANDIDATES: usize = 4_000_000;
 /// The number of model points whose pairs are listed between two counts.
 const AT_A_TIME: usize = 8;
 
-/// The largest file and cloud; they limit a problem to 500 MB of memory.
+/// The largest file; with the largest cloud it limits a problem to 500 MB of memory.
 const MAX_BYTES: u64 = 48 << 20;
-const MAX_POINTS: usize = 500_000;
-/// The largest standard deviation (m); the cube of its variance is still finite.
-const MAX_SIGMA: f64 = 1e15;
-/// The largest model coordinate (m); a double resolves no micrometres beyond. A cloud may have outliers farther away.
-const FARTHEST: f64 = 1e9;
 
 /// A validated identification problem.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +43,8 @@ pub struct CoherenceProblem {
     /// The prior, if one is known.
     pub prior: Option<Prior>,
     /// The putative pairs (model, cloud), if given; no other pairs are considered.
+    ///
+    /// A point that the file lists more than once takes part as its first.
     pub putative: Option<Vec<(usize, usize)>>,
 }
 
@@ -60,80 +62,25 @@ impl CoherenceProblem {
             return Err(fault.remedy(format!("give one `{FORMAT}` per file, in braces")));
         }
         let raw = source.read()?;
-        for (name, rows) in [("model", &raw.model), ("cloud", &raw.cloud)] {
-            if rows.len() > MAX_POINTS {
-                let remedy = format!("at most {MAX_POINTS} are accepted; reduce the points");
-                let fault = source.fault(format!("too many points in `{name}`"), &[name]);
-                return Err(fault.value(rows.len()).remedy(remedy));
-            }
-        }
-        if let Some(index) = raw.model.iter().position(|row| row.iter().any(|x| x.abs() > FARTHEST)) {
-            let fault = source.fault(format!("model point {index} is out of range"), &["model", &index.to_string()]);
-            return Err(fault.remedy(format!("give metres, at most {FARTHEST:e}")));
-        }
-        let is_sigma = |sigma: f64| (0.0..=MAX_SIGMA).contains(&sigma);
-        let of_sigma = || format!("give metres, zero to {MAX_SIGMA:e}");
-        if !is_sigma(raw.sigma) {
-            return Err(source.fault("`sigma` is out of range", &["sigma"]).remedy(of_sigma()));
-        }
-        if let Some(rows) = &raw.sigma_xyz {
-            if rows.len() != raw.cloud.len() {
-                let value = format!("{} for {}", counted(rows.len(), "row"), counted(raw.cloud.len(), "cloud point"));
-                let fault = source.fault("`sigma_xyz` has the wrong length", &["sigma_xyz"]);
-                return Err(fault.value(value).remedy("give one row per cloud point"));
-            }
-            if let Some(index) = rows.iter().position(|row| !row.iter().all(|&sigma| is_sigma(sigma))) {
-                let what = format!("row {index} of `sigma_xyz` is out of range");
-                return Err(source.fault(what, &["sigma_xyz", &index.to_string()]).remedy(of_sigma()));
-            }
-        }
-        let model: Vec<ModelPoint> = raw
-            .model
-            .iter()
-            .enumerate()
-            .map(|(index, at)| ModelPoint::exact(index.to_string(), Point::from(*at)))
-            .collect();
-        if let Some((i, k, _)) = nearest_two(&model, COINCIDENT) {
-            let fault = source.fault("coincident model points", &["model", &k.to_string()]);
-            return Err(fault.value(format!("points {i} and {k}")).remedy("remove one"));
-        }
-        // Models of up to two points are answered `too-few` for every Δ. The diameter is at least the diagonal of the
-        // bounding box over √3: it is computed only if that bound does not suffice.
-        let bounding_box = BoundingBox::around(model.iter().map(|point| point.at));
-        let settled =
-            bounding_box.map_or(0.0, |bounding_box| bounding_box.max.distance(&bounding_box.min)) / 12f64.sqrt();
-        let large = model.len() > 2 && raw.delta > settled && raw.delta > diameter(&model) / 2.0;
-        if !(raw.delta > 0.0) || large {
-            let greatest = number(diameter(&model) / 2.0);
-            let remedy = format!("allowed: above 0, at most half the model's diameter, {greatest} m");
-            return Err(source.fault("`delta` is out of range", &["delta"]).remedy(remedy));
-        }
-        let putative = match raw.putative {
-            None => None,
-            Some(pairs) => {
-                let out = pairs.iter().position(|[i, j]| *i >= raw.model.len() || *j >= raw.cloud.len());
-                if let Some(index) = out {
-                    let what = format!("putative pair {index} is out of range");
-                    let points = counted(raw.cloud.len(), "cloud point");
-                    let remedy = format!("there are {} model and {points}; count from 0", raw.model.len());
-                    return Err(source.fault(what, &["putative", &index.to_string()]).remedy(remedy));
-                }
-                Some(pairs.into_iter().map(|[i, j]| (i, j)).collect())
-            }
-        };
-        let cloud = raw.cloud.iter().enumerate().map(|(index, at)| {
-            let sigma = raw.sigma_xyz.as_ref().map_or([raw.sigma; 3], |rows| rows[index]);
-            let covariance = Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
-            MeasuredPoint { position: UncertainPoint { at: Point::from(*at), covariance }, pixels: None }
-        });
-        Ok(Self {
+        let prior = raw.prior.map(|prior| prior.0.checked(source));
+        let parts = Parts {
             id: raw.id.unwrap_or_default(),
-            model,
-            cloud: cloud.collect(),
-            delta: raw.delta,
-            prior: raw.prior.map(|prior| prior.0.checked(source)).transpose()?,
-            putative,
-        })
+            model: raw.model,
+            cloud: raw.cloud,
+            noise: Noise::Sigma(raw.sigma, raw.sigma_xyz),
+            delta: Some(raw.delta),
+            prior: None,
+            putative: raw.putative,
+        };
+        let problem = parts.checked().map_err(|invalid| {
+            let path: Vec<&str> = invalid.path.iter().map(String::as_str).collect();
+            let fault = source.fault(invalid.what, &path).remedy(invalid.remedy);
+            match invalid.value {
+                Some(value) => fault.value(value),
+                None => fault,
+            }
+        })?;
+        Ok(Self { prior: prior.transpose()?, ..problem })
     }
 
     /// Stage 1: the candidates of each model point.
@@ -179,27 +126,33 @@ impl CoherenceProblem {
         acceptance: &Acceptance,
         rng: &mut dyn Rng,
     ) -> Attempt {
-        self.attempt_from(self.prior.as_ref(), (search, solver, acceptance), rng)
+        self.attempt_from(self.prior.as_ref(), self.tolerance(), (search, solver, acceptance), rng)
     }
 
-    /// One attempt at a fix with expanding gates, for an object that may be displaced.
+    /// One attempt at a fix by a method, with a tolerance in place of the problem's Δ.
     ///
-    /// If the object is not found, the attempt is repeated with larger gates and then without a prior.
-    pub fn attempt_with_expanding_gates(
-        &self,
-        search: &dyn Search,
-        solver: &dyn Solver,
-        acceptance: &Acceptance,
-        rng: &mut dyn Rng,
-    ) -> Attempt {
-        let method = (search, solver, acceptance);
-        let first = self.attempt_from(self.prior.as_ref(), method, rng);
-        search_with_expanding_gates(first, self.prior.as_ref(), |prior| self.attempt_from(prior, method, rng))
+    /// A method with expanding gates repeats an attempt without a fix with larger gates and then without a prior, for
+    /// an object that may be displaced.
+    pub fn attempt_within(&self, tolerance: Tolerance, method: &Method<'_>, rng: &mut dyn Rng) -> Attempt {
+        let stages = (method.search.1, method.solver.1, method.acceptance);
+        let first = self.attempt_from(self.prior.as_ref(), tolerance, stages, rng);
+        if !method.expand_gates {
+            return first;
+        }
+        search_with_expanding_gates(first, self.prior.as_ref(), |prior| {
+            self.attempt_from(prior, tolerance, stages, rng)
+        })
+    }
+
+    /// The problem's Δ as the tolerance of a search.
+    pub fn tolerance(&self) -> Tolerance {
+        Tolerance::Fixed(self.delta)
     }
 
     fn attempt_from(
         &self,
         prior: Option<&Prior>,
+        tolerance: Tolerance,
         (search, solver, acceptance): (&dyn Search, &dyn Solver, &Acceptance),
         rng: &mut dyn Rng,
     ) -> Attempt {
@@ -211,8 +164,9 @@ impl CoherenceProblem {
             model: &self.model,
             cloud: &self.cloud,
             candidates: &candidates,
-            tolerance: Tolerance::Fixed(self.delta),
+            tolerance,
             prior,
+            edges: Default::default(),
         };
         compute_fix(&problem, search, solver, acceptance, None, rng)
     }

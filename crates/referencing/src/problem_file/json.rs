@@ -10,7 +10,8 @@ use serde::{
 use serde_json::value::RawValue;
 use serde_path_to_error::Segment;
 
-use super::FORMAT;
+/// The format that this reader supports.
+pub const FORMAT: &str = "coherence-problem/1";
 
 /// The keys of a problem before validation.
 #[derive(Deserialize)]

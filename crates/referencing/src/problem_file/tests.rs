@@ -3,7 +3,11 @@
 use std::path::Path;
 
 use super::*;
-use crate::{Acceptance, Kabsch, MaximumClique, RigidConsensus, SOLVERS, Search};
+use crate::{
+    accept::{acceptance::Acceptance, max_p_wrong::MaxPWrong},
+    search::{identification::Search, maximum_clique::MaximumClique, rigid_consensus::RigidConsensus},
+    solve::{SOLVERS, kabsch::Kabsch},
+};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_component::{Choice, Fault};
@@ -76,7 +80,7 @@ fn the_scale_is_reported_by_the_solver_that_finds_it() {
     problem.putative = Some((0..5).map(|k| (k, k)).collect());
     // Wide limits: this test covers no search.
     let acceptance = Acceptance {
-        max_nfa: f64::INFINITY,
+        max_p_wrong: MaxPWrong::Number(1.0),
         alert_limit: 1.0,
         alert_fraction: 1.0,
         attitude_limit: 1.0,
@@ -239,6 +243,11 @@ fn coincident_points_are_refused_and_unlikely_values_are_reported() {
             vec![(row, "[2,0,3],[0.5"), ("null}", "[[0,0],[1,1],[2,2]]}")],
             "collinear cloud points in `putative` in p.json: 3 of 5, second",
         ),
+        // Repeated points.
+        (
+            vec![("[0.5,0.5,4]", "[0.25,-0.75,3]"), ("null}", "[[0,0],[1,1],[2,2],[3,2],[3,3],[4,4]]}")],
+            "repeated cloud points in p.json: 1 of 5, e.g. 3 and 2; equal coordinates are one point; each takes part",
+        ),
         // The prior.
         (
             vec![("0.05]", "1e300]")],
@@ -293,7 +302,7 @@ fn gates_that_hold_too_much_are_refused() {
 
 #[test]
 fn the_nearest_two_of_many_points_are_found() {
-    use crate::{ModelPoint, site::nearest_two};
+    use crate::site::{model::ModelPoint, target::nearest_two};
     let step = |k: usize, at: f64| ((k as f64 * at).sin() * 43_758.545_3).fract();
     let points: Vec<ModelPoint> =
         (0..300).map(|k| ModelPoint::exact("", [step(k, 12.9898), step(k, 78.233), step(k, 37.719)].into())).collect();

@@ -5,12 +5,20 @@ use std::path::Path;
 use nalgebra::Vector3;
 use seafix_component::{Fault, counted, number};
 
-use super::CoherenceProblem;
+use super::{duplicates::firsts, input::CoherenceProblem};
 use crate::{
-    PriorBound, Rejected, RigidConsensus,
-    search::{FEWER, NEEDED},
-    site::{COINCIDENT, SUSPICIOUS, congruences, nearest_two},
-    solve::{ON_A_LINE, second_ratio},
+    problem::PriorBound,
+    search::{
+        identification::{FEWER, Rejected},
+        limits::NEEDED,
+        rigid_consensus::RigidConsensus,
+    },
+    site::{
+        check::{COINCIDENT, SUSPICIOUS},
+        congruence::congruences,
+        target::nearest_two,
+    },
+    solve::degeneracy::{ON_A_LINE, second_ratio},
 };
 
 /// The ratio of a length to the noise below which it is far below the noise.
@@ -23,6 +31,9 @@ const OUT_OF_VIEW: f64 = 1e6;
 const MAX_CHECKED: usize = 100;
 /// Distance of mapped points, in standard deviations, up to which a motion equals the identity.
 const DISTINGUISHED: f64 = 3.0;
+
+/// The standard deviation (rad) of a rotation that leaves an attitude useless, 5°.
+const OPEN: f64 = 0.09;
 
 /// The warnings about a file.
 struct Hints<'a> {
@@ -39,13 +50,14 @@ impl Hints<'_> {
 impl CoherenceProblem {
     /// Warnings about valid but implausible contents of `file`.
     ///
-    /// They cover points too few for a pose, collinear, or too close for Δ; a symmetric model; zero noise, or noise far
+    /// They cover points too few for a pose, collinear, repeated, or too close for Δ; a symmetric model; zero noise, or noise far
     /// above Δ; putative pairs that determine no pose; a prior that places the object out of view or bounds nothing;
     /// coordinates that are apparently not in metres; and too many candidates.
     pub fn warnings(&self, file: &Path) -> Vec<Fault> {
         let mut reported = Hints { file, all: Vec::new() };
         self.of_the_model(&mut reported);
         self.of_the_cloud(&mut reported);
+        self.of_duplicates(&mut reported);
         self.of_the_noise(&mut reported);
         self.of_putative(&mut reported);
         let before = reported.all.len();
@@ -68,6 +80,11 @@ impl CoherenceProblem {
         if let Some(ratio) = on_a_line(&self.model_places()) {
             let remedy = "a rotation about the line changes no measurement; add a point off the line";
             reported.warn("collinear model points", of_extents(ratio), remedy);
+        } else if let Some(turn) = self.open_turn().filter(|turn| *turn > OPEN && self.typical_sigma() <= self.extent())
+        {
+            let value =
+                format!("the rotation about the line has an error of {:.0}° (one sigma)", turn.to_degrees().min(180.0));
+            reported.warn("model points near a line", value, "add a point off the line");
         }
         if let Some((degrees, off)) = self.symmetry() {
             let value = format!(
@@ -119,6 +136,22 @@ impl CoherenceProblem {
                 number(self.extent())
             );
             reported.warn("cloud points too far apart", value, "give coordinates of both in metres");
+        }
+    }
+
+    fn of_duplicates(&self, reported: &mut Hints<'_>) {
+        if self.putative.is_none() {
+            return;
+        }
+        let models = firsts(self.model.iter().map(|point| point.at));
+        let clouds = firsts(self.cloud.iter().map(|point| point.position.at));
+        for (what, firsts) in [("model", models), ("cloud", clouds)] {
+            let mut again = firsts.iter().enumerate().filter(|(index, first)| index != *first);
+            if let Some((index, first)) = again.next() {
+                let value = format!("{} of {}, e.g. {index} and {first}", 1 + again.count(), firsts.len());
+                let remedy = "equal coordinates are one point; each takes part as its first";
+                reported.warn(&format!("repeated {what} points"), value, remedy);
+            }
         }
     }
 
@@ -258,7 +291,7 @@ impl CoherenceProblem {
     }
 
     /// The median over the cloud of the standard deviation per axis (m).
-    fn typical_sigma(&self) -> f64 {
+    pub(super) fn typical_sigma(&self) -> f64 {
         let mut all: Vec<f64> =
             self.cloud.iter().map(|point| (point.position.covariance.trace() / 3.0).sqrt()).collect();
         let middle = all.len() / 2;

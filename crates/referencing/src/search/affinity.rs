@@ -1,7 +1,7 @@
 //! The consistency graph with weights for the agreement of each coherent pair of pairs.
 
-use super::{Rejected, association::Association, grow::max_possible};
-use crate::Problem;
+use super::{association::Association, grow::max_possible, identification::Rejected};
+use crate::problem::Problem;
 
 /// A symmetric matrix over the vertices, zero for incoherent ones; its upper half by rows.
 #[derive(Debug)]
@@ -45,6 +45,15 @@ impl Affinity {
 
     pub(super) fn edges(&self) -> usize {
         self.columns.len()
+    }
+
+    /// Calls `each` with the ends, the smaller first, and the weight of every edge, by rows.
+    pub(super) fn each(&self, mut each: impl FnMut(usize, usize, f32)) {
+        for (v, ends) in self.starts.windows(2).enumerate() {
+            for (&w, &weight) in self.columns[ends[0]..ends[1]].iter().zip(&self.weights[ends[0]..ends[1]]) {
+                each(v, w as usize, weight);
+            }
+        }
     }
 
     /// M x, and A x with the unweighted graph A.

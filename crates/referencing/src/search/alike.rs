@@ -3,7 +3,11 @@
 use nalgebra::Vector3;
 
 use super::{association::Association, clique, orientation::Sense};
-use crate::{Correspondence, Observations, Problem, Tolerance, solve::least_squares};
+use crate::{
+    observations::Observations,
+    problem::{Correspondence, Problem, Tolerance},
+    solve::closed_form::fit as least_squares,
+};
 
 /// Distance from a line (fraction of the model's extent) below which points determine no rotation about it.
 const SLIM: f64 = 0.05;
@@ -75,7 +79,7 @@ fn largest_along_a_line(points: &[Vector3<f64>]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Candidates, ModelPoint};
+    use crate::{candidates::Candidates, site::model::ModelPoint};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
@@ -104,6 +108,7 @@ mod tests {
             candidates: &candidates,
             tolerance: Tolerance::Fixed(0.02),
             prior: None,
+            edges: Default::default(),
         };
         let best: Vec<Correspondence> = (0..12).map(|i| Correspondence { model: i, cloud: i }).collect();
         all_alike(&problem, &Association::of(&problem), &best, Sense::Proper, 100_000).0

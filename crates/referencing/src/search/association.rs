@@ -4,8 +4,8 @@ use seafix_geometry::Point;
 
 use super::{bitset::BitMatrix, edges::Sites};
 use crate::{
-    Correspondence, Problem, Tolerance,
     lanes::{LANES, ones_of},
+    problem::{Correspondence, Problem, Tolerance},
 };
 
 /// The consistency graph, whose cliques are one-to-one sets of mutually coherent pairs.

@@ -1,19 +1,19 @@
 //! Backtracking over subsets of the model points.
 
 use rand::Rng;
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, MAX_TIES, NEEDED, Rejected, Search,
     association::vertices,
-    bounded,
     grow::{feasible, max_possible, so_far},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, MAX_TIES, NEEDED, bounded},
     maximum_clique::min_residual,
     orientation::{Sense, wholly_mirrored},
     volumes::Volumes,
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Backtracking with forward checking (Haralick and Elliott 1980): the largest admissible set, without a graph.
 ///
@@ -24,7 +24,7 @@ use crate::{Correspondence, Problem};
 ///
 /// Exact within the budget. Among sets of one size the minimum residual of a rigid fit decides, then the coordinates.
 /// Exponential in the worst case: Π (m_i + 1) for lists of m_i.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Backtracking {
     /// Whether mirror images are rejected; `false` compares distances only, as in the paper.
@@ -115,6 +115,7 @@ impl Search for Backtracking {
             undecided = Some(Rejected::Budget { budget, best: size, bound, pair_tests });
         }
         Ok(Identification {
+            edges: Vec::new(),
             alternatives: ties.iter().map(|set| run.pairs(set)).collect(),
             alternatives_complete,
             optimal: complete,

@@ -8,7 +8,7 @@ use super::{
     quadruples::Quadruples,
     volumes::Volumes,
 };
-use crate::Problem;
+use crate::problem::Problem;
 
 /// Maximum size up to which every quadruple is tested for orientation while the set grows.
 pub(super) const MAX_ORIENTED: usize = 40;

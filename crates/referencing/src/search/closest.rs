@@ -3,7 +3,7 @@
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::association::vertices;
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// The distance, fit and limits of a closest-point search.
 pub(super) struct Closest<D, F> {

@@ -1,17 +1,17 @@
 //! Complete enumeration: the paper's search without gates.
 
 use rand::Rng;
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Rejected, Search,
     association::by_coordinates,
-    bounded,
     grow::{feasible, max_possible},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, NEEDED, bounded},
     structural_coherence::{Enumeration, Samples},
 };
-use crate::Problem;
+use crate::problem::Problem;
 
 /// The baseline without gates (the paper's ref. 35): every cloud point is a candidate of every model point.
 ///
@@ -19,7 +19,7 @@ use crate::Problem;
 /// are. Longest samples first; the first coherent one is the answer, as in `structural-coherence`.
 ///
 /// Exact within the budget; Σ_q C(n, q) M^q choices, q! times as many with the paper's ordered samples.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct CompleteEnumeration {
     /// Kind of samples.

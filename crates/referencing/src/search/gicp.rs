@@ -2,17 +2,22 @@
 
 use nalgebra::Matrix3;
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Camera, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Rejected, Search, bounded,
     closest::Closest,
     grow::{conclude_within, feasible},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, bounded},
     pose::refined,
 };
-use crate::{Correspondence, Mahalanobis, Observations, Problem, Solver};
+use crate::{
+    observations::Observations,
+    problem::{Correspondence, Problem},
+    solve::{mahalanobis::Mahalanobis, solver::Solver},
+};
 
 /// Generalised ICP (Segal, Haehnel and Thrun 2009) with point covariances.
 ///
@@ -22,7 +27,7 @@ use crate::{Correspondence, Mahalanobis, Observations, Problem, Solver};
 ///
 /// Not exact: it ends in the minimum next to the prior. N distances an iteration for N candidate pairs, and a weighted
 /// fit. Needs a prior, and positive definite covariances: a point without one is no candidate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Gicp {
     /// Whether mirror images are rejected; `false` relies on the pose alone.

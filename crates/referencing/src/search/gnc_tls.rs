@@ -1,17 +1,22 @@
 //! GNC-TLS: one robust fit to all candidate pairs.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, NEEDED, Rejected, Search,
     alike::slack,
     association::vertices,
     grow::{conclude, feasible},
+    identification::{Identification, Rejected, Search},
+    limits::NEEDED,
     pose::refined,
 };
-use crate::{Observations, Problem, Solver, solve};
+use crate::{
+    observations::Observations,
+    problem::Problem,
+    solve::{self, solver::Solver},
+};
 
 /// Truncated least squares by graduated non-convexity (Yang et al. 2020) over all candidate pairs.
 ///
@@ -19,7 +24,7 @@ use crate::{Observations, Problem, Solver, solve};
 /// pose explains. Not exact: it follows one minimum from the convex problem on. O(N) a step, some fifty steps for N
 /// pairs. The method suits putative correspondences with a large fraction of true ones; with many candidates for each
 /// model point it fits their mean.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct GncTls {
     /// Whether mirror images are rejected; `false` relies on the pose alone.
@@ -38,6 +43,7 @@ impl Default for GncTls {
 
 impl Component for GncTls {
     const NAME: &'static str = "gnc-tls";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "one robust fit to all candidate pairs, by graduated non-convexity";
     const SOURCE: &'static str = "Yang, Antonante, Tzoumas, Carlone, Graduated non-convexity for robust spatial \
                                   perception, 2020";

@@ -3,15 +3,16 @@
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{
-    Identification, NEEDED, Rejected,
     association::vertices,
     clique::{MAX_ORIENTED, decisive_members},
+    identification::{Identification, Rejected},
+    limits::NEEDED,
     orientation::{Sense, unmirrored, wholly_mirrored},
     pose::fraction,
     quadruples::Quadruples,
     volumes::Volumes,
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Maximum number of pairs examined for any admissible set, and number of sets begun with them.
 const MAX_GROWN: usize = 2048;
@@ -90,7 +91,11 @@ pub(super) fn conclude(
         }
         let all: Vec<_> = pairs.iter().copied().chain(vertices(problem)).collect();
         let image = grow(problem, &all, Sense::Mirrored, &mut pair_tests);
-        if image.len() > pairs.len() && wholly_mirrored(problem, &image[..image.len().min(MAX_ORIENTED)]) {
+        // The ranking may have stopped early: on a planar scene the object itself grows from the same pairs too.
+        let larger = image.len() > pairs.len()
+            && wholly_mirrored(problem, &image[..image.len().min(MAX_ORIENTED)])
+            && image.len() > grow(problem, &all, sense, &mut pair_tests).len();
+        if larger {
             let mirrored = Rejected::Mirrored { best: image.len(), proved: false };
             if pairs.len() <= NEEDED {
                 return Err(mirrored);

@@ -1,17 +1,18 @@
 //! Iterative closest points, from the prior.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Camera, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Rejected, Search, bounded,
     closest::Closest,
     grow::{conclude_within, feasible},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, bounded},
     pose::{fitted, refined},
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Trimmed ICP (Besl and McKay 1992, Chetverikov et al. 2002).
 ///
@@ -21,7 +22,7 @@ use crate::{Correspondence, Problem};
 ///
 /// Not exact: it ends in the minimum next to the prior, and clutter in the gates holds it back. N distances an
 /// iteration for N candidate pairs. Needs a prior.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Icp {
     /// Whether mirror images are rejected; `false` relies on the pose alone.

@@ -1,20 +1,20 @@
 //! The interpretation tree: one level a model point, one branch a candidate, and a wild card.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
-    bounded,
     grow::{admits, conclude, feasible, max_possible, so_far},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, NEEDED, bounded},
     orientation::Sense,
     pose::{fitted, fraction},
     quadruples::Quadruples,
     volumes::Volumes,
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Interpretation tree (Grimson and Lozano-Pérez 1987): the longest interpretation that a rigid motion explains.
 ///
@@ -25,7 +25,7 @@ use crate::{Correspondence, Problem};
 /// The search visits every interpretation longer than the best, unless `enough` stops it at the first that is long
 /// enough, as in the original. With `enough` = 1 no longer set passes the model test, but longer sets that are only
 /// coherent may exist. Exponential: Π (m_i + 1) for lists of m_i.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct InterpretationTree {
     /// Whether mirror images are rejected; `false` leaves them to the model test.
@@ -48,6 +48,7 @@ impl Default for InterpretationTree {
 
 impl Component for InterpretationTree {
     const NAME: &'static str = "interpretation-tree";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "the longest interpretation that is coherent and passes a rigid fit, depth first";
     const SOURCE: &'static str = "Grimson, Lozano-Pérez, Localizing overlapping parts by searching the interpretation \
                                   tree, 1987";

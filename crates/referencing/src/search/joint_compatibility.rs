@@ -2,19 +2,22 @@
 
 use nalgebra::Vector3;
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
-    bounded,
     grow::{admits, conclude, feasible, max_possible, so_far},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, NEEDED, bounded},
     orientation::Sense,
     quadruples::Quadruples,
     volumes::Volumes,
 };
-use crate::{Correspondence, Problem, Tolerance, candidates::chi_square};
+use crate::{
+    chi_square::chi_square,
+    problem::{Correspondence, Problem, Tolerance},
+};
 
 /// Joint compatibility branch and bound (Neira and Tardós 2001) on distances.
 ///
@@ -28,7 +31,7 @@ use crate::{Correspondence, Problem, Tolerance, candidates::chi_square};
 /// incremental form). With a fixed Δ the noise is isotropic, and Δ counts as three standard deviations of a distance.
 ///
 /// Exact in this measure within the budget. Exponential in the worst case; k² a node.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct JointCompatibility {
     /// Whether mirror images are rejected; `false` compares distances only.
@@ -49,6 +52,7 @@ impl Default for JointCompatibility {
 
 impl Component for JointCompatibility {
     const NAME: &'static str = "joint-compatibility";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "the longest hypothesis whose distances are jointly compatible, by branch and bound";
     const SOURCE: &'static str = "Neira, Tardós, Data association in stochastic mapping using the joint compatibility \
                                   test, 2001; the incremental form: Li, Li, Song, Zou, Yan, IJCBB, 2014";

@@ -30,7 +30,8 @@ pub(super) struct Workshop {
 
 impl Workshop {
     pub(super) fn of(graph: &Association) -> Self {
-        let max = |of: fn(&crate::Correspondence) -> usize| graph.vertices.iter().map(of).max().map_or(0, |m| m + 1);
+        let max =
+            |of: fn(&crate::problem::Correspondence) -> usize| graph.vertices.iter().map(of).max().map_or(0, |m| m + 1);
         Self {
             place: vec![0; graph.vertices.len()],
             models: Names::upto(max(|pair| pair.model)),

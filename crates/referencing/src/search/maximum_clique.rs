@@ -1,26 +1,30 @@
 //! Maximum clique: the largest admissible set, with a proof.
 
 use rand::Rng;
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, MAX_TIES, NEEDED, Rejected, Search,
     alike::all_alike,
     association::Association,
-    bounded,
     clique::{self, MAX_ORIENTED},
     grow::{feasible, so_far},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, MAX_TIES, NEEDED, bounded},
     orientation::{Sense, unmirrored, wholly_mirrored},
 };
-use crate::{Correspondence, Observations, Problem, solve::least_squares};
+use crate::{
+    observations::Observations,
+    problem::{Correspondence, Problem},
+    solve::closed_form::fit as least_squares,
+};
 
 /// The largest admissible set of correspondences, as a maximum clique of the consistency graph.
 ///
 /// Every two pairs are coherent, the set is one-to-one, and no four pairs are a mirror image of the model. The answer
 /// is exact within the budget. Among sets of one size the minimum residual of a rigid fit decides, then the
 /// coordinates. Time O(K²) for the graph of K candidate pairs, then exponential in K at worst.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaximumClique {
     /// Whether mirror images are rejected; `false` compares distances only, as in the paper.
@@ -118,6 +122,7 @@ impl Search for MaximumClique {
             (!decided).then_some(Rejected::Budget { budget, best: pairs.len(), bound: largest.bound, pair_tests })
         });
         Ok(Identification {
+            edges: Vec::new(),
             pairs,
             alternatives,
             alternatives_complete: all,

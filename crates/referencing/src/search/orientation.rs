@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::volumes::Volumes;
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Standard deviations of the measured volume that a model volume must exceed to decide.
 const DECISIVE: f64 = 3.0;
@@ -212,7 +212,7 @@ fn choose(n: usize, k: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Candidates, ModelPoint, Tolerance};
+    use crate::{candidates::Candidates, problem::Tolerance, site::model::ModelPoint};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
@@ -240,7 +240,14 @@ mod tests {
             seen.map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, 0.001), pixels: None }).collect();
         let candidates = Candidates::from_pairs(60, (0..60).map(|i| (i, i)));
         let tolerance = Tolerance::Fixed(0.01);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let pairs: Vec<Correspondence> = (0..60).map(|i| Correspondence { model: i, cloud: i }).collect();
         unmirrored(&problem, pairs, max)
     }

@@ -3,7 +3,11 @@
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::{alike::slack, bitset::BitSet};
-use crate::{Correspondence, Kabsch, Observations, Problem, Solver};
+use crate::{
+    observations::Observations,
+    problem::{Correspondence, Problem},
+    solve::{kabsch::Kabsch, solver::Solver},
+};
 
 /// The least-squares pose of some pairs; `None` if they are too few, collinear or not finite.
 pub(super) fn fitted(problem: &Problem<'_>, pairs: &[Correspondence]) -> Option<Transform<Object, Camera>> {

@@ -2,17 +2,17 @@
 
 use nalgebra::Vector3;
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, Rejected, Search,
     association::vertices,
-    bounded,
     grow::{conclude_within, feasible},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, bounded},
     pose::{fitted, refined},
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Generalised Hough transform (Ballard 1981) over the displacement of the prior.
 ///
@@ -23,7 +23,7 @@ use crate::{Correspondence, Problem};
 ///
 /// Not exact: a rotation error of the prior spreads the offsets by its angle times the model's extent, and beyond
 /// `radius` votes are lost. Time N log N for N evenly spread candidate pairs, at most the budget. Needs a prior.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct PoseVote {
     /// Whether mirror images are rejected; `false` relies on the pose alone.

@@ -2,8 +2,8 @@
 
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::{RepeatedPattern, StructuredClutter};
-use crate::{Alternative, Correspondence, ModelPoint, rms_apart};
+use super::consensus::structured_clutter::StructuredClutter;
+use crate::{accept::apart::rms_apart, alternative::Alternative, problem::Correspondence, site::model::ModelPoint};
 
 /// Evidence (nats) below the best at which an explanation is not listed; e⁻⁷·⁶ = 0.05 %.
 const NEGLIGIBLE: f64 = 7.6;
@@ -13,6 +13,8 @@ const NEGLIGIBLE: f64 = 7.6;
 pub struct Explanation {
     /// The pairs, in the order of the model points.
     pub pairs: Vec<Correspondence>,
+    /// The edges, in the order of the model edges.
+    pub edges: Vec<Correspondence>,
     /// The MAP pose of these pairs.
     pub object_from_camera: Transform<Object, Camera>,
     /// Log evidence ratio (nats): ln of p(data | a pose near this one) / p(data | no object).
@@ -24,7 +26,12 @@ pub struct Explanation {
 impl Explanation {
     /// The explanation as an alternative; its score is the evidence.
     pub(crate) fn alternative(&self) -> Alternative {
-        Alternative { object_from_camera: self.object_from_camera, pairs: self.pairs.clone(), score: self.ln_evidence }
+        Alternative {
+            object_from_camera: self.object_from_camera,
+            pairs: self.pairs.clone(),
+            edges: self.edges.clone(),
+            score: self.ln_evidence,
+        }
     }
 }
 
@@ -40,23 +47,29 @@ pub struct Posterior {
     /// A copy may be complete or partial. `None` if none was searched for, since no pose has enough evidence to be
     /// accepted.
     pub copies_sought: Option<bool>,
-    /// Evidence of a pattern that continues beyond the object; `None` for an object without a pattern.
-    pub repeated_pattern: Option<RepeatedPattern>,
+    /// ln evidence (nats) of a pattern like the object's in its place, without the object; `None` for an object without
+    /// a pattern.
+    pub pattern_alone: Option<f64>,
     /// The strongest evidence of structured clutter, which resembles the object; `None` without any.
     pub structured_clutter: Option<StructuredClutter>,
-    /// The best pose elsewhere, for comparison with the answer.
+    /// A pose elsewhere beyond those of `explanations` and `beside`, for comparison with the answer.
     ///
-    /// If no pose elsewhere was met, it is the best of the poses that were followed regardless of their evidence.
+    /// It is the best one with at least the evidence of absence. If no list has a pose elsewhere, it is a pose of
+    /// three or more agreeing pairs that contradict the best pose, whatever its evidence.
     pub unlikely: Option<Explanation>,
     /// Upper bound of the evidence (nats) by which another set exceeds the best pose.
     ///
     /// It holds for admissible sets under uniform clutter. Zero: the best pose is proved optimal. `None`: no proof was
     /// requested.
     pub evidence_gap: Option<f64>,
+    /// ln of the number of false alarms of the best pose by points and edges together; `None` without edges or prior.
+    pub ln_nfa: Option<f64>,
 }
 
-/// Minimum evidence (nats) of a second copy of the object, complete or partial, beside the best pose.
-pub(super) const COPY: f64 = 9.0;
+/// Evidence (nats) that makes a pose beside the best a second copy of the object in any case, complete or partial.
+///
+/// Two possible objects forbid a choice even if the second is not certain.
+pub(crate) const COPY: f64 = 9.0;
 
 /// Evidence (nats) that clutter alone reaches in at most one frame of twenty.
 ///
@@ -64,7 +77,7 @@ pub(super) const COPY: f64 = 9.0;
 const ACCIDENT: f64 = 3.0;
 
 /// ln of the prior probability that clutter resembles the object: so small that it matters only with evidence for it.
-const LN_RESEMBLES: f64 = -11.5;
+pub(super) const LN_RESEMBLES: f64 = -11.5;
 
 /// The posterior probabilities of the hypotheses.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,16 +112,16 @@ impl Posterior {
 
     /// A second copy of the object elsewhere, complete or partial.
     ///
-    /// The copy is a pose that explains other cloud points than the best pose, with evidence that would be accepted
-    /// alone: the probability of absence is at most `absence`. Two poses with such evidence are not explained by
-    /// clutter, and their evidence does not decide which of them is the object: it reports only how much of each is
-    /// visible.
-    ///
-    /// Evidence of nine nats is a copy in any case, whatever `absence` is: two possible objects forbid a choice even if
-    /// the second is not certain.
-    pub fn copy(&self, model: &[ModelPoint], limit: f64, absence: f64) -> Option<&Explanation> {
-        let likely = libm::log((1.0 - absence) / absence).min(COPY);
-        self.apart(&self.beside, model, limit).into_iter().find(|other| other.ln_evidence >= likely)
+    /// The copy is a pose that explains other cloud points than the best pose, with evidence (nats) that `suffices` by
+    /// itself. Two poses with such evidence are not explained by clutter, and their evidence does not decide which of
+    /// them is the object: it reports only how much of each is visible.
+    pub(crate) fn copy(
+        &self,
+        model: &[ModelPoint],
+        limit: f64,
+        suffices: impl Fn(f64) -> bool,
+    ) -> Option<&Explanation> {
+        self.apart(&self.beside, model, limit).into_iter().find(|other| suffices(other.ln_evidence))
     }
 
     /// The best pose elsewhere, whatever its evidence.
@@ -131,7 +144,7 @@ impl Posterior {
     /// P_m = Λ_m/(1 + Σ Λ), with evidence Λ and equal prior probabilities of presence and absence. Poses within `limit`
     /// (m, RMS over the model points) of the best count as one with it. Further hypotheses:
     ///
-    /// - A repeated pattern, alone or around the object, has the same prior probability.
+    /// - A pattern like the object's is in its place, without the object.
     /// - A pose beside the best, in points that the best does not use, shows how much evidence clutter of this cloud
     ///   produces. Without the object, clutter would have produced the best pose with the same probability.
     /// - Structured clutter ([`StructuredClutter`]): if another pose shows that clutter resembles the object, the best
@@ -140,27 +153,26 @@ impl Posterior {
         let Some(best) = self.explanations.first() else {
             return PosteriorProbabilities { map_estimate: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
         };
-        let pattern =
-            self.repeated_pattern.unwrap_or(RepeatedPattern { alone: f64::NEG_INFINITY, around: f64::NEG_INFINITY });
+        let pattern = self.pattern_alone.unwrap_or(f64::NEG_INFINITY);
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
         let clutter = if beside > ACCIDENT { beside } else { 0.0 };
         // The object beside structured clutter, and structured clutter alone.
         let among =
             self.structured_clutter.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_RESEMBLES);
         let imitated = self.structured_clutter.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);
-        let max =
-            [clutter, pattern.alone, pattern.around, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
+        let max = [clutter, pattern, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
         let (mut map_estimate, mut elsewhere) = (0.0, 0.0);
         for other in &self.explanations {
-            let fraction = libm::exp(other.ln_evidence - max);
+            // Structured clutter may be beside the object wherever the object is.
+            let less = other.ln_evidence - best.ln_evidence;
+            let fraction = libm::exp(other.ln_evidence - max) + libm::exp(among + less - max);
             if rms_apart(model, &best.object_from_camera, &other.object_from_camera) <= limit {
                 map_estimate += fraction;
             } else {
                 elsewhere += fraction;
             }
         }
-        map_estimate += libm::exp(pattern.around - max) + libm::exp(among - max);
-        let alike = libm::exp(pattern.alone - max);
+        let alike = libm::exp(pattern - max);
         let of_clutter = libm::exp(clutter - max) + libm::exp(imitated - max);
         let absent = of_clutter + alike;
         let all = map_estimate + elsewhere + absent;
@@ -180,33 +192,36 @@ mod tests {
     use super::*;
     use seafix_geometry::Transform;
 
-    /// Fails if a copy must be accepted by itself.
     #[test]
-    fn nine_nats_are_a_copy_however_sure_a_first_one_must_be() {
+    fn a_copy_is_elsewhere_and_suffices() {
         let pose = |x: f64| Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(x, 0.0, 0.0));
         let at = |x: f64, ln_evidence: f64| Explanation {
             pairs: Vec::new(),
+            edges: Vec::new(),
             object_from_camera: pose(x),
             ln_evidence,
             ln_clutter_density: 0.0,
         };
         let model = [ModelPoint::exact("", [0.0; 3].into())];
-        let reported = |beside: Explanation, absence: f64| {
+        let reported = |beside: Explanation| {
             let (explanations, beside) = (vec![at(0.0, 40.0)], vec![beside]);
             let posterior = Posterior { explanations, beside, ..Posterior::default() };
-            posterior.copy(&model, 0.1, absence).is_some()
+            posterior.copy(&model, 0.1, |ln_evidence| ln_evidence >= 5.0).is_some()
         };
-        // ln(1/2e-5) = 10.8, ln(1/1e-2) = 4.6.
-        assert_eq!([4.0, 5.0, 8.9, 9.1].map(|evidence| reported(at(1.0, evidence), 2e-5)), [false, false, false, true]);
-        assert_eq!([4.0, 5.0, 8.9, 9.1].map(|evidence| reported(at(1.0, evidence), 1e-2)), [false, true, true, true]);
-        assert!(!reported(at(0.05, 30.0), 1e-2), "the same place");
+        assert_eq!([4.9, 5.0].map(|evidence| reported(at(1.0, evidence))), [false, true]);
+        assert!(!reported(at(0.05, 30.0)), "the same place");
     }
 
     #[test]
     fn where_clutter_resembles_the_object_it_decides_how_the_places_are_filled() {
         let pose = Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::zeros());
-        let best =
-            Explanation { pairs: Vec::new(), object_from_camera: pose, ln_evidence: 40.0, ln_clutter_density: 0.0 };
+        let best = Explanation {
+            pairs: Vec::new(),
+            edges: Vec::new(),
+            object_from_camera: pose,
+            ln_evidence: 40.0,
+            ln_clutter_density: 0.0,
+        };
         let absent = |structured_clutter: Option<StructuredClutter>| {
             let posterior = Posterior { explanations: vec![best.clone()], structured_clutter, ..Posterior::default() };
             let probabilities = posterior.probabilities(&[], 0.1);

@@ -100,7 +100,11 @@ mod tests {
     use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 
     use super::*;
-    use crate::{Candidates, Correspondence, ModelPoint, Problem, Tolerance};
+    use crate::{
+        candidates::Candidates,
+        problem::{Correspondence, Problem, Tolerance},
+        site::model::ModelPoint,
+    };
 
     #[test]
     fn quadruples_are_counted() {
@@ -126,7 +130,14 @@ mod tests {
                 .collect();
             let candidates = Candidates::from_pairs(n + 1, (0..=n).map(|i| (i, i)));
             let tolerance = Tolerance::Fixed(1.0);
-            let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+            let problem = Problem {
+                model: &model,
+                cloud: &cloud,
+                candidates: &candidates,
+                tolerance,
+                prior: None,
+                edges: Default::default(),
+            };
             let vertices: Vec<Correspondence> = (0..=n).map(|i| Correspondence { model: i, cloud: i }).collect();
             let volumes = Volumes::of(&problem, &vertices);
             let members: Vec<usize> = (1..=n).rev().collect();

@@ -1,17 +1,17 @@
 //! RANSAC: poses of random triples.
 
 use rand::{Rng, RngExt};
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
-    bounded,
     grow::{conclude_within, feasible, max_possible, so_far},
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, NEEDED, bounded},
     pose::{fitted, fraction, refined},
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// RANSAC (Fischler and Bolles 1981) with the truncated score of MSAC.
 ///
@@ -22,7 +22,7 @@ use crate::{Correspondence, Problem};
 /// Not exact. Triples are sampled until one of true pairs was among them with the probability `confidence`, according
 /// to the best inlier fraction, or until the budget ends: O(w⁻³) triples for a fraction w of true pairs, N residuals
 /// for each coherent one. The best pose is fitted again to the pairs that it explains.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Ransac {
     /// Whether mirror images are rejected; `false` relies on distances and pose alone.
@@ -43,6 +43,7 @@ impl Default for Ransac {
 
 impl Component for Ransac {
     const NAME: &'static str = "ransac";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "the best of the poses of random coherent triples";
     const SOURCE: &'static str = "Fischler, Bolles, Random sample consensus, 1981; the score: Torr, Zisserman, MLESAC, \
                                   2000; the edge-length check: Zhou, Park, Koltun, Open3D, 2018";

@@ -1,16 +1,17 @@
 //! Spectral matching: the principal eigenvector of the agreement matrix.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, NEEDED, Rejected, Search,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
     grow::{conclude, feasible},
+    identification::{Identification, Rejected, Search},
+    limits::NEEDED,
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Spectral matching (Leordeanu and Hebert 2005).
 ///
@@ -21,7 +22,7 @@ use crate::{Correspondence, Problem};
 /// Exact for the relaxed problem only, without a proof for the set. E operations an iteration for E edges of the graph,
 /// after N²/2 pair tests for N candidate pairs. If true pairs are few among many accidental agreements, the eigenvector
 /// spreads over the latter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Spectral {
     /// Whether mirror images are rejected; `false` compares distances only.
@@ -42,6 +43,7 @@ impl Default for Spectral {
 
 impl Component for Spectral {
     const NAME: &'static str = "spectral";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "pairs by their weight in the principal eigenvector of the agreements";
     const SOURCE: &'static str = "Leordeanu, Hebert, A spectral technique for correspondence problems using pairwise \
                                   constraints, 2005";

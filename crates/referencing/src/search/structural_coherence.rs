@@ -1,19 +1,20 @@
 //! Structural coherence: the paper's search, in the paper's order.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BUDGET, Identification, NEEDED, Rejected, Search,
     association::vertices,
     grow::so_far,
+    identification::{Identification, Rejected, Search},
+    limits::{BUDGET, NEEDED},
     orientation::{mirrored, quadruples, wholly_mirrored},
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// The kind of samples of q model points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Samples {
     /// The paper's ordered samples A_n^q: each set of points q! times.
@@ -31,7 +32,7 @@ pub enum Samples {
 /// There are Σ_q n!/(n − q)! m^q choices of m candidates a point, with combinations q! times fewer. The answer is
 /// exact, but its cost is prohibitive beyond some ten points: the budget ends the search, and the rejection states the
 /// best set.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct StructuralCoherence {
     /// Kind of samples.

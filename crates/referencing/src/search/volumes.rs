@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::orientation::Sense;
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// Coordinates of each vertex in model and cloud, with the exact test of orientation.
 ///

@@ -1,17 +1,17 @@
 //! Weighted clique: the densest consistent set.
 
 use rand::Rng;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Identification, Rejected, Search,
     affinity::{Affinity, by_weight, normalized},
     association::Association,
-    bounded,
     grow::{conclude_within, feasible},
+    identification::{Identification, Rejected, Search},
+    limits::bounded,
 };
-use crate::{Correspondence, Problem};
+use crate::problem::{Correspondence, Problem};
 
 /// CLIPPER (Lusk, Fathian and How 2021): the densest consistent set.
 ///
@@ -22,7 +22,7 @@ use crate::{Correspondence, Problem};
 /// Projected gradient ascent on uᵀ M u − d Σ u_a u_b over the incoherent pairs; the penalty d grows until the support,
 /// which is the answer, has no incoherent pair. The result is a local maximum without a proof. E operations a step for
 /// E edges, after N²/2 pair tests for N candidate pairs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct WeightedClique {
     /// Whether mirror images are rejected; `false` compares distances only.
@@ -45,6 +45,7 @@ impl Default for WeightedClique {
 
 impl Component for WeightedClique {
     const NAME: &'static str = "weighted-clique";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "the densest consistent set, by projected gradient ascent with a growing penalty";
     const SOURCE: &'static str = "Lusk, Fathian, How, CLIPPER: a graph-theoretic framework for robust data \
                                   association, 2021";

@@ -7,8 +7,9 @@ use seafix_component::{Fault, counted, line_of, nearest};
 use seafix_geometry::{Object, Point, World, triad};
 
 use super::{
-    Interest, ModelPoint, Site, SiteObject,
+    check_edges,
     file::{AXES, ObjectFile, SiteFile},
+    model::{Interest, ModelPoint, Site, SiteObject},
     target::diameter,
 };
 
@@ -29,24 +30,24 @@ const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
 const SURVEY_SIGMAS: f64 = 4.0;
 
 /// The collected faults and warnings, with the text for their line numbers.
-struct Checker<'a> {
+pub(super) struct Checker<'a> {
     text: &'a str,
     file: &'a Path,
-    faults: Vec<Fault>,
-    warnings: Vec<Fault>,
+    pub(super) faults: Vec<Fault>,
+    pub(super) warnings: Vec<Fault>,
 }
 
 impl Checker<'_> {
-    fn at(&self, what: impl Into<String>, path: &[&str]) -> Fault {
+    pub(super) fn at(&self, what: impl Into<String>, path: &[&str]) -> Fault {
         Fault::new(what, self.file).on_line(line_of(self.text, path))
     }
 
-    fn fault(&mut self, fault: Fault) {
+    pub(super) fn fault(&mut self, fault: Fault) {
         self.faults.push(fault);
     }
 
     /// Adds a fault unless the coordinates are finite.
-    fn finite(&mut self, what: &str, values: &[f64], path: &[&str]) {
+    pub(super) fn finite(&mut self, what: &str, values: &[f64], path: &[&str]) {
         if !values.iter().all(|value| value.is_finite()) {
             let fault = self.at(format!("{what} is not finite"), path).value(format!("{values:?}"));
             self.fault(fault.remedy("give finite numbers, in metres"));
@@ -62,7 +63,7 @@ impl Checker<'_> {
         }
     }
 
-    fn sigma(&mut self, what: &str, value: f64, path: &[&str]) {
+    pub(super) fn sigma(&mut self, what: &str, value: f64, path: &[&str]) {
         if !(value >= 0.0 && value.is_finite()) {
             let fault = self.at(format!("{what} is not a standard deviation"), path).value(value);
             self.fault(fault.remedy("give a finite number of metres, zero or more"));
@@ -70,7 +71,12 @@ impl Checker<'_> {
     }
 
     /// Adds a fault for every empty or repeated identifier.
-    fn unique<'i>(&mut self, kind: &str, ids: impl Iterator<Item = &'i str>, path: impl Fn(&str) -> Vec<String>) {
+    pub(super) fn unique<'i>(
+        &mut self,
+        kind: &str,
+        ids: impl Iterator<Item = &'i str>,
+        path: impl Fn(&str) -> Vec<String>,
+    ) {
         let mut seen: HashMap<&str, usize> = HashMap::new();
         for (index, id) in ids.enumerate() {
             let line = |index: usize| {
@@ -112,8 +118,12 @@ pub(super) fn site(raw: &SiteFile, text: &str, file: &Path) -> Result<Site, Vec<
         let fault = check.at("unknown object in `site_frame`", &["site_frame"]).value(format!("`{}`", raw.site_frame));
         check.fault(fault.remedy(suggestion(&raw.site_frame, ids())));
     }
-    let objects: Vec<_> =
-        raw.objects.iter().enumerate().map(|(index, object)| check_object(&mut check, object, index)).collect();
+    let objects: Vec<_> = raw
+        .objects
+        .iter()
+        .enumerate()
+        .map(|(index, object)| check_object(&mut check, object, index, &raw.format))
+        .collect();
     match (objects.into_iter().collect::<Option<Vec<_>>>(), frame) {
         (Some(objects), Some(frame)) if check.faults.is_empty() => {
             Ok(Site { name: raw.name.clone(), frame, objects, warnings: check.warnings })
@@ -122,7 +132,7 @@ pub(super) fn site(raw: &SiteFile, text: &str, file: &Path) -> Result<Site, Vec<
     }
 }
 
-fn suggestion<'a>(word: &str, options: impl Iterator<Item = &'a str> + Clone) -> String {
+pub(super) fn suggestion<'a>(word: &str, options: impl Iterator<Item = &'a str> + Clone) -> String {
     match nearest(word, options.clone()) {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("there are {}", options.collect::<Vec<_>>().join(", ")),
@@ -130,7 +140,7 @@ fn suggestion<'a>(word: &str, options: impl Iterator<Item = &'a str> + Clone) ->
 }
 
 /// The object, or `None` after a fault that makes it unusable.
-fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Option<SiteObject> {
+fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize, format: &str) -> Option<SiteObject> {
     let before = check.faults.len();
     let number = index.to_string();
     let of = format!("object `{}`", raw.id);
@@ -172,6 +182,7 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Opti
         .collect();
     spread(check, &points, &of, &number);
     frame_rule(check, &base.map(|i| points[i].at), &of, &number);
+    let edges = check_edges::edges(check, raw, &points, format, &of, &number);
     let base_in_world = raw.base_in_world.map(|base| base.map(Point::<World>::from));
     if let Some(world) = &base_in_world {
         survey(check, world, &base.map(|i| &points[i]), raw.survey_sigma, &of, &number);
@@ -184,6 +195,7 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Opti
         survey_sigma: raw.survey_sigma,
         world_from_object,
         points,
+        edges,
         interest: raw
             .interest
             .iter()

@@ -3,8 +3,11 @@
 use nalgebra::Vector3;
 use seafix_geometry::{Object, Point, Transform, UncertainPoint};
 
-use super::{ModelPoint, target::diameter};
-use crate::{Kabsch, Observation, Observations, Solver};
+use super::{model::ModelPoint, target::diameter};
+use crate::{
+    observations::{Observation, Observations},
+    solve::{kabsch::Kabsch, solver::Solver},
+};
 
 /// The minimum fraction and the minimum number of points that a motion must map.
 const MIN_FRACTION: f64 = 0.6;
@@ -191,7 +194,7 @@ impl Finder {
             model: self.at[onto],
             model_sigma: 0.0,
         };
-        let data = Observations { points: pairs.iter().map(observation).collect(), rig: None };
+        let data = Observations { points: pairs.iter().map(observation).collect(), edges: Vec::new(), rig: None };
         Kabsch::default().solve(&data).ok().map(|motion| motion.relabel())
     }
 

@@ -3,14 +3,23 @@
 use std::sync::OnceLock;
 
 use nalgebra::{Matrix6, Vector3};
+use seafix_component::Settings;
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform, World};
 use serde::{Deserialize, Serialize};
 
-use super::{BoundingBox, Congruence, ModelPoint, Site, SiteObject, congruence};
-use crate::{Member, Placement, Prior, PriorBound};
+use super::{
+    bounding_box::BoundingBox,
+    congruence::{self, Congruence},
+    edge::{End, ModelEdge},
+    model::{ModelPoint, Site, SiteObject},
+};
+use crate::{
+    joint::member::{Member, Placement},
+    problem::{Prior, PriorBound},
+};
 
 /// The kind of target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum TargetKind {
     /// Each object by itself, in its own frame.
@@ -43,6 +52,8 @@ pub struct Target {
     pub name: String,
     /// The feature points, in the target's frame.
     pub points: Vec<ModelPoint>,
+    /// The straight edges, in the target's frame.
+    pub edges: Vec<ModelEdge>,
     /// The pose of the target's frame in the world; `None` without a survey.
     pub world_from_object: Option<Transform<World, Object>>,
     /// The covariance of the pose in the world; `None` without a survey.
@@ -116,6 +127,7 @@ impl Target {
         Self {
             name: object.id.clone(),
             points: object.points.clone(),
+            edges: object.edges.clone(),
             world_from_object: object.world_from_object,
             survey: object.survey_covariance(),
             firsts: Vec::new(),
@@ -186,7 +198,7 @@ pub(super) fn targets(site: &Site, kind: TargetKind) -> Result<Vec<Target>, NoWo
 /// All points of the site in the frame of its frame object, transformed by Eq. (1).
 fn full(site: &Site) -> Result<Target, NoWorld> {
     let frame = site.frame_object();
-    let (mut points, mut firsts) = (Vec::new(), Vec::new());
+    let (mut points, mut edges, mut firsts) = (Vec::new(), Vec::new(), Vec::new());
     for (index, object) in site.objects.iter().enumerate() {
         let own = index == site.frame;
         let site_from_object: Transform<Object, Object> = if own {
@@ -195,14 +207,15 @@ fn full(site: &Site) -> Result<Target, NoWorld> {
             let place = |o: &SiteObject| o.world_from_object.ok_or_else(|| NoWorld { object: o.id.clone() });
             (place(frame)?.inverse() * place(object)?).relabel()
         };
-        firsts.push(points.len());
+        let first = points.len();
+        firsts.push(first);
+        // The survey cancels within the frame object. For other objects both surveys contribute, more for points
+        // farther from the surveyed base.
+        let spread = |survey: Option<Covariance6<World, Object>>, at: &Point<Object>| {
+            survey.filter(|_| !own).map_or(0.0, |survey| survey.of_point(at).trace() / 3.0)
+        };
         points.extend(object.points.iter().map(|point| {
             let at = site_from_object * point.at;
-            // The survey cancels within the frame object. For other objects both surveys contribute, more for points
-            // farther from the surveyed base.
-            let spread = |survey: Option<Covariance6<World, Object>>, at: &Point<Object>| {
-                survey.filter(|_| !own).map_or(0.0, |survey| survey.of_point(at).trace() / 3.0)
-            };
             let survey = spread(frame.survey_covariance(), &at) + spread(object.survey_covariance(), &point.at);
             ModelPoint {
                 id: format!("{}/{}", object.id, point.id),
@@ -211,10 +224,27 @@ fn full(site: &Site) -> Result<Target, NoWorld> {
                 normal: point.normal.map(|normal| site_from_object.rotation() * normal),
             }
         }));
+        edges.extend(object.edges.iter().map(|edge| {
+            let places = edge.places(&object.points);
+            // The common error of an object's survey is that of an edge's centre.
+            let centre = Point::from((places[0].coords + places[1].coords) / 2.0);
+            let survey = spread(frame.survey_covariance(), &(site_from_object * centre))
+                + spread(object.survey_covariance(), &centre);
+            ModelEdge {
+                id: format!("{}/{}", object.id, edge.id),
+                ends: edge.ends.map(|end| match end {
+                    End::Point(index) => End::Point(first + index),
+                    End::At(place) => End::At(site_from_object * place),
+                }),
+                sigma: (edge.sigma * edge.sigma + survey).sqrt(),
+                faces: edge.faces.iter().map(|normal| site_from_object.rotation() * normal).collect(),
+            }
+        }));
     }
     Ok(Target {
         name: site.name.clone(),
         points,
+        edges,
         world_from_object: frame.world_from_object,
         survey: frame.survey_covariance(),
         firsts,

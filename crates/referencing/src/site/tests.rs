@@ -5,6 +5,7 @@ use std::path::Path;
 use seafix_geometry::Point;
 
 use super::*;
+use nalgebra::Vector3;
 
 /// Two objects: a plate at (10, 20, 30) with the world's axes, and a frame 5 m north of it.
 const GOOD: &str = r#"
@@ -217,4 +218,73 @@ fn all_faults_come_at_once() {
         .replace("at = [2.0, 0.0, 0.0]", "at = [inf, 0.0, 0.0]");
     let found = parse(&text.replace("site_frame = \"plate\"", "site_frame = \"x\"")).unwrap_err();
     assert_eq!(found.len(), 3, "{found:?}");
+}
+
+/// The valid site with an edge between two points and another to a place of its own.
+fn with_edges() -> String {
+    let edges = r#"
+[[object.edge]]
+id = "front"
+from = "A"
+to = "B"
+sigma = 0.001
+faces = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]
+[[object.edge]]
+id = "post"
+from = [0.0, 0.0, 1.0]
+to = "A"
+[[object.interest]]"#;
+    GOOD.replace("seafix-site/1", "seafix-site/1.1").replacen("[[object.interest]]", edges.trim_start(), 1)
+}
+
+/// Fails if a site without edges is written in the newer format, and if an end loses its point.
+#[test]
+fn edges_are_read_and_written_in_a_format_of_their_own() {
+    let site = parse(&with_edges()).unwrap();
+    let edges = &site.objects[0].edges;
+    assert_eq!(edges[0].ends, [End::Point(0), End::Point(1)]);
+    assert_eq!(edges[1].ends, [End::At([0.0, 0.0, 1.0].into()), End::Point(0)]);
+    assert_eq!((edges[0].sigmas(&site.objects[0].points), edges[1].sigma), ([0.001, 0.0], 0.0));
+    let text = site.to_toml();
+    assert!(text.contains("\"seafix-site/1.1\""));
+    assert_eq!(parse(&text).unwrap(), site);
+    assert!(parse(GOOD).unwrap().to_toml().contains("\"seafix-site/1\""));
+    let target = &site.targets(TargetKind::Site).unwrap()[0];
+    assert_eq!(target.edges.len(), 2);
+    assert_eq!(site.targets(TargetKind::Object).unwrap()[0].edges, *edges);
+}
+
+#[test]
+fn an_invalid_edge_is_refused_in_one_line() {
+    let good = with_edges();
+    for (from, to, parts) in [
+        ("seafix-site/1.1", "seafix-site/1", ["format", "format = \"seafix-site/1.1\""]),
+        ("to = \"B\"", "to = \"Z\"", ["edge `front`: unknown point in `to`", "there are A, B, C"]),
+        ("to = \"B\"", "to = \"A\"", ["edge `front` is too short", "0 m"]),
+        ("to = \"B\"", "to = [0.0, 0.0, 0.019]", ["edge `front` is too short", "0.019 m"]),
+        ("to = \"B\"", "to = [0.0, nan, 0.0]", ["edge `front`: `to` is not finite", "finite numbers"]),
+        ("[-1.0, 0.0, 0.0]", "[-2.0, 0.0, 0.0]", ["a face normal is not a unit vector", "of length 2"]),
+        ("[-1.0, 0.0, 0.0]", "[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]", ["edge `front` has too many faces", "3"]),
+        ("from = [0.0, 0.0, 1.0]", "from = \"B\"", ["the same edge twice", "`front` and `post`"]),
+        ("sigma = 0.001\nfaces", "sigma = -1.0\nfaces", ["edge `front`: `sigma`", "zero or more"]),
+        ("id = \"post\"", "id = \"front\"", ["edge id is used twice", "choose another id"]),
+    ] {
+        let text = good.replacen(from, to, 1);
+        assert_ne!(text, good, "{from}");
+        let faults = parse(&text).unwrap_err();
+        assert_eq!(faults.len(), 1, "{faults:?}");
+        let line = faults[0].to_string();
+        assert!(line.contains(" in site.toml:") && parts.iter().all(|part| line.contains(part)), "{line}");
+        assert!(!line.contains('\n'), "{line}");
+    }
+}
+
+#[test]
+fn suspicious_edges_are_warned_of() {
+    let warned = |from: &str, to: &str| parse(&with_edges().replacen(from, to, 1)).unwrap().warnings;
+    assert!(warned("x", "x").is_empty());
+    let long = warned("from = [0.0, 0.0, 1.0]", "from = [0.0, 0.0, 6.0]");
+    assert!(long[0].to_string().contains("edge `post` is long"));
+    let parallel = warned("from = [0.0, 0.0, 1.0]", "from = [0.0, 0.5, 0.0]");
+    assert!(parallel[0].to_string().contains("all edges are parallel"));
 }

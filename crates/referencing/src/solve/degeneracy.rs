@@ -25,7 +25,7 @@ pub enum Degenerate {
         min: f64,
     },
     /// A measured point lies behind the left camera.
-    #[error("point behind the camera: point {index} has a depth of {depth:.3} m; check the triangulation")]
+    #[error("point behind the camera: point {index} has a depth of {depth:.3} m")]
     Behind {
         /// The index of the point.
         index: usize,
@@ -44,7 +44,7 @@ pub enum Degenerate {
         max: f64,
     },
     /// The solver needs pixels and a rig, and at least one is missing.
-    #[error("no pixels or no rig: the solver needs both; use `mahalanobis` for points alone")]
+    #[error("no pixels or no rig: the solver needs both")]
     NoPixels,
     /// Measured points and model differ in scale.
     #[error(
@@ -107,6 +107,28 @@ pub enum Degenerate {
         /// The largest accepted distance.
         max: f64,
     },
+    /// A solver outside this library rejects the geometry, in its own words.
+    #[error("{0}")]
+    Stated(String),
+}
+
+impl Degenerate {
+    /// The remedy in one phrase.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::TooFew { .. } => "bring more of the object into view",
+            Self::Collinear { .. } => "identify points farther from a common line",
+            Self::Behind { .. } => "check the triangulation",
+            Self::Far { .. } => "move closer or use a longer baseline",
+            Self::NoPixels => "use `mahalanobis` for points alone",
+            Self::Scale { .. } => "check baseline, focal length and survey",
+            Self::Singular { .. } | Self::Scattered { .. } => "identify more points",
+            Self::NotFinite => "check the coordinates of model and cloud",
+            Self::Noise { .. } => "check the point covariances",
+            Self::Hidden { .. } | Self::Unconverged { .. } => "use the solver `mahalanobis`",
+            Self::Stated(_) => "see the description of the solver",
+        }
+    }
 }
 
 /// Largest distance (standard deviations of the pose) from the minimum at the end of an iteration.

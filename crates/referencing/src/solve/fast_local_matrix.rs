@@ -1,7 +1,7 @@
 //! Fast local matrix: a linearised rotation and a closed 6×6 solve, repeated.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Covariance6, Object, Transform, triad};
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ use crate::{
 /// exponential restores a rotation; this repeats until the steps vanish. If the points fit no motion (a mirror image),
 /// steps shrink slowly and the iteration may end short of the minimum, so the solver does not claim least squares. It
 /// is the project's own reading of the phrase "fast computation of the local matrix", whose source was not available.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct FastLocalMatrix {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
@@ -39,6 +39,7 @@ impl Component for FastLocalMatrix {
     const NAME: &'static str = "fast-local-matrix";
     const SUMMARY: &'static str = "unweighted least squares by a linearised rotation, repeated";
     const SOURCE: &'static str = "ours, after a phrase in Bobkov, Kudryashov, Inzartsev 2021";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-ratio", self.min_ratio)

@@ -1,6 +1,6 @@
 //! Graduated non-convexity with truncated least squares: the threshold limits the effect of outliers.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ use crate::{
 /// into it. With μ growing by `growth`, a point has weight 1 below c²μ/(μ+1), 0 above c²(μ+1)/μ, and (c/d)√(μ(μ+1)) − μ
 /// between. If points are excluded, they may be the wrong ones: up to `triples` sets of three points then serve as
 /// further starts (all sets, for few points), and the smallest sum is the answer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct GncTls {
     /// Threshold c (standard deviations of a point), positive; 4.5 keeps 99 % of the inliers even if all noise is along
@@ -47,6 +47,7 @@ impl Component for GncTls {
     const SUMMARY: &'static str = "truncated least squares by graduated non-convexity: excludes outliers";
     const SOURCE: &'static str = "Yang, Antonante, Tzoumas, Carlone, Graduated non-convexity for robust spatial \
                                   perception, 2020";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         // A NaN is rejected as well.
@@ -84,7 +85,7 @@ impl Solver for GncTls {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let kept = self.used(data).into_iter().map(|k| data.points[k]).collect();
-        let kept = Observations { points: kept, rig: data.rig };
+        let kept = Observations { points: kept, edges: Vec::new(), rig: data.rig };
         sandwich::or_resampled(&kept, at, |_| 1.0, |sampled| Ok(fit(&sampled.points)))
     }
 }
@@ -186,7 +187,7 @@ impl GncTls {
     /// Whether the points with a positive weight are three or more and not collinear.
     fn determined(&self, data: &Observations<'_>, weights: &[f64]) -> bool {
         let kept = data.points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(point, _)| *point).collect();
-        check(&Observations { points: kept, rig: data.rig }, self.minimum(), self.min_ratio).is_ok()
+        check(&Observations { points: kept, edges: Vec::new(), rig: data.rig }, self.minimum(), self.min_ratio).is_ok()
     }
 }
 

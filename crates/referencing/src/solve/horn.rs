@@ -1,7 +1,7 @@
 //! Horn: unweighted least squares by unit quaternions.
 
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion};
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ use crate::{
 ///
 /// The quaternion is the eigenvector to the largest eigenvalue of the symmetric 4×4 matrix N of the sums S_ij = Σ c_i
 /// p_j; it maximises qᵀ N q = tr(Rᵀ M).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Horn {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
@@ -35,6 +35,7 @@ impl Component for Horn {
     const NAME: &'static str = "horn";
     const SUMMARY: &'static str = "unweighted least squares by unit quaternions";
     const SOURCE: &'static str = "Horn, Closed-form solution of absolute orientation using unit quaternions, 1987";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-ratio", self.min_ratio)

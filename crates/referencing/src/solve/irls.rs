@@ -1,7 +1,7 @@
 //! Iteratively reweighted least squares: robust losses that grow more slowly than the square.
 
 use nalgebra::Vector6;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// The loss of a residual.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Loss {
     /// d² up to the threshold, linear beyond (Huber, 1964).
@@ -36,10 +36,10 @@ pub(crate) enum Loss {
 ///
 /// For Huber and Cauchy d_k = ‖C·H − P‖ / σ_k with σ_k² = tr(Σ_k + σ_model² I)/3, and the sum is Σ σ_k² ρ(d_k). If
 /// every residual is within Huber's threshold, the answer is that of `kabsch`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Irls {
-    /// The loss.
+    /// Loss of a residual; Huber's, the default, keeps every identified point in the fit.
     pub(crate) loss: Loss,
     /// Threshold (standard deviations of a point), positive: the start of Huber's linear part, or Cauchy's c.
     pub(crate) threshold: f64,
@@ -57,6 +57,7 @@ impl Component for Irls {
     const NAME: &'static str = "irls";
     const SUMMARY: &'static str = "robust least squares: Huber, Cauchy, or the paper's un-squared sum";
     const SOURCE: &'static str = "Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         // A NaN is rejected as well.

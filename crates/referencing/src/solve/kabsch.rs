@@ -1,6 +1,6 @@
 //! Kabsch: unweighted least squares over rigid motions.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ use crate::{
 ///
 /// It is the paper's "standard method". With a_k = P_k − P̄, b_k = C_k − C̄ and M = Σ a_k b_kᵀ = U S Vᵀ, the rotation
 /// is R = U diag(1, 1, det(U Vᵀ)) Vᵀ and the translation P̄ − R C̄. The determinant excludes reflections.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Kabsch {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
@@ -36,6 +36,7 @@ impl Component for Kabsch {
     const SUMMARY: &'static str = "unweighted least squares over rigid motions, by singular values";
     const SOURCE: &'static str = "Kabsch, A solution for the best rotation to relate two sets of vectors, 1976; \
                                   Umeyama, Least-squares estimation of transformation parameters, 1991";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-ratio", self.min_ratio)

@@ -2,7 +2,7 @@
 
 use argmin::core::{Executor, State};
 use argmin::solver::{linesearch::MoreThuenteLineSearch, quasinewton::LBFGS};
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ use crate::{
 /// The cost is that of `stereo-reprojection`, as a function of six numbers; the method uses the line search of Moré and
 /// Thuente and a numerical gradient. It is an independent check of the project's own minimiser and does not compete in
 /// speed. It ends at the limit of precision of the cost.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct LBfgs {
     /// Maximum number of iterations, 1 to 1000000.
@@ -40,6 +40,7 @@ impl Component for LBfgs {
     const SUMMARY: &'static str = "maximum likelihood on the pixels by a general-purpose quasi-Newton method";
     const SOURCE: &'static str =
         "Liu, Nocedal, On the limited memory BFGS method for large scale optimization, 1989; the crate argmin";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         self.check_limits()

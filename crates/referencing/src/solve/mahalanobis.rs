@@ -1,7 +1,7 @@
 //! Mahalanobis: 3D–3D least squares with the full covariance of every point.
 
 use nalgebra::SMatrix;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -12,6 +12,7 @@ use crate::{
         likelihood::{
             descent::model_errors,
             initial_poses::{AlternativePose, STARTS, alternatives},
+            mixed::{self, Mixed},
             pixel_terms::{PixelTerms, TermTarget, rig_of_pixels},
             point_fit::{covariance, solved},
             point_terms::Measured,
@@ -29,7 +30,7 @@ use crate::{
 /// displacement C − p as the first-order step between the pixels of p and of C, r = Σ(p) Jᵀ Σ_px⁻¹ (π(C) − π(p)).
 /// Pixels are unbiased, so r is unbiased to second order. The answer then solves Σ ∂pᵀ (Σ(p) + σ² I)⁻¹ r = 0, as does
 /// reprojection of the triangulated point's pixels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mahalanobis {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
@@ -51,6 +52,7 @@ impl Component for Mahalanobis {
     const SUMMARY: &'static str = "3D-3D least squares with full covariances, seen from the fitted points";
     const SOURCE: &'static str =
         "Matei, Meer, Optimal rigid motion estimation and performance evaluation with bootstrap, 1999";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points and straight edges")];
 
     fn check(&self) -> Result<(), String> {
         in_range((1..=5).contains(&self.starts), "starts", self.starts, "1 to 5")?;
@@ -59,13 +61,31 @@ impl Component for Mahalanobis {
 }
 
 impl Solver for Mahalanobis {
+    fn takes_edges(&self) -> bool {
+        true
+    }
+
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate> {
+        if !data.edges.is_empty() {
+            return mixed::solve(data, None);
+        }
         check(data, self.minimum(), self.min_ratio)?;
         solved(data, self.rig(data), self.starts, |pose, _| Ok(*pose))
     }
 
+    fn solve_near(
+        &self,
+        data: &Observations<'_>,
+        near: &Transform<Object, Camera>,
+    ) -> Result<Transform<Object, Camera>, Degenerate> {
+        match data.edges.is_empty() {
+            true => self.solve(data),
+            false => mixed::solve_near(data, None, near),
+        }
+    }
+
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
-        let Some(rig) = self.rig(data) else { return Vec::new() };
+        let Some(rig) = self.rig(data).filter(|_| data.edges.is_empty()) else { return Vec::new() };
         let mut pixel_terms = PixelTerms::new(rig);
         match pixel_terms.see(&data.points, TermTarget::Triangulated) {
             Ok(()) => alternatives(data, rig, self.starts, &pixel_terms, at, max),
@@ -78,6 +98,9 @@ impl Solver for Mahalanobis {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
+        if !data.edges.is_empty() {
+            return mixed::covariance(data, None, at);
+        }
         let Some(rig) = self.rig(data) else {
             let measured = Measured::of(&data.points);
             return covariance(data, at, &|k, place| Some(measured.term(k, place)));
@@ -90,6 +113,9 @@ impl Solver for Mahalanobis {
         data: &Observations<'_>,
         at: &Transform<Object, Camera>,
     ) -> Result<Vec<SMatrix<f64, 6, 3>>, Degenerate> {
+        if !data.edges.is_empty() {
+            return Mixed::of(data, None, None)?.model_errors(at);
+        }
         let Some(rig) = self.rig(data) else {
             let measured = Measured::of(&data.points);
             return model_errors(&data.points, at, &|k, place: &_| Some(measured.term(k, place)));
@@ -114,7 +140,7 @@ mod tests {
     use super::*;
     use crate::{
         observations::Observation,
-        solve::{StereoReprojection, covariance::numerical},
+        solve::{covariance::numerical, stereo_reprojection::StereoReprojection},
     };
 
     const PLACES: [[f64; 3]; 5] =
@@ -142,7 +168,7 @@ mod tests {
             let measured = UncertainPoint { at: found.point, covariance: found.covariance };
             Observation { measured, pixels: Some(pixels), model: Point::from(*at), model_sigma: 2e-3 }
         });
-        Observations { points: points.collect(), rig: Some(rig) }
+        Observations { points: points.collect(), edges: Vec::new(), rig: Some(rig) }
     }
 
     #[test]
@@ -179,7 +205,7 @@ mod tests {
                 point(at, if k < 2 { 1e-3 } else { 2e-3 }, off)
             })
             .collect();
-        let data = Observations { points, rig: None };
+        let data = Observations { points, edges: Vec::new(), rig: None };
         let found = Mahalanobis::default().solve(&data).unwrap();
         // Weights 4 to 1: the x of the fit has an error of 4/5 of 0.3 mm.
         assert!((found.translation() + Vector3::new(2.4e-4, 0.0, 0.0)).amax() < 1e-9, "{}", found.translation());
@@ -197,11 +223,13 @@ mod tests {
         let (near, far) = (pixels.error_to(&refit).norm(), pixels.error_to(&fixed).norm());
         assert!(far > 5e-4 && near < 0.01 * far, "{near} {far}");
         // Refitting requires a rig and pixels.
-        let bare = Mahalanobis::default().solve(&Observations { rig: None, ..data.clone() }).unwrap();
+        let bare =
+            Mahalanobis::default().solve(&Observations { edges: Vec::new(), rig: None, ..data.clone() }).unwrap();
         assert!(fixed.error_to(&bare).amax() < 1e-12);
         let mut points = data.points.clone();
         points.iter_mut().for_each(|point| point.pixels = None);
-        let without = Mahalanobis::default().solve(&Observations { points, rig: Some(&rig) }).unwrap();
+        let without =
+            Mahalanobis::default().solve(&Observations { points, edges: Vec::new(), rig: Some(&rig) }).unwrap();
         assert!(fixed.error_to(&without).amax() < 1e-12);
         // One point with pixels suffices.
         let mut some = data.clone();
@@ -216,7 +244,7 @@ mod tests {
     fn model_errors_are_the_derivatives_of_the_answer() {
         let rig = rig();
         let solver = Mahalanobis::default();
-        for data in [seen(&rig, 0.0), Observations { rig: None, ..seen(&rig, 0.0) }] {
+        for data in [seen(&rig, 0.0), Observations { edges: Vec::new(), rig: None, ..seen(&rig, 0.0) }] {
             let at = solver.solve(&data).unwrap();
             let analytic = solver.model_errors(&data, &at).unwrap();
             let numeric = numerical::model_errors(|moved| solver.solve(moved), &data, &at).unwrap();
@@ -231,7 +259,7 @@ mod tests {
     #[test]
     fn bare_points_have_no_alternatives() {
         let rig = rig();
-        let data = Observations { rig: None, ..seen(&rig, 1.0) };
+        let data = Observations { edges: Vec::new(), rig: None, ..seen(&rig, 1.0) };
         let solver = Mahalanobis::default();
         let at = solver.solve(&data).unwrap();
         assert!(solver.alternatives(&data, &at, 1e9).is_empty());
@@ -253,7 +281,7 @@ mod tests {
             let measured = UncertainPoint { at: found.point, covariance: found.covariance };
             Observation { measured, pixels: Some(pixels), model, model_sigma: 0.0 }
         });
-        let data = Observations { points: points.to_vec(), rig: Some(&rig) };
+        let data = Observations { points: points.to_vec(), edges: Vec::new(), rig: Some(&rig) };
         let alternatives = |solver: Mahalanobis, max: f64| solver.alternatives(&data, &at, max);
         let found = alternatives(Mahalanobis::default(), 40.0);
         assert!(

@@ -2,38 +2,32 @@
 
 use seafix_component::{Registry, entry};
 
-mod closed_form;
-mod covariance;
-mod degeneracy;
+pub(crate) mod closed_form;
+pub(crate) mod covariance;
+pub(crate) mod degeneracy;
 mod fast_local_matrix;
 mod gnc_tls;
 mod horn;
 mod irls;
-mod kabsch;
+pub(crate) mod kabsch;
 mod l_bfgs;
 pub(crate) mod likelihood;
-mod mahalanobis;
+pub(crate) mod line_frames;
+pub(crate) mod mahalanobis;
 mod nelder_mead;
 mod optimiser;
 mod p3p_stereo;
-mod solver;
-mod stereo_reprojection;
+pub(crate) mod solver;
+pub(crate) mod stereo_reprojection;
 #[cfg(test)]
 mod tests;
 mod triad;
 mod umeyama;
 mod weighted_kabsch;
 
-pub(crate) use closed_form::fit as least_squares;
 pub use degeneracy::Degenerate;
-pub(crate) use degeneracy::{ON_A_LINE, converged, second_ratio, wide_enough};
 pub(crate) use gnc_tls::GncTls;
 pub use kabsch::Kabsch;
-pub(crate) use likelihood::{
-    descent::Term,
-    normal::{inverse, rounding},
-    pixel_terms::{PixelTerms, TermTarget as PixelTarget},
-};
 pub use likelihood::{initial_poses::AlternativePose, scale_error::ScaleError};
 pub use mahalanobis::Mahalanobis;
 pub use solver::Solver;

@@ -3,7 +3,7 @@
 use argmin::core::{Executor, State};
 use argmin::solver::neldermead;
 use nalgebra::Vector6;
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Object, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ use crate::{
 /// The cost is that of `stereo-reprojection`. The simplex is restarted about its own answer until the answer no longer
 /// moves: an independent check that no wrong derivative can mislead. Each simplex is scaled by the standard deviations
 /// of the pose at its start, so that the cost is equally steep in all directions.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct NelderMead {
     /// Maximum number of iterations of one simplex, 1 to 1000000.
@@ -40,6 +40,7 @@ impl Component for NelderMead {
     const NAME: &'static str = "nelder-mead";
     const SUMMARY: &'static str = "maximum likelihood on the pixels by a simplex, without derivatives";
     const SOURCE: &'static str = "Nelder, Mead, A simplex method for function minimization, 1965; the crate argmin";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         self.check_limits()

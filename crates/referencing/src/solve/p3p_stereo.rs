@@ -1,6 +1,6 @@
 //! P3P with two cameras: the minimal solver of pixels.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,7 @@ use crate::{
 /// double root noise moves the roots of one camera far, or off the real numbers. The roots therefore serve as starts:
 /// each is refined to a minimum of Σ rᵀ S⁻¹ r over the three points in both images. The answer is the minimum that best
 /// explains the pixels of *all* points.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct P3pStereo {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
@@ -47,6 +47,7 @@ impl Component for P3pStereo {
     const SUMMARY: &'static str = "three points in both images, from the roots of each camera: minimal";
     const SOURCE: &'static str =
         "Persson, Nordberg, Lambda Twist: an accurate fast robust perspective three point solver, 2018";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-ratio", self.min_ratio)
@@ -62,7 +63,7 @@ impl Solver for P3pStereo {
         check(data, self.minimum(), self.min_ratio)?;
         let rig = pixels_and_rig(data)?;
         let chosen = widest(data);
-        let three = Observations { points: chosen.map(|i| data.points[i]).to_vec(), rig: data.rig };
+        let three = Observations { points: chosen.map(|i| data.points[i]).to_vec(), edges: Vec::new(), rig: data.rig };
         check(&three, self.minimum(), self.min_ratio)?;
         let mut pixel_terms = PixelTerms::new(rig);
         pixel_terms.see(&three.points, TermTarget::Pixels)?;
@@ -106,7 +107,8 @@ impl Solver for P3pStereo {
     /// The alternatives of the three points that the pixels of all points admit.
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let Ok(rig) = pixels_and_rig(data) else { return Vec::new() };
-        let three = Observations { points: widest(data).map(|i| data.points[i]).to_vec(), rig: data.rig };
+        let three =
+            Observations { points: widest(data).map(|i| data.points[i]).to_vec(), edges: Vec::new(), rig: data.rig };
         let (mut few, mut all) = (PixelTerms::new(rig), PixelTerms::new(rig));
         if few.see(&three.points, TermTarget::Pixels).and_then(|()| all.see(&data.points, TermTarget::Pixels)).is_err()
         {

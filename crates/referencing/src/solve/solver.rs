@@ -39,7 +39,7 @@ use crate::{
 ///     model: Point::from(at),
 ///     model_sigma: 0.0,
 /// });
-/// let data = Observations { points: points.to_vec(), rig: None };
+/// let data = Observations { points: points.to_vec(), edges: Vec::new(), rig: None };
 /// let pose = MeanTranslation.solve(&data)?;
 /// assert!((pose.translation() - Vector3::new(0.0, 0.0, -3.0)).norm() < 1e-12);
 ///
@@ -56,6 +56,11 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
 
     /// Whether the solver needs the pixels of both images; it rejects points without them.
     fn needs_pixels(&self) -> bool {
+        false
+    }
+
+    /// Whether the solver uses edges; others solve for the points alone.
+    fn takes_edges(&self) -> bool {
         false
     }
 
@@ -78,6 +83,20 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// [`Degenerate`]: the geometry determines no pose; the failed test is stated with its number.
     fn solve(&self, data: &Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>;
 
+    /// The pose near a known one; the pose of [`solve`](Self::solve) by default.
+    ///
+    /// # Errors
+    ///
+    /// As `solve`.
+    fn solve_near(
+        &self,
+        data: &Observations<'_>,
+        near: &Transform<Object, Camera>,
+    ) -> Result<Transform<Object, Camera>, Degenerate> {
+        let _ = near;
+        self.solve(data)
+    }
+
     /// The scale s of the model relative to the measured points: min Σ ‖P_k − s C_k H‖².
     ///
     /// It is a diagnostic; a fix is rigid and does not use it. `None` for solvers that do not estimate it, and for
@@ -99,9 +118,10 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// Minima within the covariance of the answer are excluded. Others occur with few points whose extent is small
     /// relative to their distance. A solver with a single minimum returns none.
     ///
-    /// With `max` the quantile of χ²₁ at a confidence, the probability of answering with the wrong one of two minima
-    /// alone is at most half of one minus the confidence, for every distance d of the minima: the difference of their
-    /// χ² is normal with mean d² and variance 4d², and Q((d² + max) / 2d) is largest at d² = `max`.
+    /// Let `max` be the quantile of χ²₁ at the confidence c, and let there be two minima at a distance d. The
+    /// probability that the wrong one is the answer, without the right one among the alternatives, is at most (1 − c)/2
+    /// for every d: the difference of their χ² is normal with mean d² and variance 4d², and Q((d² + max) / 2d) is
+    /// largest at d² = `max`.
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let _ = (data, at, max);
         Vec::new()

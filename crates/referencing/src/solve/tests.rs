@@ -23,7 +23,7 @@ fn seen(model: &[[f64; 3]], sigma: f64) -> Observations<'static> {
         let measured = UncertainPoint::isotropic(motion().inverse() * model, sigma);
         Observation { measured, pixels: None, model, model_sigma: 0.0 }
     });
-    Observations { points: points.collect(), rig: None }
+    Observations { points: points.collect(), edges: Vec::new(), rig: None }
 }
 
 const SPREAD: [[f64; 3]; 5] = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 1.3, 0.1], [0.4, 0.3, 0.9], [-0.7, 0.5, 0.4]];
@@ -170,7 +170,7 @@ fn through_a_rig_from(
         let measured = UncertainPoint { at: found.point, covariance: found.covariance };
         Observation { measured, pixels: Some(pixels), model, model_sigma: 2e-3 }
     });
-    (Observations { points: points.collect(), rig: Some(rig) }, pose)
+    (Observations { points: points.collect(), edges: Vec::new(), rig: Some(rig) }, pose)
 }
 
 fn rig() -> StereoRig {
@@ -200,7 +200,7 @@ fn analytic_covariances_are_the_numerical_ones() {
         let shift = Vector3::new(rng.random_range(-0.4..0.4), rng.random_range(-0.4..0.4), rng.random_range(3.0..5.0));
         let camera_from_object = Transform::<Camera, Object>::new(seafix_geometry::so3::exp(&turn), shift);
         let (data, pose) = through_a_rig_from(&rig, camera_from_object.inverse());
-        for data in [data.clone(), Observations { rig: None, ..data.clone() }] {
+        for data in [data.clone(), Observations { edges: Vec::new(), rig: None, ..data.clone() }] {
             if solver.needs_pixels() && data.rig.is_none() {
                 continue;
             }
@@ -263,7 +263,7 @@ fn pixels_are_asked_for_by_name() {
     let data = seen(&SPREAD, 0.01);
     let why = StereoReprojection::default().solve(&data).unwrap_err();
     assert_eq!(why, Degenerate::NoPixels);
-    assert!(why.to_string().contains("`mahalanobis`"));
+    assert!(why.remedy().contains("`mahalanobis`"));
     let rig = rig();
     let (mut data, _) = through_a_rig(&rig);
     data.points[2].measured.at.coords.z = -1.0;
@@ -301,7 +301,7 @@ fn degenerate_views_are_refused_with_the_number_that_failed() {
             let measured = UncertainPoint { at: found.point, covariance: found.covariance };
             Observation { measured, pixels: Some(pixels), model: pose * place, model_sigma: 0.0 }
         });
-        Observations { points: points.collect(), rig: Some(&rig) }
+        Observations { points: points.collect(), edges: Vec::new(), rig: Some(&rig) }
     };
     let good = [[0.0, 0.0, 3.0], [0.8, 0.1, 3.2], [-0.4, 0.6, 2.8], [0.3, -0.5, 3.5]];
     let line = [0.0, 1.0, 2.0, 3.0].map(|k| [-0.6 + 0.4 * k, 0.1 * k, 3.0 + 0.2 * k]);

@@ -1,7 +1,7 @@
 //! Triad: the paper's pose from three identified points.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ use crate::{
 /// The rule that selects the three points of the triad.
 ///
 /// The paper takes "the three most reliable" and does not define them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Choose {
     /// The triangle of largest area in the model.
@@ -32,7 +32,7 @@ pub enum Choose {
 /// The paper's direct referencing by auxiliary frames on three identified points, Eq. (3)–(5).
 ///
 /// `object_from_camera = object_from_auxiliary · (camera_from_auxiliary)⁻¹`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Triad {
     /// The rule that selects the three points.
@@ -52,6 +52,7 @@ impl Component for Triad {
     const SUMMARY: &'static str = "auxiliary frames on three identified points, Eq. (3) to (5)";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of autonomous \
          underwater vehicles to man-made objects using stereo images, 2021";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-sine", self.min_sine)
@@ -81,7 +82,12 @@ impl Solver for Triad {
         at: &Transform<Object, Camera>,
     ) -> Result<Covariance6<Object, Camera>, Degenerate> {
         let three = self.three(data)?.map(|i| data.points[i]).to_vec();
-        resampled::covariance(of_three, &Observations { points: three, rig: data.rig }, at, resampled::Answer::Straight)
+        resampled::covariance(
+            of_three,
+            &Observations { points: three, edges: Vec::new(), rig: data.rig },
+            at,
+            resampled::Answer::Straight,
+        )
     }
 }
 
@@ -230,7 +236,7 @@ fn covariance_of(
     data: &Observations<'_>,
     at: &Transform<Object, Camera>,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
-    let three = Observations { points: points.to_vec(), rig: data.rig };
+    let three = Observations { points: points.to_vec(), edges: Vec::new(), rig: data.rig };
     numerical::covariance(of_three, &three, at)
 }
 
@@ -330,7 +336,7 @@ mod tests {
     }
 
     fn three(solver: &Triad, points: &[Observation]) -> Result<[usize; 3], Degenerate> {
-        solver.three(&Observations { points: points.to_vec(), rig: None })
+        solver.three(&Observations { points: points.to_vec(), edges: Vec::new(), rig: None })
     }
 
     /// Sides 3, 4, 5 have the area 6 and the sines 3/5, 4/5 and 1; sides 5, 12, 13 have the smallest sine 5/13.
@@ -423,9 +429,9 @@ mod tests {
     #[test]
     fn the_predicted_error_is_that_of_three_points() {
         let places = [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0], [2.0, 0.0, 0.0], [2.0, 0.5, 0.0]];
-        let data = Observations { points: seen(&places, &Transform::identity()), rig: None };
+        let data = Observations { points: seen(&places, &Transform::identity()), edges: Vec::new(), rig: None };
         let of = |points: &[Observation]| {
-            let data = Observations { points: points.to_vec(), rig: None };
+            let data = Observations { points: points.to_vec(), edges: Vec::new(), rig: None };
             predicted_error(&[points[0], points[1], points[2]], &data).unwrap() / 1e-6
         };
         let ratio = 0.5 * 0.5 / 4.0;
@@ -445,7 +451,7 @@ mod tests {
             points[worst].measured.covariance *= 100.0;
             let others: Vec<usize> = (0..4).filter(|&k| k != worst).collect();
             assert_eq!(three(&solver, &points).unwrap().to_vec(), others);
-            let data = Observations { points, rig: None };
+            let data = Observations { points, edges: Vec::new(), rig: None };
             assert_eq!(solver.used(&data), others);
         }
     }

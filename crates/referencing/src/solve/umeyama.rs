@@ -1,7 +1,7 @@
 //! Umeyama: least squares by singular values, with the scale as a diagnostic.
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -19,12 +19,12 @@ use crate::{
 /// M = U S Vᵀ, R = U diag(1, 1, det U det V) Vᵀ, and the scale of the best similarity is s = tr(S diag(…)) / Σ‖c_k‖². A
 /// fix is rigid, so the scale is not applied. It differs from one by noise, a wrong focal length, a wrong baseline or a
 /// model in other units; a deviation beyond `max_scale_error` is rejected.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Umeyama {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
     pub(crate) min_ratio: f64,
-    /// Largest accepted |s − 1|; infinite accepts every scale.
+    /// Largest accepted relative scale error |s − 1|; infinite accepts every scale.
     pub(crate) max_scale_error: f64,
 }
 
@@ -39,6 +39,7 @@ impl Component for Umeyama {
     const SUMMARY: &'static str = "unweighted least squares by singular values, the scale as a diagnostic";
     const SOURCE: &'static str = "Umeyama, Least-squares estimation of transformation parameters between two point \
                                   patterns, 1991";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-ratio", self.min_ratio)?;
@@ -118,7 +119,7 @@ fn polish(mut rotation: Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Observation;
+    use crate::observations::Observation;
     use seafix_geometry::{Point, UncertainPoint};
 
     #[test]
@@ -129,7 +130,7 @@ mod tests {
             model: Point::from(at.map(|x| x * 1000.0)),
             model_sigma: 0.0,
         });
-        let data = Observations { points: points.to_vec(), rig: None };
+        let data = Observations { points: points.to_vec(), edges: Vec::new(), rig: None };
         let careful = Umeyama { max_scale_error: 0.1, ..Umeyama::default() };
         let Err(Degenerate::Scale { scale, .. }) = careful.solve(&data) else { panic!("a thousandfold model") };
         assert!((scale - 1000.0).abs() < 1e-9);

@@ -1,6 +1,6 @@
 //! Weighted Kabsch: least squares with one scalar weight per point.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ use crate::{
 ///
 /// Near points have more weight than far ones. A scalar weight cannot express that a far point is precise across the
 /// line of sight; `mahalanobis` uses the full covariance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct WeightedKabsch {
     /// Minimum ratio of second to first extent of the points, 0 to below 1; below it they count as collinear.
@@ -36,6 +36,7 @@ impl Component for WeightedKabsch {
     const SUMMARY: &'static str = "least squares over rigid motions, one weight per point from its variance";
     const SOURCE: &'static str = "Kabsch, A solution for the best rotation to relate two sets of vectors, 1976; \
                                   Sorkine-Hornung, Rabinovich, Least-squares rigid motion using SVD, 2017";
+    const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 
     fn check(&self) -> Result<(), String> {
         fraction("min-ratio", self.min_ratio)

@@ -28,6 +28,7 @@ impl Case {
             candidates: &self.candidates,
             tolerance: self.tolerance,
             prior: None,
+            edges: Default::default(),
         }
     }
 }

@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Object, Point, Transform, UncertainPoint};
 use seafix_referencing::{
-    Acceptance, Attempt, Candidates, Correspondence, Explanation, Gate, Identification, Kabsch, Mahalanobis,
+    Acceptance, Attempt, Candidates, Correspondence, Explanation, Gate, Identification, Kabsch, Mahalanobis, MaxPWrong,
     MaximumClique, ModelPoint, Outcome, Posterior, Prior, PriorBound, Problem, Rejected, RejectionReason, Search,
     StructuralCoherence, Tolerance, candidates, compute_fix, judge, judge_labelled,
 };
@@ -44,7 +44,8 @@ fn cloud_of(model: &[ModelPoint], rng: &mut ChaCha8Rng) -> Vec<MeasuredPoint> {
 }
 
 fn attempt(model: &[ModelPoint], cloud: &[MeasuredPoint], candidates: &Candidates, prior: Option<&Prior>) -> Attempt {
-    let problem = Problem { model, cloud, candidates, tolerance: Tolerance::Sigmas(4.0), prior };
+    let problem =
+        Problem { model, cloud, candidates, tolerance: Tolerance::Sigmas(4.0), prior, edges: Default::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let (search, solver) = (MaximumClique::default(), Kabsch::default());
     compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng)
@@ -107,6 +108,7 @@ fn a_set_that_fits_no_rigid_motion_falls_at_the_residuals() {
         candidates: &candidates,
         tolerance: Tolerance::Fixed(20.0 * SIGMA),
         prior: None,
+        edges: Default::default(),
     };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let (search, solver) = (MaximumClique::default(), Kabsch::default());
@@ -197,6 +199,7 @@ fn a_mirror_image_is_refused_by_name() {
         candidates: &candidates,
         tolerance: Tolerance::Sigmas(4.0),
         prior: None,
+        edges: Default::default(),
     };
     let search = StructuralCoherence { orientation: false, ..StructuralCoherence::default() };
     let mut rng = ChaCha8Rng::seed_from_u64(0);
@@ -247,6 +250,7 @@ fn a_blow_up_stops_at_the_budget_with_an_honest_bound() {
         candidates: &candidates,
         tolerance: Tolerance::Fixed(0.05),
         prior: None,
+        edges: Default::default(),
     };
     let search = StructuralCoherence { budget: 100_000, ..StructuralCoherence::default() };
     let solver = Kabsch::default();
@@ -284,7 +288,7 @@ fn judged(
     alternatives: Vec<Vec<Correspondence>>,
 ) -> Attempt {
     let tolerance = Tolerance::Fixed(20.0 * SIGMA);
-    let problem = Problem { model, cloud, candidates, tolerance, prior };
+    let problem = Problem { model, cloud, candidates, tolerance, prior, edges: Default::default() };
     let mut found = MaximumClique::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a set");
     found.alternatives.extend(alternatives);
     judge(&problem, Ok(found), &Kabsch::default(), acceptance, None)
@@ -316,7 +320,14 @@ fn what_is_more_probable_elsewhere_leaves_an_answer_ambiguous() {
         cloud.extend(copy.map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at, SIGMA), pixels: None }));
         let candidates = Candidates::from_pairs(7, (0..7).chain(0..count).enumerate().map(|(j, i)| (i, j)));
         let tolerance = Tolerance::Fixed(6.0 * SIGMA);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let first = Candidates::from_pairs(7, (0..7).map(|i| (i, i)));
         let of_first = Problem { candidates: &first, ..problem };
         let found = MaximumClique::default().search(&of_first, &mut ChaCha8Rng::seed_from_u64(0));
@@ -429,7 +440,7 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     let cloud: Vec<_> = model.iter().map(|point| MeasuredPoint { position: exact(point), pixels: None }).collect();
     let seen = |count: usize| (model.clone(), cloud.clone(), Candidates::from_pairs(9, (0..count).map(|i| (i, i))));
     // The NFA is irrelevant here.
-    let acceptance = Acceptance { alert_limit: 0.065, max_nfa: 1e300, ..Acceptance::default() };
+    let acceptance = Acceptance { alert_limit: 0.065, max_p_wrong: MaxPWrong::Number(1.0), ..Acceptance::default() };
     let outcome = judged(&seen(7), None, &acceptance, Vec::new()).outcome;
     let Outcome::Rejected(rejection @ RejectionReason::Hinge { rms, .. }) = &outcome else { panic!("{outcome:?}") };
     assert!((rms - 0.036).abs() < 5e-4 && rejection.reason() == "imprecise", "{rejection}");
@@ -440,7 +451,14 @@ fn a_pose_that_hangs_on_one_point_is_refused() {
     assert!(matches!(both.outcome, Outcome::Fix(_)), "{:?}", both.outcome);
     let (_, _, candidates) = seen(7);
     let tolerance = Tolerance::Sigmas(4.0);
-    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance,
+        prior: None,
+        edges: Default::default(),
+    };
     let pairs = (0..7).map(|i| Correspondence { model: i, cloud: i }).collect();
     let message = judge_labelled(&problem, pairs, &Kabsch::default(), &acceptance, None);
     assert!(matches!(message.outcome, Outcome::Fix(_)), "{:?}", message.outcome);
@@ -466,7 +484,7 @@ fn noise_at_the_edge_of_a_box_excludes_no_reading_but_enough_proposals_do() {
     let cloud: Vec<_> = one.iter().map(|at| MeasuredPoint { position: seen(at), pixels: None }).collect();
     let moved = Transform::<Camera, Object>::new(UnitQuaternion::identity(), Vector3::new(-0.2, 0.0, 3.0));
     let prior = Prior { object_from_camera: moved.inverse(), bound: PriorBound::Box(0.3 - SIGMA) };
-    let acceptance = Acceptance { max_nfa: 1e300, alert_fraction: 1.0, ..Acceptance::default() };
+    let acceptance = Acceptance { max_p_wrong: MaxPWrong::Number(0.01), alert_fraction: 1.0, ..Acceptance::default() };
     let outcome = |candidates: Candidates| {
         let scene = (model.clone(), cloud.clone(), candidates);
         judged(&scene, Some(&prior), &acceptance, Vec::new()).outcome
@@ -503,6 +521,7 @@ fn what_was_not_examined_is_not_believed() {
         candidates: &candidates,
         tolerance: Tolerance::Sigmas(4.0),
         prior: None,
+        edges: Default::default(),
     };
     let mut found = MaximumClique::default().search(&problem, &mut rng).expect("a set");
     assert_eq!(found.undecided, None);
@@ -527,7 +546,14 @@ fn named(places: &[[f64; 3]]) -> Outcome {
     let (model, cloud) = (model_of(places), at_one_depth(places));
     let candidates = Candidates::from_pairs(model.len(), (0..model.len()).map(|i| (i, i)));
     let tolerance = Tolerance::Sigmas(4.0);
-    let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance,
+        prior: None,
+        edges: Default::default(),
+    };
     let pairs: Vec<Correspondence> = (0..model.len()).map(|i| Correspondence { model: i, cloud: i }).collect();
     judge_labelled(&problem, pairs, &Mahalanobis::default(), &Acceptance::default(), None).outcome
 }
@@ -539,13 +565,14 @@ fn named_points_are_tested_for_their_residuals_alone() {
     let (model, mut rng) = (model_of(&MODEL[..5]), ChaCha8Rng::seed_from_u64(4));
     let cloud = cloud_of(&model, &mut rng);
     let candidates = Candidates::all(5, 5);
-    let strict = Acceptance { max_nfa: 1e-300, ..Acceptance::default() };
+    let strict = Acceptance { max_p_wrong: MaxPWrong::Number(1e-300), ..Acceptance::default() };
     let problem = Problem {
         model: &model,
         cloud: &cloud,
         candidates: &candidates,
         tolerance: Tolerance::Sigmas(4.0),
         prior: None,
+        edges: Default::default(),
     };
     let message = |names: [usize; 5]| -> Vec<Correspondence> {
         (0..5).map(|i| Correspondence { model: i, cloud: names[i] }).collect()

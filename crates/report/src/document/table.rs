@@ -34,8 +34,6 @@ pub(crate) struct Line {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Cell {
     pub(crate) text: Text,
-    /// The number of columns that the cell spans; 0 counts as 1.
-    pub(crate) columns: usize,
     /// Whether the text may wrap.
     pub(crate) prose: bool,
     /// Whether the cell is less prominent than its neighbours.
@@ -72,14 +70,6 @@ impl Cell {
 
     pub(crate) fn minor(span: impl Into<Span>) -> Self {
         Self { text: vec![span.into()], minor: true, ..Self::default() }
-    }
-
-    pub(crate) fn over(columns: usize, span: impl Into<Span>) -> Self {
-        Self { text: vec![span.into()], columns, ..Self::default() }
-    }
-
-    pub(crate) fn width(&self) -> usize {
-        self.columns.max(1)
     }
 
     pub(crate) fn plain(&self) -> String {

@@ -25,7 +25,6 @@ pub(crate) fn csv(table: &Table) -> String {
                 above.clone_from(&own);
             }
             cells.push(own);
-            cells.extend(std::iter::repeat_n(String::new(), cell.width() - 1));
         }
         out += &line(cells.iter().map(String::as_str));
     }

@@ -161,16 +161,10 @@ fn wide(table: &Table) -> bool {
 fn cells(table: &Table, cells: &[Cell]) -> Markup {
     // On a narrow screen every line of a wide table becomes a block, with the column name above each cell.
     let names = if wide(table) { table.names() } else { Vec::new() };
-    let mut next = 0;
-    let mut place = |cell: &Cell| {
-        next += cell.width();
-        next - cell.width()
-    };
-    let placed: Vec<(usize, &Cell)> = cells.iter().map(|cell| (place(cell), cell)).collect();
     markup! {
-        @for (place, cell) in placed {
-            @let numbers = table.numbers(place) && cell.width() == 1;
-            td.n[numbers].minor[cell.minor].text[cell.prose].word[!numbers && !cell.prose] colspan=[(cell.width() > 1).then(|| cell.width())] data-of=[names.get(place)] {
+        @for (place, cell) in cells.iter().enumerate() {
+            @let numbers = table.numbers(place);
+            td.n[numbers].minor[cell.minor].text[cell.prose].word[!numbers && !cell.prose] data-of=[names.get(place)] {
                 (spans(&cell.text))
             }
         }

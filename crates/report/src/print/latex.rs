@@ -156,8 +156,7 @@ fn columns(table: &Table) -> String {
 
 fn cell(cell: &Cell) -> String {
     let text = spans(&cell.text);
-    let text = if cell.prose { format!("{{\\raggedright {text}\\par}}") } else { text };
-    if cell.width() > 1 { format!("\\multicolumn{{{}}}{{c}}{{{text}}}", cell.width()) } else { text }
+    if cell.prose { format!("{{\\raggedright {text}\\par}}") } else { text }
 }
 
 fn listing(title: &str, text: &str) -> String {

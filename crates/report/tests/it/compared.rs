@@ -33,7 +33,7 @@ fn long(folder: &Path, name: &str, solver: &str, seed: u64, frames: u64) -> Path
 fn runs_of_the_same_data_are_compared() {
     let folder = tempfile::tempdir().unwrap();
     let (first, second) = (run(folder.path(), "a", "triad", 1), run(folder.path(), "b", "kabsch", 1));
-    let compared = compare(&[first.clone(), second], false, Some(folder.path()), None).unwrap();
+    let compared = compare(&[first.clone(), second], false, Some(&folder.path().join("compared")), None).unwrap();
     assert!(compared.differ && compared.table.contains("significant"), "{}", compared.table);
     assert!(compared.page.unwrap().exists());
     let again = run(folder.path(), "c", "triad", 1);

@@ -28,8 +28,12 @@ pub(crate) fn noise(seed: u64) -> f64 {
 }
 
 pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
-    let camera =
-        CameraRecord { size: SIZE, matrix: [[F, 0.0, 255.5], [0.0, F, 191.5], [0.0, 0.0, 1.0]], distortion: vec![] };
+    let camera = CameraRecord {
+        size: SIZE,
+        matrix: [[F, 0.0, 255.5], [0.0, F, 191.5], [0.0, 0.0, 1.0]],
+        distortion: vec![],
+        equidistant: false,
+    };
     let mut right_from_left = IDENTITY;
     right_from_left[0][3] = -0.25;
     let component = |stage: &str, name: &str, summary: &str, source: &str| Component {

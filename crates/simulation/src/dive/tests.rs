@@ -201,7 +201,7 @@ fn saddle(image: &Image, near: &Pixel) -> Option<Pixel> {
 }
 
 /// Whether a feature point is the common corner of two panels.
-fn is_x_mark(plan: &crate::ObjectPlan, point: usize) -> bool {
+fn is_x_mark(plan: &crate::blueprint::ObjectPlan, point: usize) -> bool {
     let Some(panel) = plan.points[point].panel else { return false };
     let here = &plan.panels[panel];
     plan.panels.iter().filter(|p| p.carrier == here.carrier && p.outline[0] == here.outline[0]).count() == 2
@@ -262,7 +262,7 @@ fn numbers_that_make_no_dive_are_refused() {
     for (dive, start) in [
         (Dive { distance: f64::NAN, ..small() }, "distance = NaN; "),
         (Dive { tilt_deg: [10.0, 5.0], ..small() }, "tilt-deg[1] = 5; "),
-        (Dive { rig: VirtualRig { focal: -1.0, ..VirtualRig::default() }, ..small() }, "rig: fx = -1; "),
+        (Dive { rig: VirtualRig { focal: -1.0, ..VirtualRig::default() }, ..small() }, "rig.focal = -1; "),
         (Dive { points: PointNoise { found: 2.0, ..PointNoise::default() }, ..small() }, "points.found = 2; "),
     ] {
         let message = dive.plan(1, 0).unwrap_err().to_string();

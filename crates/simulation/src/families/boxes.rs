@@ -4,10 +4,12 @@ use nalgebra::Vector3;
 use seafix_geometry::Point;
 
 use super::{
-    Family, Generated, GeneratedParameters, GeneratedProblem, GeneratedTruth, Part, Source,
     clutter::{EDGE_JITTER, Scene, in_gates, on_edge, on_face},
+    family::{Family, Part, Source},
+    generated::Generated,
     prior::{ahead, prior_pose},
-    problem::{micrometres, round},
+    problem::{GeneratedProblem, micrometres, round},
+    truth::{GeneratedParameters, GeneratedTruth},
 };
 use crate::stream::Stream;
 

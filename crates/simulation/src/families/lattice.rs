@@ -6,11 +6,13 @@ use nalgebra::Vector3;
 use seafix_geometry::Point;
 
 use super::{
-    Generated, GeneratedParameters, GeneratedProblem, GeneratedTruth, Part, Source,
     boxes::shuffled,
     clutter::anywhere,
+    family::{Part, Source},
+    generated::Generated,
     prior::{ahead, direction, prior_pose},
-    problem::micrometres,
+    problem::{GeneratedProblem, micrometres},
+    truth::{GeneratedParameters, GeneratedTruth},
 };
 use crate::stream::Stream;
 

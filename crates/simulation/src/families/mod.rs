@@ -20,84 +20,20 @@
 
 mod boxes;
 mod clutter;
+mod family;
+mod generated;
 mod lattice;
 mod prior;
 mod problem;
 mod putative;
 mod truth;
 
-use std::str::FromStr;
-
+use family::Source;
+pub use family::{Family, Presence};
+pub use generated::Generated;
 pub use problem::{GeneratedPrior, GeneratedProblem};
 pub use putative::PutativePairs;
 pub use truth::{GeneratedParameters, GeneratedTruth};
-
-use crate::stream::{Purpose, Stream};
-
-/// A family of generated coherence problems.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Family {
-    /// Paper-scale: the size of the paper's scenes.
-    A,
-    /// Site-scale: a complete site.
-    B,
-    /// No-prior: a site without a prior pose.
-    C,
-    /// Putative correspondences.
-    D,
-    /// Lattice: a lattice with decoys.
-    E,
-    /// Few-visible: a site of which few points are visible.
-    F,
-    /// Dense-clutter: a site with all clutter in the gates.
-    G,
-}
-
-impl Family {
-    /// All families, in order.
-    pub const ALL: [Self; 7] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F, Self::G];
-
-    /// Name of the family.
-    pub fn name(self) -> &'static str {
-        ["paper-scale", "site-scale", "no-prior", "putative", "lattice", "few-visible", "dense-clutter"][self as usize]
-    }
-
-    /// Letter of the family in `coherence-problem/1`.
-    pub fn letter(self) -> &'static str {
-        ["a", "b", "c", "d", "e", "f", "g"][self as usize]
-    }
-}
-
-impl FromStr for Family {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL.into_iter().find(|family| family.name() == name);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("unknown family `{name}`; give one of {names}")
-        })
-    }
-}
-
-/// Presence of the object in the scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Presence {
-    /// The object is there, and its visible points were measured.
-    #[default]
-    Present,
-    /// The object is absent, and the cloud is clutter.
-    Absent,
-}
-
-/// A generated problem with its truth.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Generated {
-    /// The problem, as a method receives it.
-    pub problem: GeneratedProblem,
-    /// The truth, for evaluation only.
-    pub truth: GeneratedTruth,
-}
 
 impl Generated {
     /// Generates problem `number` of a family.
@@ -114,37 +50,6 @@ impl Generated {
     /// depend on seed and number alone, not on the fraction of outliers.
     pub fn of_pairs(pairs: &PutativePairs, seed: u64, number: u64) -> Self {
         putative::generated(&Source { family: Family::D, seed, number, presence: Presence::Present }, pairs)
-    }
-}
-
-/// The origin of a problem.
-struct Source {
-    family: Family,
-    seed: u64,
-    number: u64,
-    presence: Presence,
-}
-
-/// A part of a problem with a stream of its own, so that a change of one part leaves the others unchanged.
-#[derive(Clone, Copy)]
-enum Part {
-    Cell,
-    Model,
-    Pose,
-    Visible,
-    Prior,
-    Clutter,
-    Noise,
-    Order,
-}
-
-impl Source {
-    fn stream(&self, part: Part) -> Stream {
-        Stream::new(self.seed, self.number, 16 * self.family as u64 + part as u64, Purpose::Problem)
-    }
-
-    fn absent(&self) -> bool {
-        self.presence == Presence::Absent
     }
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use seafix_geometry::{Camera, Object, Point, Transform};
 
-use super::GeneratedPrior;
+use super::problem::GeneratedPrior;
 use crate::stream::Stream;
 
 /// Maximum number of prior poses that are tried; the last is kept although a point may lie outside of its gate.

@@ -5,7 +5,7 @@ use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, Uncertain
 use seafix_referencing::{ModelPoint, Prior, PriorBound, problem_file::CoherenceProblem};
 use serde::Serialize;
 
-use super::Source;
+use super::family::Source;
 
 /// A problem with the keys and the order of `coherence-problem/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,10 +4,12 @@ use nalgebra::Vector3;
 use seafix_geometry::{Point, Transform};
 
 use super::{
-    Generated, GeneratedParameters, GeneratedProblem, GeneratedTruth, Part, Source,
     boxes::shuffled,
+    family::{Part, Source},
+    generated::Generated,
     prior::{cube, direction, rotation},
-    problem::micrometres,
+    problem::{GeneratedProblem, micrometres},
+    truth::{GeneratedParameters, GeneratedTruth},
 };
 
 /// Number of pairs, and percentage of outliers among them.

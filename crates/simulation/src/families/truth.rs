@@ -4,7 +4,7 @@ use seafix_geometry::{Camera, Object, Transform};
 use seafix_referencing::{Correspondence, Kabsch, Observations, Solver, problem_file::CoherenceProblem, rms_apart};
 use serde::Serialize;
 
-use super::GeneratedProblem;
+use super::problem::GeneratedProblem;
 
 /// Number of true pairs from which on the largest coherent subset is not computed.
 const MANY_PAIRS: usize = 100;

@@ -1,6 +1,6 @@
 //! The state of the cameras under faults.
 
-use super::Instant;
+use super::frame::Instant;
 use crate::{
     sensors::{DeviceFault, FaultKind, FaultyDevice},
     stream::{Purpose, Stream},

@@ -2,7 +2,7 @@
 
 use seafix_vision::{Image, Threads};
 
-use super::{Mission, PlannedMission, RigPlan};
+use super::{plan::PlannedMission, rig::RigPlan, settings::Mission};
 use crate::sensors::{DeviceFault, FaultKind, FaultyDevice};
 
 /// A mission of twelve frames at 5 Hz; the fault is active from the fifth to the tenth.

@@ -7,7 +7,7 @@ use seafix_geometry::{
 };
 use seafix_vision::{Image, Threads};
 
-use super::{PlannedMission, PriorKind, capture::CaptureState};
+use super::{capture::CaptureState, plan::PlannedMission, settings::PriorKind};
 use crate::{
     dive::VisiblePoint,
     render::{Exposure, Rolling, Shot},
@@ -37,6 +37,13 @@ pub struct InstantTruth {
     pub world_from_camera: Transform<World, Camera>,
     /// The feature points of all objects that are inside both images and not occluded.
     pub visible: Vec<VisiblePoint>,
+}
+
+impl PlannedMission {
+    /// Frame number `index`, a function of settings, seed, dive and index alone.
+    pub fn instant(&self, index: usize) -> Instant<'_> {
+        Instant::new(self, index, self.times[index])
+    }
 }
 
 impl<'a> Instant<'a> {

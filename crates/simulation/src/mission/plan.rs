@@ -1,17 +1,18 @@
 //! A mission with its site and its trajectory; frames are computed on demand, in any order.
 
-use std::sync::Mutex;
+use std::{path::Path, sync::Mutex};
 
 use nalgebra::{Matrix3, Vector3, Vector6};
+use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Object, StereoRig, Transform, World};
 use seafix_referencing::Site;
 use seafix_vision::{Threads, Workspace};
 
-use super::{Instant, Mission, rig::Cameras};
+use super::{rig::Cameras, settings::Mission};
 use crate::{
     optics::Lamp,
     render::{RenderCamera, Studio, SurfaceTextures},
-    scene::{Changes, Scene, SitePlan},
+    scene::{Changes, Scene, SitePlan, wireframe::add_edges},
     sensors::{Readings, SensorNavigation, SensorPrior},
     stream::{Purpose, Stream},
     survey::SurveyErrors,
@@ -46,10 +47,30 @@ pub struct PlannedMission {
     memories: Mutex<Vec<Workspace>>,
 }
 
+impl Mission {
+    /// Plans dive number `dive` of an experiment with this seed. `folder` is the base of relative paths.
+    ///
+    /// # Errors
+    /// All faults of the site, or else the first fault of the settings or of the route. The message of a collision
+    /// names the object, the place and the time.
+    pub fn plan(&self, seed: u64, dive: u64, folder: &Path) -> Result<PlannedMission, Vec<Fault>> {
+        let wrong = |message: String| vec![Fault::new(message, Path::new("the source's settings"))];
+        self.check().map_err(wrong)?;
+        let site = self.site_plan(folder)?;
+        if let Some(name) = self.changes.stranger(&site.site) {
+            return Err(wrong(format!(
+                "changes.objects = `{name}`; the site has no such object; give the ids of its objects"
+            )));
+        }
+        PlannedMission::new(self, &site, seed, dive).map_err(wrong)
+    }
+}
+
 impl PlannedMission {
     pub(super) fn new(settings: &Mission, plan: &SitePlan, seed: u64, dive: u64) -> Result<Self, String> {
         let errors = SurveyErrors { model: settings.model_sigma, survey: settings.survey_sigma };
-        let scene = Scene::new(plan, &settings.changes, errors, seed);
+        let mut scene = Scene::new(plan, &settings.changes, errors, seed);
+        add_edges(&mut scene, plan, settings.model_sigma, settings.model_edges, seed);
         let cameras = settings.rig.build()?;
         let body_from_camera = mount(settings.rig.ahead_deg, settings.rig.at);
         let studio = build_studio(settings, &cameras, seed, dive);
@@ -176,11 +197,6 @@ impl PlannedMission {
     /// Whether there is no frame.
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
-    }
-
-    /// Frame number `index`, a function of settings, seed, dive and index alone.
-    pub fn instant(&self, index: usize) -> Instant<'_> {
-        Instant::new(self, index, self.times[index])
     }
 
     /// The time of a frame (s).

@@ -1,7 +1,7 @@
 //! The true stereo rig, and the rig that a method receives.
 
 use nalgebra::{UnitQuaternion, Vector3};
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::{Camera, Pinhole, RightCamera, StereoRig, Transform, so3};
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::optics::{Lens, Port, PortKind};
 pub const CALIBRATION_RANGE: f64 = 3.0;
 
 /// The medium in which the focal length is given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum FocalIn {
     /// Air: the lens alone, without its port.
@@ -23,7 +23,7 @@ pub enum FocalIn {
 
 /// Two equal cameras side by side, tilted forward from straight down. The defaults are the paper's virtual camera; the
 /// paper gives no baseline.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigPlan {
     /// Width and height of the images (px), from 16 to 8192 each.
@@ -64,7 +64,7 @@ impl Default for RigPlan {
 }
 
 /// Calibration errors: differences between the rig that a method receives and the true rig.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CalibrationError {
     /// Relative error of both focal lengths (0.001 is 0.1 %), from −0.5 to 0.5.

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use seafix_component::{Fault, in_range};
+use seafix_component::{Fault, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{PlannedMission, RigPlan};
+use super::rig::RigPlan;
 use crate::{
     optics::{Lamp, Water},
     points::PointNoise,
@@ -19,7 +19,7 @@ use crate::{
 const LONGEST: f64 = 7200.0;
 
 /// Source of the prior pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum PriorKind {
     /// The true pose plus normally distributed errors, independent in each frame.
@@ -30,7 +30,7 @@ pub enum PriorKind {
 }
 
 /// The settings of a mission. A factor of magnitude 0 gives the same bits as no factor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Mission {
     /// The site: `drill-centre`, `karmin2`, `random`, or the path of NAME.site.toml with NAME.geometry.toml beside it.
@@ -54,6 +54,8 @@ pub struct Mission {
     pub prior_attitude_deg: f64,
     /// Standard deviation of each coordinate of a model point (m), from 0 to 0.05.
     pub model_sigma: f64,
+    /// Fraction of the straight edges of the objects that the site lists, from 0 to 1.
+    pub model_edges: f64,
     /// Standard deviation of each surveyed world coordinate of a base point (m), from 0 to 1.
     pub survey_sigma: f64,
     /// Minimum distance of cameras, lamps and vehicle from every surface (m), from 0 to 10; a nearer route is rejected.
@@ -98,6 +100,7 @@ impl Default for Mission {
             prior_position: 0.1,
             prior_attitude_deg: 0.5,
             model_sigma: 0.001,
+            model_edges: 1.0,
             survey_sigma: 0.01,
             clearance: 0.3,
             shadows: true,
@@ -135,10 +138,12 @@ impl Mission {
         within("prior-position", self.prior_position, 0.0, 100.0)?;
         within("prior-attitude-deg", self.prior_attitude_deg, 0.0, 180.0)?;
         within("model-sigma", self.model_sigma, 0.0, 0.05)?;
+        within("model-edges", self.model_edges, 0.0, 1.0)?;
         within("survey-sigma", self.survey_sigma, 0.0, 1.0)?;
         within("clearance", self.clearance, 0.0, 10.0)?;
         within("points.sigma-px", self.points.sigma_px, 0.0, 20.0)?;
         within("points.found", self.points.found, 0.0, 1.0)?;
+        within("points.clutter", self.points.clutter as f64, 0.0, PointNoise::MAX_CLUTTER as f64)?;
         self.random.check()?;
         self.changes.check()?;
         self.rig.check()?;
@@ -154,7 +159,7 @@ impl Mission {
     }
 
     /// Loads the site; a relative path starts at `folder`.
-    fn site_plan(&self, folder: &Path) -> Result<SitePlan, Vec<Fault>> {
+    pub(super) fn site_plan(&self, folder: &Path) -> Result<SitePlan, Vec<Fault>> {
         if let Some(plan) = built_in(&self.site) {
             return Ok(plan);
         }
@@ -169,22 +174,5 @@ impl Mission {
             ]);
         }
         SitePlan::read(&folder.join(&self.site))
-    }
-
-    /// Plans dive number `dive` of an experiment with this seed. `folder` is the base of relative paths.
-    ///
-    /// # Errors
-    /// All faults of the site, or else the first fault of the settings or of the route. The message of a collision
-    /// names the object, the place and the time.
-    pub fn plan(&self, seed: u64, dive: u64, folder: &Path) -> Result<PlannedMission, Vec<Fault>> {
-        let wrong = |message: String| vec![Fault::new(message, Path::new("the source's settings"))];
-        self.check().map_err(wrong)?;
-        let site = self.site_plan(folder)?;
-        if let Some(name) = self.changes.stranger(&site.site) {
-            return Err(wrong(format!(
-                "changes.objects = `{name}`; the site has no such object; give the ids of its objects"
-            )));
-        }
-        PlannedMission::new(self, &site, seed, dive).map_err(wrong)
     }
 }

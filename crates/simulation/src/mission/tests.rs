@@ -74,7 +74,7 @@ fn what_is_switched_on_at_nothing_changes_nothing() {
             fault(FaultKind::Intermittent, 0.0, 99.0),
             fault(FaultKind::Delayed, 0.0, 99.0),
         ],
-        imager: crate::Imager { sync_ms: 0.0, readout_ms: 0.0, ..small().imager },
+        imager: crate::render::Imager { sync_ms: 0.0, readout_ms: 0.0, ..small().imager },
         ..small()
     };
     let plan = planned(&mission);
@@ -93,7 +93,7 @@ fn a_right_image_taken_late_shifts_by_speed_times_delay() {
     };
     let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
     let still = Mission { route: along, vehicle: rail, frames: 3, rate: 0.2, start: 8.0, ..small() };
-    let late = Mission { imager: crate::Imager { sync_ms: 20.0, ..still.imager.clone() }, ..still.clone() };
+    let late = Mission { imager: crate::render::Imager { sync_ms: 20.0, ..still.imager.clone() }, ..still.clone() };
     let (on_time, delayed) = (planned(&still), planned(&late));
     let (a, b) = (on_time.instant(0), delayed.instant(0));
     let mut n = 0;

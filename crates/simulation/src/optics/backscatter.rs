@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use seafix_geometry::Pixel;
 
-use super::{Lens, Water, lamp::Lamp};
+use super::{lamp::Lamp, lens::Lens, water::Water};
 
 /// Distance of table nodes in the image (tangent of the angle).
 const STEP: f64 = 0.08;
@@ -169,7 +169,7 @@ fn textured(backscatter_table: &Backscatter, row: &[f32], u: &[f32], r: &[f32], 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optics::Port;
+    use crate::optics::port::Port;
     use seafix_geometry::Pinhole;
 
     fn lens() -> Lens {

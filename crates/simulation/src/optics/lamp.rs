@@ -1,21 +1,21 @@
 //! Lamps that move with the vehicle.
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 /// A lamp on the vehicle.
 ///
 /// The intensity at the angle θ to the axis is `power`·cosᵐ θ, and 0 beyond 90°. The exponent m gives half the
 /// intensity at half the beam width.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Lamp {
     /// Position in the left camera's frame (m), from −100 to 100 each.
     pub at: [f64; 3],
     /// Point on the lamp's axis in the left camera's frame (m), from −100 to 100 each.
     pub aim: [f64; 3],
-    /// Intensity along the axis, from 0 to 1000; 1 is a usual lamp.
+    /// Intensity along the axis as a multiple of a usual lamp's, from 0 to 1000.
     pub power: f64,
     /// Full width of the beam at half the intensity (degrees), from 5 to 170.
     pub beam_deg: f64,

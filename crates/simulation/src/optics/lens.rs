@@ -30,7 +30,7 @@ impl Lens {
 
     /// Whether it is an ideal pinhole, which maps lines to lines.
     pub fn is_straight(&self) -> bool {
-        self.port.kind == PortKind::None && self.camera.distortion().shortest().is_empty()
+        self.port.kind == PortKind::None && self.camera.distortion().is_none()
     }
 
     /// The ray in the water of a pixel.

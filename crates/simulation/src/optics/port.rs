@@ -1,7 +1,7 @@
 //! The port between camera and water: none, a dome, or a flat plate.
 
 use nalgebra::{Vector2, Vector3};
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 /// Tangent of the angle beyond which a flat port transmits nearly nothing.
@@ -17,7 +17,7 @@ pub struct Ray {
 }
 
 /// The kinds of port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum PortKind {
     /// No port: the ideal camera of the paper.
@@ -30,7 +30,7 @@ pub enum PortKind {
 }
 
 /// A port with exact refraction at both surfaces (Snell's law).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Port {
     /// Kind of the port.

@@ -1,6 +1,6 @@
 //! Optical properties of the water: attenuation and scattering.
 
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 /// Names of waters and their attenuation coefficients at 530 nm (1/m).
@@ -19,7 +19,7 @@ pub const WATERS: [(&str, f64); 7] = [
 /// Light is attenuated by exp(−c r), with c = a + b for absorption and scattering. The fraction `1 − isotropic` of the
 /// scattered light follows Henyey and Greenstein (1941) with mean cosine `forwardness`; the rest is isotropic, because
 /// the Henyey–Greenstein function alone underestimates backscatter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Water {
     /// Beam attenuation coefficient c (1/m), from 0 to 20. The default is the water `clear`.
@@ -37,7 +37,7 @@ pub struct Water {
     pub small_angle: f64,
     /// Standard deviation of the small-angle blur (px) per unit of c·range, from 0 to 5.
     pub blur: f64,
-    /// Daylight at the seabed, in units of a lamp's irradiance at 1 m, from 0 to 1000.
+    /// Daylight at the seabed as a multiple of a lamp's irradiance at 1 m, from 0 to 1000.
     pub ambient: f64,
     /// Number of marine snow particles per cubic metre, from 0 to 5000.
     pub snow: f64,

@@ -25,7 +25,6 @@ mod visibility;
 
 pub(crate) use camera::{RenderCamera, Rolling};
 pub(crate) use scene::{Shot, Studio};
-pub(crate) use sensor::Pattern;
 pub use sensor::{Exposure, Imager};
 pub(crate) use texture::SurfaceTextures;
 pub(crate) use visibility::changes;

@@ -7,10 +7,12 @@ use seafix_geometry::{Camera, Frame, RightCamera, Transform, World};
 use seafix_vision::{Image, Threads, Workspace};
 
 use super::{
-    Exposure, Imager, Pattern, RenderCamera, Rolling, SurfaceTextures,
     blur::{BlurScratch, Smear, gaussian},
+    camera::{RenderCamera, Rolling},
+    sensor::{Exposure, Imager, Pattern},
     shadow::{ShadowMap, ShadowView, shadow_camera},
     snow::{Flake, fall, flakes},
+    texture::SurfaceTextures,
     view::{Lit, View, ViewScratch},
 };
 use crate::{

@@ -1,6 +1,6 @@
 //! The image sensor: exposure, gain, noise and quantisation.
 
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ const BRIGHTEST: f64 = 0.02;
 ///
 /// The mean is μ = K·n + black and the variance σ² = K²(σ_read² + n) + quantisation, with n electrons and the gain K in
 /// grey levels per electron. The defaults are those of a usual industrial CMOS sensor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Imager {
     /// Exposure time (ms), from 0.001 to 1000; the maximum with automatic exposure.
@@ -39,7 +39,7 @@ pub struct Imager {
     pub prnu: f64,
     /// Dark signal non-uniformity: standard deviation (electrons), from 0 to 10 000.
     pub dsnu: f64,
-    /// Black level (grey levels of 255), from 0 to 100.
+    /// Black level (grey levels), from 0 to 100.
     pub black: f64,
     /// Bits of a pixel: 8 or 12.
     pub bits: u8,

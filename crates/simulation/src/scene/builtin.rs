@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::SitePlan;
+use super::site_plan::SitePlan;
 
 /// Names and descriptions of the built-in sites.
 pub const BUILT_IN: [(&str, &str); 2] = [

@@ -1,7 +1,7 @@
 //! Changes of the site since its survey: displaced, overgrown or silted objects, and occluders.
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::{Object, Transform, World, so3};
 use seafix_referencing::Site;
 use serde::{Deserialize, Serialize};
@@ -13,7 +13,7 @@ use crate::stream::{Purpose, Stream};
 /// Magnitudes are exact and directions are sampled from the seed. All zero is the site as surveyed. Studies use a shift
 /// up to 0.5 m, settlement up to 0.10 m, tilt up to 3°, heading up to 5° (usual installation tolerances), rounding up
 /// to 5 cm and silt up to 15 cm.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Changes {
     /// Ids of the changed objects; an empty list stands for all.

@@ -38,7 +38,7 @@ impl Scene {
 mod tests {
     use super::*;
     use crate::{
-        scene::{Changes, built_in},
+        scene::{builtin::built_in, change::Changes},
         survey::SurveyErrors,
     };
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix_component::{Fault, line_at};
+use seafix_component::{Fault, Settings, line_at};
 use serde::{Deserialize, Serialize};
 
 /// Name of the format.
@@ -11,7 +11,7 @@ pub const GEOMETRY_FORMAT: &str = "seafix-geometry/1";
 /// Solid bodies, paint and materials of a site, each object's in the frame of its site file.
 ///
 /// Lengths are in metres, angles in degrees.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Geometry {
     /// Name of the format, `seafix-geometry/1`.
@@ -30,12 +30,12 @@ pub struct Geometry {
 }
 
 /// The seabed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct SeabedPlan {
     /// Depth of the mean seabed below the world's origin (m), from −100 000 to 100 000.
     pub depth: f64,
-    /// Scale of the relief, from 0 to 3: 0 is flat, 1 has waves of a few centimetres.
+    /// Factor of the relief, from 0 to 3: 0 is flat, 1 has waves of a few centimetres.
     pub relief: f64,
     /// Albedo, from 0 to 1.
     pub albedo: f64,
@@ -52,7 +52,7 @@ impl Default for SeabedPlan {
 }
 
 /// The texture of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Texture {
     /// Uniform albedo.
@@ -72,7 +72,7 @@ pub enum Texture {
 }
 
 /// A material, with Lambertian reflection.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaterialPlan {
     /// Name, to which bodies refer.
@@ -84,7 +84,7 @@ pub struct MaterialPlan {
 }
 
 /// The bodies of one object.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ObjectGeometry {
     /// Id of the object in the site.
@@ -107,7 +107,7 @@ pub struct ObjectGeometry {
 }
 
 /// A box.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct BoxBody {
     /// Centre (m).
@@ -122,7 +122,7 @@ pub struct BoxBody {
 }
 
 /// A cylinder with its two caps.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CylinderBody {
     /// Start of the axis (m).
@@ -136,7 +136,7 @@ pub struct CylinderBody {
 }
 
 /// A flat, convex painted area, rendered upon the face in whose plane it lies.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PanelBody {
     /// Corners in order, anticlockwise seen from outside (m).
@@ -146,7 +146,7 @@ pub struct PanelBody {
 }
 
 /// A chequered marking.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ChequerBody {
     /// First corner (m).
@@ -162,7 +162,7 @@ pub struct ChequerBody {
 }
 
 /// A mesh of triangles.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MeshBody {
     /// Vertices (m).

@@ -3,17 +3,17 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::{Object, Point, Transform, World, so3, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    SitePlan,
     mesh::angles,
     plan::{
         BoxBody, CylinderBody, GEOMETRY_FORMAT, Geometry, MaterialPlan, ObjectGeometry, PanelBody, SeabedPlan, Texture,
     },
+    site_plan::SitePlan,
 };
 use crate::stream::{Purpose, Stream};
 
@@ -25,7 +25,7 @@ const TRIALS: usize = 60;
 /// A random site of slabs with boxes and painted marks.
 ///
 /// The feature points are the corners of the boxes' upper faces and of the marks. All objects are at most 1.5 m high.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RandomSite {
     /// Number of objects, from 1 to 50.
@@ -131,6 +131,7 @@ impl RandomSite {
             survey_sigma: 0.01,
             world_from_object: Some(world_from_object),
             points: points.collect(),
+            edges: Vec::new(),
             interest: Vec::new(),
         };
         let turned = |yaw: f64| angles(&(local.rotation() * so3::exp(&(Vector3::z() * yaw))).to_rotation_matrix());

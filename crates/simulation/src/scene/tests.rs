@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use super::*;
 
 fn scene(plan: &SitePlan, changes: &Changes) -> Scene {
@@ -33,7 +35,7 @@ fn built_in_sites_match_their_descriptions() {
 fn the_papers_site_is_the_blueprint_dressed() {
     let plan = built_in("drill-centre").unwrap();
     let scene = scene(&plan, &Changes::default());
-    let virtual_site = crate::virtual_scene::VirtualScene::new(&crate::Blueprint::drill_centre(), 3);
+    let virtual_site = crate::virtual_scene::VirtualScene::new(&crate::blueprint::Blueprint::drill_centre(), 3);
     for (object, body) in scene.objects.iter().zip(&virtual_site.bodies) {
         for (point, corner) in object.points.iter().zip(&body.points) {
             assert!((point.at - corner.at).norm() < 3e-6);

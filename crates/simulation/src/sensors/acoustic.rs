@@ -1,9 +1,10 @@
 //! Ultra-short-baseline (USBL) positioning from a ship.
 
 use nalgebra::Vector3;
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
-use super::{SOUND, TimedReading, within};
+use super::reading::{SOUND, TimedReading, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
@@ -16,7 +17,7 @@ const OUTLIER: f64 = 0.1;
 ///
 /// USBL has a range fraction (0.5 % is usual, published values go from 0.1 to 2 %). A `sigma` of 0.1 to 0.3 m without a
 /// fraction stands for an LBL system of which only the positions are used.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Acoustic {
     /// Position of the ship's transceiver: north, east, down (m), from −100 000 to 100 000 each.

@@ -1,10 +1,11 @@
 //! Rate gyro and attitude solution.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use seafix_component::Settings;
 use seafix_geometry::so3;
 use serde::{Deserialize, Serialize};
 
-use super::{TimedReading, Value, within};
+use super::reading::{TimedReading, Value, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
@@ -15,7 +16,7 @@ use crate::{
 /// The rate is ω + bias + white noise of density `random_walk`. The bias is an Ornstein–Uhlenbeck process of standard
 /// deviation `instability` and time constant `tau`. The attitude has a heading error and a level error that stay the
 /// same for the dive, and white noise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct AttitudeSensor {
     /// Standard deviation of the heading error, constant over a dive (degrees), from 0 to 180.

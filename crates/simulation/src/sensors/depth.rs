@@ -1,16 +1,17 @@
 //! The pressure sensor.
 
 use nalgebra::Vector3;
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
-use super::{TimedReading, within};
+use super::reading::{TimedReading, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
 };
 
 /// Depth from pressure, with a constant bias over a dive (tide, density) and white noise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DepthGauge {
     /// Position of the sensor in the body frame (m), from −10 to 10 each.

@@ -1,9 +1,10 @@
 //! The Doppler velocity log.
 
 use nalgebra::Vector3;
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
-use super::{TimedReading, within};
+use super::reading::{TimedReading, within};
 use crate::{
     scene::Scene,
     stream::{Purpose, Stream},
@@ -19,7 +20,7 @@ const ON_STRUCTURE: f64 = 0.5;
 ///
 /// The scale error is sampled once for a dive. A velocity needs three of four beams; a beam that meets a structure
 /// fails in half of the pings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Doppler {
     /// Position of the sensor in the body frame (m), from −10 to 10 each.

@@ -1,16 +1,16 @@
 //! Device faults.
 
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{TimedReading, Value};
+use super::reading::{TimedReading, Value};
 use crate::stream::{Purpose, Stream};
 
 /// Decimation of a slow device: one reading in this number arrives.
 const SLOW: usize = 5;
 
 /// The devices that can fail.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultyDevice {
     /// Both cameras.
@@ -28,7 +28,7 @@ pub enum FaultyDevice {
 }
 
 /// The kinds of fault, named as in PX4's failure injection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
     /// No reading arrives; images are black.
@@ -48,7 +48,7 @@ pub enum FaultKind {
 }
 
 /// A fault of one device over an interval of time.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct DeviceFault {
     /// The device.

@@ -1,10 +1,10 @@
 //! Long-baseline (LBL) positioning: ranges to transponders on the seabed.
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{SOUND, TimedReading, Value, within};
+use super::reading::{SOUND, TimedReading, Value, within};
 use crate::{
     stream::{Purpose, Stream},
     vehicle::Track,
@@ -20,7 +20,7 @@ const ECHO: f64 = 0.1;
 /// A range is |p − t|·(1 + s) + noise. The true transponder position t differs from its surveyed position by an error
 /// of standard deviation `survey`; s is the relative error of the speed of sound. Both stay the same for the dive.
 /// Outliers are echoes, which are always too long. The vehicle's motion during the travel time is neglected.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Lbl {
     /// Surveyed positions of the transponders: north, east, down (m). Give three to eight; an empty list disables LBL.

@@ -10,10 +10,11 @@ mod doppler;
 mod fault;
 mod lbl;
 mod prior;
+mod reading;
 mod trilateration;
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
 pub use acoustic::Acoustic;
@@ -23,20 +24,7 @@ pub use doppler::Doppler;
 pub use fault::{DeviceFault, FaultKind, FaultyDevice};
 pub use lbl::{Lbl, Ranges};
 pub(crate) use prior::{SensorNavigation, SensorPrior};
-
-/// The speed of sound (m/s).
-const SOUND: f64 = 1500.0;
-
-/// A sensor reading with its times.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TimedReading<V> {
-    /// Time of the measurement (s).
-    pub time: f64,
-    /// Time of arrival (s); the reading is unknown before it.
-    pub arrival: f64,
-    /// The measured value.
-    pub value: V,
-}
+pub use reading::TimedReading;
 
 /// An acoustic position of the transponder.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +62,7 @@ pub struct Readings {
 }
 
 /// The navigation sensors of the vehicle.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sensors {
     /// USBL positioning from a ship.
@@ -96,39 +84,6 @@ impl Sensors {
         self.doppler.check()?;
         self.attitude.check()?;
         self.depth.check()
-    }
-}
-
-/// Checks that a sensor's setting lies in its range.
-fn within(sensor: &str, name: &str, x: f64, low: f64, high: f64) -> Result<(), String> {
-    in_range(x >= low && x <= high, &format!("sensors.{sensor}.{name}"), x, &format!("a number from {low} to {high}"))
-}
-
-/// A value that faults can replace.
-pub(crate) trait Value: Copy {
-    /// A random value.
-    fn garbage(stream: &mut crate::stream::Stream) -> Self;
-    /// The value with a plausible error.
-    fn wrong(self) -> Self;
-}
-
-impl Value for Vector3<f64> {
-    fn garbage(stream: &mut crate::stream::Stream) -> Self {
-        stream.normal3(1e3)
-    }
-
-    fn wrong(self) -> Self {
-        self * 1.5 + Self::new(2.0, -1.0, 0.5)
-    }
-}
-
-impl Value for f64 {
-    fn garbage(stream: &mut crate::stream::Stream) -> Self {
-        1e3 * stream.normal()
-    }
-
-    fn wrong(self) -> Self {
-        1.1 * self + 1.0
     }
 }
 

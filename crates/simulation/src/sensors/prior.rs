@@ -4,8 +4,11 @@ use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Body, Transform, World};
 
 use super::{
-    AcousticFix, AttitudeReading, LblFix, Ranges, Readings, Sensors, TimedReading,
+    AcousticFix, LblFix, Readings, Sensors,
+    attitude::AttitudeReading,
     fault::{DeviceFault, FaultyDevice, failed},
+    lbl::Ranges,
+    reading::TimedReading,
     trilateration::{Found, Length, trilaterate},
 };
 use crate::{scene::Scene, vehicle::Track};

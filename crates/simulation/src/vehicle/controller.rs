@@ -1,7 +1,7 @@
 //! The controlled vehicle: a PID controller follows the route.
 
 use nalgebra::{DVector, UnitQuaternion, Vector3, Vector6};
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::{Body, Transform, so3};
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use super::{
 use crate::seabed::Seabed;
 
 /// The vehicle models.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum VehicleKind {
     /// An ideal carriage: the cameras follow the route exactly.
@@ -28,7 +28,7 @@ pub enum VehicleKind {
 
 /// The vehicle and its PID controller. Gains apply to position and velocity errors and are scaled by the vehicle's
 /// mass.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vehicle {
     /// The vehicle model.

@@ -1,7 +1,7 @@
 //! The current of the water.
 
 use nalgebra::Vector3;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use crate::stream::{Purpose, Stream};
@@ -16,7 +16,7 @@ const REFERENCE: f64 = 3.0;
 /// The mean follows the law of the wall, u(z) = u*/κ ln(z/z₀), scaled to `speed` 3 m above the seabed. The fluctuation
 /// of each horizontal axis is an Ornstein–Uhlenbeck process, x' = x e^(−dt/τ) + σ √(1 − e^(−2dt/τ)) n, exact for any
 /// step.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Current {
     /// Mean speed 3 m above the seabed (m/s), from 0 to 5.

@@ -1,10 +1,10 @@
 //! The planned route: waypoints and the standard survey patterns.
 
 use nalgebra::{Vector2, Vector3};
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{Looker, inspection};
+use super::inspection::{self, Looker};
 use crate::scene::Scene;
 
 /// Half length of the rounding of a corner (m).
@@ -13,7 +13,7 @@ pub(super) const ROUNDING: f64 = 0.8;
 const SAMPLES: i32 = 16;
 
 /// The kinds of route.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum RouteKind {
     /// A tour over all objects, back and forth until `length` is reached; the paper's 200 m path.
@@ -32,7 +32,7 @@ pub enum RouteKind {
 }
 
 /// The planned route.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Route {
     /// The kind of route.

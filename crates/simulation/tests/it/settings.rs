@@ -38,6 +38,7 @@ const SETTINGS: &[Setting] = &[
     ("prior-position", "0.2", r#"prior="sampled""#, GIVEN),
     ("prior-attitude-deg", "0.2", r#"prior="sampled""#, GIVEN),
     ("model-sigma", "0.002", "", None),
+    ("model-edges", "0.5", "", None),
     ("survey-sigma", "0.02", "", None),
     ("shadows", "false", "", None),
     ("random.objects", "5", RANDOM, BUILT),

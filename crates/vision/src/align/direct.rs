@@ -1,11 +1,18 @@
 //! Direct alignment of the two views.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{StereoPixels, StereoRig, UncertainPixels};
 use serde::{Deserialize, Serialize};
 
-use super::{Aligned, Aligner, Expected, Refinement, Unaligned, Warp, Weight, apart, local::Local, together};
-use crate::{Image, Pair, Workspace};
+use super::{
+    follow::Expected,
+    inverse_compositional::{Aligned, Aligner},
+    local::Local,
+    refinement::{Refinement, Unaligned, apart, together},
+    warp::Warp,
+    window::Weight,
+};
+use crate::{image::Image, locate::Pair, workspace::Workspace};
 
 /// Direct alignment of a match by inverse-compositional Gauss–Newton, with its covariance.
 ///
@@ -25,7 +32,7 @@ use crate::{Image, Pair, Workspace};
 ///
 /// Source: Baker and Matthews, *Lucas–Kanade 20 years on*, IJCV 2004; interpolation: Unser, *Splines: a perfect fit for
 /// signal and image processing*, 1999.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Direct {
     /// Whether to align at all; `false` equals [`Unrefined`](super::Unrefined).
@@ -138,7 +145,7 @@ mod tests {
     use nalgebra::{Matrix2, UnitQuaternion, Vector2, Vector3};
     use seafix_geometry::{Pinhole, Pixel, Transform};
 
-    use crate::UncertainPixel;
+    use crate::locate::UncertainPixel;
 
     /// Waves, shifted `shift` px to the right and half of that down, with the given contrast and brightness offset.
     fn waves(shift: f64, contrast: f64, light: f64) -> Image {

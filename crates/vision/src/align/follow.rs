@@ -4,10 +4,11 @@ use nalgebra::{Matrix2, Vector2};
 use seafix_geometry::Pixel;
 
 use super::{
-    Aligned, Aligner, Direct, Rules, Translation, Warp,
-    warp::{Affine, Slanted},
+    direct::Direct,
+    inverse_compositional::{Aligned, Aligner, Rules},
+    warp::{Affine, Slanted, Translation, Warp},
 };
-use crate::{Image, Track, Workspace};
+use crate::{image::Image, track::Track, workspace::Workspace};
 
 /// A point of one image with its expected position in another.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,7 +10,7 @@ use super::{
     warp::{Model, Slanted, Translation},
     window::{Grid, MIN_VARIANCE, Normal, Template, Weight},
 };
-use crate::{Image, UncertainPixel};
+use crate::{image::Image, locate::UncertainPixel};
 
 /// The acceptance rules of an alignment.
 #[derive(Debug, Clone, Copy)]

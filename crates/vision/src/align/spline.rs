@@ -1,6 +1,6 @@
 //! Interpolation by cubic splines.
 
-use crate::Image;
+use crate::image::Image;
 
 /// The number of the prefilter's taps on either side; the truncated part is 1e-4 of a pixel's value.
 const REACH: usize = 7;

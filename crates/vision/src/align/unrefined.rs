@@ -1,17 +1,17 @@
 //! No refinement.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{StereoRig, UncertainPixels};
 use serde::{Deserialize, Serialize};
 
-use super::{Refinement, apart};
-use crate::{Image, Pair, Workspace};
+use super::refinement::{Refinement, apart};
+use crate::{image::Image, locate::Pair, workspace::Workspace};
 
 /// No refinement: keeps the pixels of detector, locator and matcher.
 ///
 /// Their errors are independent: a fitted corner has the covariance of its fit, any other key point the `sigma-px` of
 /// the triangulation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Unrefined {}
 

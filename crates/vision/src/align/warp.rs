@@ -1,10 +1,11 @@
 //! Models of a window's deformation between the views.
 
 use nalgebra::{Matrix2, Vector2};
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
 /// Deformation of the left window in the right image, beside its translation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Warp {
     /// No deformation; two parameters.

@@ -1,6 +1,7 @@
 //! Windows: weights, and the template with its derivatives.
 
 use nalgebra::{SMatrix, Vector2};
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -8,10 +9,10 @@ use super::{
     spline::copy,
     warp::Model,
 };
-use crate::Image;
+use crate::image::Image;
 
 /// Weights of a window's pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weight {
     /// Equal weights, in proportion for pixels that the window's border cuts.

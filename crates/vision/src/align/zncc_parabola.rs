@@ -1,15 +1,17 @@
 //! Subpixel refinement by the paraboloid through nine correlations.
 
 use nalgebra::Matrix2;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Pixel, StereoRig, UncertainPixels};
 use serde::{Deserialize, Serialize};
 
-use super::{Refinement, Unaligned, apart, together};
+use super::refinement::{Refinement, Unaligned, apart, together};
 use crate::{
-    Image, Pair, UncertainPixel, Workspace,
     detect::vertex,
+    image::Image,
+    locate::{Pair, UncertainPixel},
     matching::correlate::{Template, WIDEST},
+    workspace::Workspace,
 };
 
 /// The vertex of the paraboloid through nine correlations at integer pixels, as in most stereo programs.
@@ -27,7 +29,7 @@ use crate::{
 ///
 /// Source: Tian and Huhns, *Algorithms for subpixel registration*, CVGIP 1986; its bias: Shimizu and Okutomi, *Precise
 /// sub-pixel estimation on area-based matching*, ICCV 2001.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccParabola {
     /// Side of the window (px); odd, 3 to 51.

@@ -1,11 +1,13 @@
 //! The BRIEF descriptor: 256 comparisons of brightness.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::comparisons::{self, Settings};
-use super::{Descriptor, Descriptors};
-use crate::{Image, Keypoint, Workspace};
+use super::{
+    comparisons,
+    descriptor::{Descriptor, Descriptors},
+};
+use crate::{detect::Keypoint, image::Image, workspace::Workspace};
 
 /// BRIEF-256, upright: one bit for each of 256 pairs of points, set if the first is darker.
 ///
@@ -15,7 +17,7 @@ use crate::{Image, Keypoint, Workspace};
 ///
 /// Source: Calonder, Lepetit, Strecha and Fua, *BRIEF: binary robust independent elementary features*, ECCV 2010 (its
 /// pattern G II).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Brief {
     /// Step of the pattern (px), whose window is 35 steps wide; 0: half the key point's own scale.
@@ -41,7 +43,7 @@ impl Component for Brief {
 
 impl Descriptor for Brief {
     fn describe_into(&self, image: &Image, keypoints: &[Keypoint], work: &mut Workspace, described: &mut Descriptors) {
-        let settings = Settings { scale: self.scale, turned: false };
+        let settings = comparisons::Settings { scale: self.scale, turned: false };
         comparisons::describe(&settings, image, keypoints, work, described);
     }
 }

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use seafix_geometry::Pixel;
 
-use crate::Image;
+use crate::image::Image;
 
 /// The means over `N`×`N` cells, `cells[column][row]`; the first `N` of a column's `LANES` values are valid.
 pub(super) type Cells<const N: usize, const LANES: usize> = [[f32; LANES]; N];

@@ -4,9 +4,12 @@ use std::sync::OnceLock;
 
 use multiversion::multiversion;
 
-use super::cells::{Cells, Grid};
-use super::{Descriptors, halves::Halves};
-use crate::{Image, Keypoint, Workspace};
+use super::{
+    cells::{Cells, Grid},
+    descriptor::Descriptors,
+    halves::Halves,
+};
+use crate::{detect::Keypoint, image::Image, workspace::Workspace};
 
 /// The settings that distinguish the descriptors.
 #[derive(Debug, Clone, Copy)]
@@ -165,7 +168,7 @@ fn mixed(counter: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Brief, Descriptor, Orb};
+    use crate::describe::{brief::Brief, descriptor::Descriptor, orb::Orb};
     use seafix_geometry::Pixel;
 
     fn image(f: impl Fn(f64, f64) -> f64) -> Image {

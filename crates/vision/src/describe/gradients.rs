@@ -1,7 +1,7 @@
 //! Gradients in a rotated window around a key point, and their dominant direction.
 
 use super::sample::bilinear;
-use crate::{Keypoint, scale_space::Octave};
+use crate::{detect::Keypoint, scale_space::Octave};
 
 /// The number of cells along a side.
 pub(super) const CELLS: usize = 4;

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use seafix_geometry::Pixel;
 
 use super::cells::Grid;
-use crate::Image;
+use crate::image::Image;
 
 /// Successive halves of an image, in which each pixel is the mean of 2×2 of the one before.
 ///

@@ -1,11 +1,13 @@
 //! The ORB descriptor: BRIEF, rotated to the centroid of brightness.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::comparisons::{self, Settings};
-use super::{Descriptor, Descriptors};
-use crate::{Image, Keypoint, Workspace};
+use super::{
+    comparisons,
+    descriptor::{Descriptor, Descriptors},
+};
+use crate::{detect::Keypoint, image::Image, workspace::Workspace};
 
 /// ORB's descriptor: BRIEF-256, rotated by the direction from the key point to the centroid of brightness.
 ///
@@ -14,7 +16,7 @@ use crate::{Image, Keypoint, Workspace};
 ///
 /// Source: Rublee, Rabaud, Konolige and Bradski, *ORB: an efficient alternative to SIFT or SURF*, ICCV 2011; Rosin,
 /// *Measuring corner properties*, 1999.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Orb {
     /// Step of the pattern (px), whose window is 35 steps wide; 0: half the key point's own scale.
@@ -40,7 +42,7 @@ impl Component for Orb {
 
 impl Descriptor for Orb {
     fn describe_into(&self, image: &Image, keypoints: &[Keypoint], work: &mut Workspace, described: &mut Descriptors) {
-        let settings = Settings { scale: self.scale, turned: true };
+        let settings = comparisons::Settings { scale: self.scale, turned: true };
         comparisons::describe(&settings, image, keypoints, work, described);
     }
 }

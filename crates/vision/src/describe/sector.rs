@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use seafix_geometry::Pixel;
 
 use super::cells::{Cells, Grid};
-use crate::Image;
+use crate::image::Image;
 
 /// SURF's orientation: the dominant gradient direction around a key point.
 ///

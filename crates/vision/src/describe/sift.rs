@@ -1,16 +1,18 @@
 //! The SIFT descriptor.
 
 use multiversion::multiversion;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Descriptor, Descriptors,
+    descriptor::{Descriptor, Descriptors},
     gradients::{CELLS, DIRECTIONS, LevelPosition, SIDE, STEP, Window, gradients},
 };
 use crate::{
-    Image, Keypoint, Workspace,
+    detect::Keypoint,
+    image::Image,
     scale_space::{INTERVALS, ScaleSpace, Strip, octaves, sigma},
+    workspace::Workspace,
 };
 
 /// SIFT's descriptor: histograms of 8 gradient directions in 4×4 cells of 3σ.
@@ -27,7 +29,7 @@ use crate::{
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004; Arandjelović and Zisserman,
 /// *Three things everyone should know to improve object retrieval*, CVPR 2012 (`root`).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Sift {
     /// Whether the window is upright, for the two views of one instant, or rotated with the image.
@@ -179,7 +181,10 @@ fn normalise(numbers: &mut [f32; LENGTH], root: bool) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Detector, Dog, Threads};
+    use crate::{
+        detect::{Detector, Dog},
+        workspace::Threads,
+    };
     use seafix_geometry::Pixel;
 
     fn image(width: usize, height: usize, f: impl Fn(f64, f64) -> f64) -> Image {
@@ -215,7 +220,7 @@ mod tests {
         let image = image(80, 600, waves);
         let keypoints = Dog { contrast: 0.5, ..Dog::default() }.detect(&image);
         let sift = Sift::default();
-        let mut work = crate::Workspace::default();
+        let mut work = crate::workspace::Workspace::default();
         *work.get() = ScaleSpace::keeping(3000);
         let mut found = Descriptors::default();
         sift.describe_into(&image, &keypoints, &mut work, &mut found);

@@ -1,13 +1,16 @@
 //! The SURF descriptor.
 
 use multiversion::multiversion;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::cells::{Cells, Grid};
-use super::{Descriptor, Descriptors};
-use super::{halves::Halves, sector::Sectors};
-use crate::{Image, Keypoint, Workspace};
+use super::{
+    cells::{Cells, Grid},
+    descriptor::{Descriptor, Descriptors},
+    halves::Halves,
+    sector::Sectors,
+};
+use crate::{detect::Keypoint, image::Image, workspace::Workspace};
 
 /// SURF's descriptor: sums of Haar wavelet responses around the key point, 64 or 128 numbers.
 ///
@@ -23,7 +26,7 @@ use crate::{Image, Keypoint, Workspace};
 ///
 /// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006; Bay, Ess, Tuytelaars and Van
 /// Gool, CVIU 2008.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Surf {
     /// Step s between wavelets (px), whose window is 20 s wide; 0: the key point's own scale.

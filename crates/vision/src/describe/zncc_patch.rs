@@ -1,12 +1,17 @@
 //! The normalised window as a descriptor.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::{Descriptor, Descriptors, sample::bilinear};
+use super::{
+    descriptor::{Descriptor, Descriptors},
+    sample::bilinear,
+};
 use crate::{
-    Image, Keypoint, Workspace,
+    detect::Keypoint,
     gaussian::{half_kernel_into, smooth_into},
+    image::Image,
+    workspace::Workspace,
 };
 
 /// The window around the key point with zero mean and unit norm.
@@ -19,7 +24,7 @@ use crate::{
 /// nearest pixel is repeated beyond the border. All numbers are zero in a flat region, or if values overflow.
 ///
 /// Source: Lewis, *Fast normalized cross-correlation*, Vision Interface, 1995.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccPatch {
     /// Number of samples along a side; odd.
@@ -114,7 +119,7 @@ fn normalise(patch: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Threads;
+    use crate::workspace::Threads;
     use seafix_geometry::Pixel;
 
     fn image(f: impl Fn(f64, f64) -> f64) -> Image {

@@ -6,13 +6,15 @@ use seafix_component::in_range;
 use seafix_geometry::Pixel;
 
 use super::{
-    Keypoint,
     peaks::{Disc, in_rows, to_vertex},
-    select,
-    select::Budget,
+    select::{self, Budget},
     tensor::{Stream, Tensor, Weights},
 };
-use crate::{Image, Threads, Workspace};
+use crate::{
+    image::Image,
+    keypoint::Keypoint,
+    workspace::{Threads, Workspace},
+};
 
 /// The maxima of a structure tensor's response, with subpixel positions.
 #[derive(Debug, Clone, Copy)]

@@ -3,17 +3,20 @@
 use std::cmp::Ordering;
 
 use nalgebra::{Matrix3, Vector3};
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Detector, Keypoint, Selection, extrema,
-    select::{self, Budget},
+    detector::Detector,
+    extrema,
+    select::{self, Budget, Selection},
 };
 use crate::{
-    Image, Workspace,
+    image::Image,
+    keypoint::Keypoint,
     scale_space::{INTERVALS, LEVELS, Octave, ScaleSpace, Strip, octaves, sigma},
+    workspace::Workspace,
 };
 
 /// SIFT's detector: blobs at extrema, over position and scale, of the difference of Gaussians.
@@ -27,7 +30,7 @@ use crate::{
 /// Limit: nothing is detected within five pixels (of the octave) of the border.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Dog {
     /// Doubles the image first: four times the key points and the time, scales from 0.9 px instead of 1.8 px.
@@ -190,7 +193,7 @@ impl Dog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Threads;
+    use crate::workspace::Threads;
 
     /// Gaussian blobs (x, y, σ, height) on grey.
     fn blobs(width: usize, height: usize, blobs: &[[f64; 4]]) -> Image {

@@ -119,7 +119,7 @@ fn beyond(levels: [&[&[f32]; 3]; 3], min: f32, x: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Image, Threads, scale_space::ScaleSpace};
+    use crate::{image::Image, scale_space::ScaleSpace, workspace::Threads};
 
     #[test]
     fn it_finds_what_comparing_all_neighbours_finds() {

@@ -1,16 +1,16 @@
 //! The FAST detector: features from the accelerated segment test.
 
 use multiversion::multiversion;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Detector, Keypoint, Selection,
     corners::MAX_RADIUS,
+    detector::Detector,
     peaks::{self, Peaks},
-    select::{self, Budget},
+    select::{self, Budget, Selection},
 };
-use crate::{Image, Workspace};
+use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 
 /// FAST-9/16: pixels that differ from an arc of the circle around them.
 ///
@@ -23,7 +23,7 @@ use crate::{Image, Workspace};
 /// the image turns the corners exactly.
 ///
 /// Source: Rosten and Drummond, *Machine learning for high-speed corner detection*, ECCV 2006.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Fast {
     /// Minimum difference between the arc and the centre (grey levels).

@@ -1,17 +1,19 @@
 //! Detectors of man-made corners by the fit of a corner model.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Detector, Keypoint, Selection, Window,
     corners::{Corners, SIGMAS},
-    select::{self, Budget},
-    tensor::{Measure, Tensor},
+    detector::Detector,
+    select::{self, Budget, Selection},
+    tensor::{Measure, Tensor, Window},
 };
 use crate::{
-    CornerFit, Image, UncertainPixel, Workspace,
-    locate::{FITTED, Shape, fit_into},
+    image::Image,
+    keypoint::Keypoint,
+    locate::{CornerFit, FITTED, Shape, UncertainPixel, fit_into},
+    workspace::Workspace,
 };
 
 /// The settings of a detector that fits a corner model to Harris' candidates.
@@ -19,7 +21,7 @@ use crate::{
 /// Candidates are the maxima of [`Harris`](super::Harris)' response. A corner model is fitted to the pixels around
 /// each; a good fit gives the corner and its position. The response is the inverse of the larger eigenvalue of the
 /// position's covariance (px⁻²), so sharp edges of high contrast at a right angle come first.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FittedCorners {
     /// Standard deviation of the window for candidates (px).
@@ -131,7 +133,7 @@ fn one_each(found: &mut Vec<Keypoint>) {
 macro_rules! detector {
     ($(#[$doc:meta])* $name:ident, $kebab:literal, $shape:expr, $summary:literal) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
         #[serde(transparent)]
         pub struct $name(pub FittedCorners);
 

@@ -1,15 +1,15 @@
 //! Harris' corner detector.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Detector, Keypoint, Selection, Window,
     corners::Corners,
-    select::Budget,
-    tensor::{Measure, Tensor},
+    detector::Detector,
+    select::{Budget, Selection},
+    tensor::{Measure, Tensor, Window},
 };
-use crate::{Image, Workspace};
+use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 
 /// Harris' corner detector.
 ///
@@ -23,7 +23,7 @@ use crate::{Image, Workspace};
 /// smaller image has no corner.
 ///
 /// Source: Harris and Stephens, *A combined corner and edge detector*, Alvey Vision Conference, 1988.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Harris {
     /// Window that integrates the structure tensor.

@@ -3,7 +3,8 @@
 use multiversion::multiversion;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Keypoint, integral::Integral};
+use super::integral::Integral;
+use crate::keypoint::Keypoint;
 use seafix_geometry::Pixel;
 
 /// An octave: the image with 2ᵒ×2ᵒ pixels summed to one, under box filters of sides 9, 15, 21, ….
@@ -229,7 +230,7 @@ const BLOCK: usize = 64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Image;
+    use crate::image::Image;
 
     /// The determinant at the centre of a 64×64 image by the filter of a layer.
     fn determinant(layer: usize, number: usize, f: impl Fn(i32, i32) -> i32) -> f32 {

@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use crate::Image;
+use crate::image::Image;
 
 /// The integral image in integer units, modulo 2³².
 ///

@@ -3,8 +3,7 @@
 use multiversion::multiversion;
 use seafix_geometry::Pixel;
 
-use super::Keypoint;
-use crate::Threads;
+use crate::{keypoint::Keypoint, workspace::Threads};
 
 /// The criteria of a maximum.
 #[derive(Debug, Clone, Copy)]

@@ -1,12 +1,13 @@
 //! The selection of key points beyond a maximum number.
 
+use seafix_component::Settings;
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
-use super::Keypoint;
+use crate::keypoint::Keypoint;
 
 /// Selection of key points beyond a maximum number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Selection {
     /// The strongest of the image.
@@ -42,7 +43,7 @@ pub(super) struct Scratch {
 /// The factor 0.9 of a clearly stronger response.
 const CLEARLY: f32 = 0.9;
 
-fn stronger(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
+pub(super) fn stronger(a: &Keypoint, b: &Keypoint) -> std::cmp::Ordering {
     let (u, v) = (a.at.u.total_cmp(&b.at.u), a.at.v.total_cmp(&b.at.v));
     b.response.total_cmp(&a.response).then(v).then(u)
 }

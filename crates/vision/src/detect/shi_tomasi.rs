@@ -1,15 +1,15 @@
 //! Shi and Tomasi's corner detector.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Detector, Keypoint, Selection, Window,
     corners::Corners,
-    select::Budget,
-    tensor::{Measure, Tensor},
+    detector::Detector,
+    select::{Budget, Selection},
+    tensor::{Measure, Tensor, Window},
 };
-use crate::{Image, Workspace};
+use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 
 /// Shi and Tomasi's detector of good features to track.
 ///
@@ -20,7 +20,7 @@ use crate::{Image, Workspace};
 /// image has no corner.
 ///
 /// Source: Shi and Tomasi, *Good features to track*, CVPR 1994.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ShiTomasi {
     /// Window that integrates the structure tensor.

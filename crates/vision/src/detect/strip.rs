@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::tensor::{Measure, Weights};
-use crate::Image;
+use crate::image::Image;
 
 /// The working memory of one strip, and the strongest response so far.
 #[derive(Debug)]

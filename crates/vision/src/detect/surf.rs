@@ -2,12 +2,20 @@
 
 use std::ops::Range;
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::hessian::{self, Octave, lobe};
-use super::{Detector, Keypoint, Selection, integral::Integral, select, select::Budget};
-use crate::{Image, Threads, Workspace};
+use super::{
+    detector::Detector,
+    hessian::{self, Octave, lobe},
+    integral::Integral,
+    select::{self, Budget, Selection},
+};
+use crate::{
+    image::Image,
+    keypoint::Keypoint,
+    workspace::{Threads, Workspace},
+};
 
 /// SURF's detector: dark or bright blobs at maxima, over position and scale, of the Hessian's determinant.
 ///
@@ -21,7 +29,7 @@ use crate::{Image, Threads, Workspace};
 ///
 /// Source: Bay, Tuytelaars and Van Gool, *SURF: speeded up robust features*, ECCV 2006; Bay, Ess, Tuytelaars and Van
 /// Gool, CVIU 2008.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct FastHessian {
     /// Number of octaves, each of half the resolution.

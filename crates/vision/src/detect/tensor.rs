@@ -1,12 +1,13 @@
 //! The structure tensor's response at every pixel of an image, streamed.
 
+use seafix_component::Settings;
 use serde::{Deserialize, Serialize};
 
 use super::strip::{Band, Part, Planes, STRIP, strip};
-use crate::{Image, gaussian::half_kernel};
+use crate::{gaussian::half_kernel, image::Image};
 
 /// Window that integrates the structure tensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Window {
     /// A Gaussian, cut off at 3σ; the same in every direction.

@@ -1,10 +1,13 @@
 //! Contrast-limited adaptive histogram equalisation.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::Filter;
-use crate::{Image, Threads, Workspace};
+use super::image_filter::Filter;
+use crate::{
+    image::Image,
+    workspace::{Threads, Workspace},
+};
 
 /// Contrast-limited adaptive histogram equalisation (CLAHE).
 ///
@@ -17,7 +20,7 @@ use crate::{Image, Threads, Workspace};
 /// constant, in general with another value.
 ///
 /// Source: Zuiderveld, *Contrast limited adaptive histogram equalization*, Graphics Gems IV, 1994.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Clahe {
     /// Number of tiles along the width and along the height.

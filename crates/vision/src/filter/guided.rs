@@ -1,13 +1,13 @@
 //! The guided filter, which smooths and preserves edges.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Filter,
+    image_filter::Filter,
     mean::{Means, mean_into},
 };
-use crate::{Image, Workspace};
+use crate::{image::Image, workspace::Workspace};
 
 /// The guided filter with the image as its own guide.
 ///
@@ -16,7 +16,7 @@ use crate::{Image, Workspace};
 /// contain it. Results are clipped to the range of the input, 0 to 255.
 ///
 /// Source: He, Sun and Tang, *Guided image filtering*, ECCV 2010; PAMI 2013.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Guided {
     /// Half the side of the windows (px).

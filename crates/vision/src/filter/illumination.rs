@@ -1,13 +1,13 @@
 //! Correction of uneven illumination.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Filter,
+    image_filter::Filter,
     mean::{Means, mean_into},
 };
-use crate::{Image, Workspace};
+use crate::{image::Image, workspace::Workspace};
 
 /// Shading correction: division by the lamps' light or subtraction of backscatter, estimated as the smooth background.
 ///
@@ -17,7 +17,7 @@ use crate::{Image, Workspace};
 ///
 /// Source: Gonzalez and Woods, *Digital image processing*, 2002, shading correction; the windows: Wells, *Efficient
 /// synthesis of Gaussian filters by cascaded uniform filters*, PAMI 1986.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Illumination {
     /// Standard deviation of the smoothing (px): larger than the structure of interest, smaller than a lamp's cone.
@@ -29,7 +29,7 @@ pub struct Illumination {
 }
 
 /// Operation with the background.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Operation {
     /// Division of the image by the background.

@@ -1,6 +1,6 @@
 //! Means over square windows, at a cost that does not depend on their size.
 
-use crate::Threads;
+use crate::workspace::Threads;
 
 /// The number of rows that one thread processes at a time.
 const BAND: usize = 128;

@@ -1,11 +1,11 @@
 //! The median filter.
 
 use multiversion::multiversion;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
 
-use super::Filter;
-use crate::{Image, Workspace};
+use super::image_filter::Filter;
+use crate::{image::Image, workspace::Workspace};
 
 /// The median filter of 3×3 or 5×5 pixels.
 ///
@@ -14,7 +14,7 @@ use crate::{Image, Workspace};
 /// reduced to the comparators that lead to it, for sixteen pixels at a time.
 ///
 /// Source: Tukey, *Exploratory data analysis*, 1977; Batcher, *Sorting networks and their applications*, AFIPS 1968.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Median {
     /// Half the side of the window (px): 1 is 3×3, 2 is 5×5.

@@ -1,14 +1,18 @@
 //! Locators that fit a model of blurred corners.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Locator, UncertainPixel,
     fit::{CornerFit, Fitter},
+    locator::{Locator, UncertainPixel},
     model::Shape,
 };
-use crate::{Image, Keypoint, Threads, Workspace};
+use crate::{
+    image::Image,
+    keypoint::Keypoint,
+    workspace::{Threads, Workspace},
+};
 
 /// The source of the corner models.
 pub(crate) const SOURCE: &str = "Rohr, Recognizing corners by fitting parametric models, IJCV 1992";
@@ -17,7 +21,7 @@ pub(crate) const SOURCE: &str = "Rohr, Recognizing corners by fitting parametric
 macro_rules! locator {
     ($(#[$doc:meta])* $name:ident, $kebab:literal, $shapes:expr, $summary:literal) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
         #[serde(transparent)]
         pub struct $name(pub CornerFit);
 

@@ -1,19 +1,19 @@
 //! The fit of a blurred corner to the pixels around a key point.
 
 use nalgebra::{Cholesky, Matrix2, SMatrix, SVector};
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    UncertainPixel,
+    locator::UncertainPixel,
     model::{Model, Normal, PARAMETERS, Pixels, Shape},
     start::{Guess, Start},
 };
-use crate::{Image, Keypoint};
+use crate::{image::Image, keypoint::Keypoint};
 
 /// Settings of the fit of a corner model and of its acceptance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct CornerFit {
     /// Side of the square window of the fit (px); odd, 7 to 31.

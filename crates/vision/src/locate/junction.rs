@@ -1,12 +1,15 @@
 //! The junction of the edges around a corner.
 
 use nalgebra::{Matrix2, Vector2};
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
-use super::{Locator, UncertainPixel, fit::full};
-use crate::{Image, Keypoint, Workspace};
+use super::{
+    fit::full,
+    locator::{Locator, UncertainPixel},
+};
+use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 
 /// Förstner's junction: the point nearest to the lines of all edges around it.
 ///
@@ -20,7 +23,7 @@ use crate::{Image, Keypoint, Workspace};
 ///
 /// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct points, corners and
 /// centres of circular features*, ISPRS 1987.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Junction {
     /// Standard deviation σ of the window (px).

@@ -1,15 +1,15 @@
 //! The locator that keeps the detector's positions.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
 
-use super::{Locator, UncertainPixel};
-use crate::{Image, Keypoint, Workspace};
+use super::locator::{Locator, UncertainPixel};
+use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 
 /// Keeps each key point at the peak of the detector's response.
 ///
 /// The position is right for texture, and 1 to 2 px inside the corner of a box.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Peak {}
 

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::model::{Model, Shape};
-use crate::Image;
+use crate::image::Image;
 
 /// The initial guess: two edges and the statistics of the four sectors between them.
 #[derive(Debug, Clone, Copy)]

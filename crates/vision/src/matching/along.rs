@@ -1,7 +1,7 @@
 //! Mutual nearest neighbours among admissible pairs, with the support of neighbouring pairs.
 
 use super::{nearest::Nearest, support::MatchCandidates};
-use crate::Keypoint;
+use crate::detect::Keypoint;
 
 /// The working memory of the search.
 #[derive(Debug, Default)]

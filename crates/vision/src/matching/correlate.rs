@@ -2,7 +2,7 @@
 
 use multiversion::multiversion;
 
-use crate::Image;
+use crate::image::Image;
 
 /// The number of windows that are compared side by side.
 pub(crate) const LANES: usize = 16;

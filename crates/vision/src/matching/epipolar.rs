@@ -4,7 +4,7 @@ use nalgebra::{Vector2, Vector3};
 use seafix_geometry::StereoRig;
 
 use super::grid::Grid;
-use crate::Keypoint;
+use crate::detect::Keypoint;
 
 /// The limits of an admissible pair of key points.
 #[derive(Debug, Clone, Copy)]

@@ -1,16 +1,16 @@
 //! Mutual nearest neighbours along the epipolar band, supported by neighbouring pairs.
 
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::StereoRig;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Match, Matcher, View,
     along::{Along, Test},
     epipolar::{Band, Limits},
+    matcher::{Match, Matcher, View},
     metric::Metric,
 };
-use crate::Workspace;
+use crate::workspace::Workspace;
 
 /// Mutual nearest neighbours by descriptor along the epipolar band, with ratio test and neighbour support.
 ///
@@ -29,7 +29,7 @@ use crate::Workspace;
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio); Barnard and Thompson,
 /// *Disparity analysis of images*, PAMI 1980 (support).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct EpipolarBand {
     /// Maximum ratio of the distances to the nearest and the second nearest; 1 disables the test.
@@ -136,12 +136,10 @@ impl Matcher for EpipolarBand {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{
-        MutualRatio,
-        test_scene::{index, matched, numbers, rig, scene, unit},
-    };
+    use super::super::test_scene::{index, matched, numbers, rig, scene, unit};
     use super::*;
-    use crate::{Descriptors, Table};
+    use crate::describe::{Descriptors, Table};
+    use crate::matching::mutual_ratio::MutualRatio;
     use nalgebra::Vector3;
     use seafix_geometry::{Pixel, Point};
 

@@ -10,7 +10,7 @@ use super::{
     metric::Metric,
     nearest::{Nearest, Two},
 };
-use crate::Threads;
+use crate::workspace::Threads;
 
 /// The working memory of the comparison.
 #[derive(Debug, Default)]
@@ -96,7 +96,7 @@ fn settle(two: &mut Two, three: &Three, margin: f32, count: usize, squared: impl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Descriptors, Table};
+    use crate::describe::{Descriptors, Table};
 
     /// The definition, pair by pair.
     fn one_by_one(metric: &Metric<'_>, n: usize, m: usize) -> Nearest {

@@ -1,12 +1,21 @@
 //! Matching without descriptors by pyramidal Lucas–Kanade tracking along the epipolar curve.
 
 use nalgebra::Vector2;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Pixel, StereoPixels, StereoRig};
 use serde::{Deserialize, Serialize};
 
-use super::{Match, Matcher, View, curve::epipolar_curve, sought::Sought};
-use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
+use super::{
+    curve::epipolar_curve,
+    matcher::{Match, Matcher, View},
+    sought::Sought,
+};
+use crate::{
+    align::Aligner,
+    image::Image,
+    track::{Pyramid, Tracker},
+    workspace::Workspace,
+};
 
 /// Pyramidal Lucas–Kanade tracking of left key points along their epipolar curves.
 ///
@@ -19,7 +28,7 @@ use crate::{Image, Pyramid, Tracker, Workspace, align::Aligner};
 ///
 /// Source: Lucas and Kanade, *An iterative image registration technique with an application to stereo vision*, 1981;
 /// Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct LucasKanade {
     /// Maximum distance from the epipolar curve (px, Sampson distance).
@@ -159,7 +168,7 @@ impl LucasKanade {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Descriptors, Keypoint, track::stones};
+    use crate::{describe::Descriptors, detect::Keypoint, track::stones};
     use nalgebra::{UnitQuaternion, Vector3};
     use seafix_geometry::{Pinhole, Transform};
 

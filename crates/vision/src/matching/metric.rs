@@ -1,6 +1,6 @@
 //! The distance between two descriptors.
 
-use crate::{Descriptors, Table};
+use crate::describe::{Descriptors, Table};
 
 /// The comparable descriptors of two views: of one kind and one length.
 #[derive(Debug, Clone, Copy)]

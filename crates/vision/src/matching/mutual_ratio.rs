@@ -1,11 +1,17 @@
 //! Mutual nearest neighbours with the ratio test.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::StereoRig;
 use serde::{Deserialize, Serialize};
 
-use super::{EpipolarBand, Match, Matcher, View, exhaustive::Exhaustive, metric::Metric, nearest::Nearest};
-use crate::Workspace;
+use super::{
+    epipolar_band::EpipolarBand,
+    exhaustive::Exhaustive,
+    matcher::{Match, Matcher, View},
+    metric::Metric,
+    nearest::Nearest,
+};
+use crate::workspace::Workspace;
 
 /// Mutual nearest neighbours by descriptor among all pairs, with the ratio test.
 ///
@@ -16,7 +22,7 @@ use crate::Workspace;
 /// Limits: descriptors of different kinds or lengths do not match. The rig takes no part; [`EpipolarBand`] uses it.
 ///
 /// Source: Lowe, *Distinctive image features from scale-invariant keypoints*, IJCV 2004 (ratio).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MutualRatio {
     /// Maximum ratio of the distances to the nearest and the second nearest; 1 disables the test.

@@ -2,8 +2,8 @@
 
 use seafix_geometry::Pixel;
 
-use super::Match;
-use crate::{Keypoint, Threads};
+use super::matcher::Match;
+use crate::{detect::Keypoint, workspace::Threads};
 
 /// The number of left key points in a piece of the work.
 const PIECE: usize = 32;

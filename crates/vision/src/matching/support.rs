@@ -1,7 +1,7 @@
 //! The support of a pair by neighbouring pairs (relaxation labelling).
 
 use super::grid::Grid;
-use crate::Keypoint;
+use crate::detect::Keypoint;
 
 /// A candidate: a right key point that may match a left one.
 #[derive(Debug, Clone, Copy)]

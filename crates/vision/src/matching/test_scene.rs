@@ -3,8 +3,12 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_geometry::{Pinhole, Pixel, Point, StereoRig, Transform};
 
-use super::{Match, Matcher, View};
-use crate::{Descriptors, Image, Keypoint, Table};
+use super::matcher::{Match, Matcher, View};
+use crate::{
+    describe::{Descriptors, Table},
+    detect::Keypoint,
+    image::Image,
+};
 
 /// A rig with the right camera displaced by `step` (m) and rotated by `turn` (rad).
 pub(super) fn rig(step: Vector3<f64>, turn: Vector3<f64>) -> StereoRig {

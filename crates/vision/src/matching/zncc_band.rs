@@ -1,17 +1,17 @@
 //! Matching by zero-normalised cross-correlation at every pixel of the epipolar band.
 
 use nalgebra::Vector2;
-use seafix_component::{Component, in_range};
+use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::{Pixel, StereoPixels, StereoRig};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Match, Matcher, View,
     correlate::{LANES, Template, WIDEST},
     curve::epipolar_curve,
+    matcher::{Match, Matcher, View},
     sought::Sought,
 };
-use crate::{Image, Workspace, detect::vertex};
+use crate::{detect::vertex, image::Image, workspace::Workspace};
 
 /// Area-based matching of left key points by ZNCC at every pixel of their epipolar band.
 ///
@@ -27,7 +27,7 @@ use crate::{Image, Workspace, detect::vertex};
 ///
 /// Source: Hannah, *Computer matching of areas in stereo images*, 1974; Fua, *A parallel stereo algorithm that produces
 /// dense depth maps and preserves image features*, 1993 (left–right check).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ZnccBand {
     /// Side of the window (px); odd, 3 to 51.
@@ -211,7 +211,7 @@ fn band(curve: &[Vector2<f64>], reach: f64, [width, height]: [usize; 2], rows: &
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Descriptors, Keypoint, track::stones};
+    use crate::{describe::Descriptors, detect::Keypoint, track::stones};
     use nalgebra::{UnitQuaternion, Vector3};
     use seafix_geometry::{Pinhole, Transform};
 

@@ -4,13 +4,18 @@ mod pyramid;
 
 use nalgebra::{Matrix2, Vector2};
 pub use pyramid::Pyramid;
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use seafix_geometry::Pixel;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Image, Weight, Workspace,
-    align::{Aligned, Aligner, Rules, Translation},
+    align::{
+        inverse_compositional::{Aligned, Aligner, Rules},
+        warp::Translation,
+        window::Weight,
+    },
+    image::Image,
+    workspace::Workspace,
 };
 
 /// The pyramidal Lucas–Kanade tracker with forward–backward check.
@@ -21,7 +26,7 @@ use crate::{
 ///
 /// Source: Bouguet, *Pyramidal implementation of the Lucas Kanade feature tracker*, 2000; Kalal, Mikolajczyk and Matas,
 /// *Forward-backward error*, 2010.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Tracker {
     /// Side of the window on each level (px); odd, 3 to 201.

@@ -1,6 +1,6 @@
 //! Gaussian image pyramids.
 
-use crate::Image;
+use crate::image::Image;
 
 /// An image and its successive halves; pixel i of a level lies at 2 i of the next finer level.
 ///

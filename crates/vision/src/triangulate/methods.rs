@@ -1,16 +1,16 @@
 //! The methods of triangulation.
 
-use seafix_component::Component;
+use seafix_component::{Component, Settings};
 use seafix_geometry::{StereoRig, Triangulation, UncertainPixels, Untriangulable};
 use serde::{Deserialize, Serialize};
 
-use super::{PointRules, Triangulator};
+use super::{rules::PointRules, triangulator::Triangulator};
 
 /// Defines a triangulator by one of the rig's methods.
 macro_rules! triangulator {
     ($(#[$doc:meta])* $name:ident, $kebab:literal, $method:ident, $summary:literal, $source:literal) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+        #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, Settings)]
         #[serde(transparent)]
         pub struct $name(pub PointRules);
 

@@ -1,10 +1,10 @@
 //! The error model of pixels and the acceptance criteria of points.
 
-use seafix_component::in_range;
+use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 /// The settings of every triangulator.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PointRules {
     /// Standard deviation (px) of a key point without a fitted corner, from image to image.

@@ -9,7 +9,8 @@ fn all() -> Vec<(String, Box<dyn Descriptor>)> {
     let build = |choice: &Choice| DESCRIPTORS.build(choice).expect("valid settings");
     let mut all = Vec::new();
     for listing in DESCRIPTORS.listings() {
-        let flags: Vec<_> = listing.defaults.iter().filter_map(|(key, value)| Some((key, value.as_bool()?))).collect();
+        let flags: Vec<_> =
+            listing.table.defaults.iter().filter_map(|(key, value)| Some((key, value.as_bool()?))).collect();
         for turned in 0..1_usize << flags.len() {
             let mut choice = Choice::named(listing.name);
             for (i, (key, value)) in flags.iter().enumerate() {
@@ -25,10 +26,10 @@ fn all() -> Vec<(String, Box<dyn Descriptor>)> {
 fn at_own_scale() -> Vec<(String, Box<dyn Descriptor>)> {
     let build = |choice: &Choice| DESCRIPTORS.build(choice).expect("valid settings");
     let mut all = Vec::new();
-    for listing in DESCRIPTORS.listings().iter().filter(|listing| listing.defaults.contains_key("scale")) {
+    for listing in DESCRIPTORS.listings().iter().filter(|listing| listing.table.defaults.contains_key("scale")) {
         let own = Choice::named(listing.name).with("scale", 0.0);
         all.push((format!("{} at its own scale", listing.name), build(&own)));
-        if listing.defaults.contains_key("upright") {
+        if listing.table.defaults.contains_key("upright") {
             all.push((format!("{} turned at its own scale", listing.name), build(&own.with("upright", false))));
         }
     }

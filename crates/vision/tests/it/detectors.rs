@@ -47,7 +47,7 @@ fn cut(image: &Image, [left, top]: [usize; 2], [width, height]: [usize; 2]) -> I
 fn every(window: &str, law: impl Fn(&str, &dyn Detector)) {
     for listing in DETECTORS.listings() {
         let mut choice = Choice::named(listing.name);
-        let has = |key: &str| listing.defaults.contains_key(key);
+        let has = |key: &str| listing.table.defaults.contains_key(key);
         if has("features") {
             choice = choice.with("features", 1_000_000);
         }
@@ -226,7 +226,7 @@ fn threads_and_memory_change_no_bit() {
 /// Seen to fail when one more is kept.
 #[test]
 fn the_budget_is_kept() {
-    for listing in DETECTORS.listings().iter().filter(|listing| listing.defaults.contains_key("features")) {
+    for listing in DETECTORS.listings().iter().filter(|listing| listing.table.defaults.contains_key("features")) {
         let image = shown(listing.name, 190, 150);
         for features in [1, 17, 40] {
             let detector = DETECTORS.build(&Choice::named(listing.name).with("features", features)).unwrap();

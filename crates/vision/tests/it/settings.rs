@@ -1,7 +1,10 @@
 //! Tests of invalid settings and their messages.
 
 use seafix_component::{Choice, Registry};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Tracker};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS,
+    TRIANGULATORS, Tracker,
+};
 
 const NO_NUMBERS: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
@@ -14,7 +17,7 @@ fn rejection<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Option<Strin
 fn numbers_must_be_numbers<T: ?Sized>(registry: &Registry<T>) {
     for listing in registry.listings() {
         registry.build(&Choice::named(listing.name)).expect("valid defaults");
-        for (key, _) in listing.defaults.iter().filter(|(_, default)| default.is_float()) {
+        for (key, _) in listing.table.defaults.iter().filter(|(_, default)| default.is_float()) {
             for bad in NO_NUMBERS {
                 let message = rejection(registry, &Choice::named(listing.name).with(key, bad)).unwrap_or_default();
                 assert!(
@@ -36,6 +39,8 @@ fn no_number_is_no_setting() {
     numbers_must_be_numbers(&MATCHERS);
     numbers_must_be_numbers(&REFINEMENTS);
     numbers_must_be_numbers(&TRIANGULATORS);
+    numbers_must_be_numbers(&SEGMENT_DETECTORS);
+    numbers_must_be_numbers(&SEGMENT_MATCHERS);
 }
 
 /// Asserts that the values `inside` of a setting are accepted and those `beyond` are rejected with its name.

@@ -1,12 +1,15 @@
 //! Association and alignment of two trajectories.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use seafix_data::trajectory::{LoggedTrajectory, Trajectory};
-use seafix_evaluation::trajectory::{Alignment, Pose, align, associate};
+use seafix_evaluation::trajectory::{Alignment, Pose, align, associate, interpolate};
 
-use super::Eval;
-use crate::exit::{Failure, INPUT, USAGE};
+use super::{Eval, SyncMethod};
+use crate::{
+    exit::{Failure, INPUT, USAGE},
+    terminal::notify,
+};
 
 /// The associated poses of two trajectories.
 pub(super) struct Matched {
@@ -19,6 +22,8 @@ pub(super) struct Matched {
     pub(super) of: (usize, usize),
     /// The fraction of the reference's time between the first and the last matched pose.
     pub(super) covered: f64,
+    /// A file whose poses have no attitude.
+    pub(super) without_attitude: Option<PathBuf>,
 }
 
 impl Matched {
@@ -69,10 +74,14 @@ impl Eval {
         if self.estimate.is_none() && !is_log(&self.reference) {
             return Err(Failure::new(USAGE, "no trajectory to evaluate; give ESTIMATE, or a log"));
         }
-        let (reference, estimate) = (
+        let (mut reference, estimate) = (
             read(&self.reference, LoggedTrajectory::True, self.sort_stamps)?,
             read(self.estimate(), self.trajectory.into(), self.sort_stamps)?,
         );
+        reference.warnings.iter().chain(&estimate.warnings).for_each(|warning| notify(&format!("warning: {warning}")));
+        self.cut(&mut reference)?;
+        let lacks = |trajectory: &Trajectory, file: &Path| (!trajectory.has_attitude).then(|| file.to_owned());
+        let without_attitude = lacks(&reference, &self.reference).or(lacks(&estimate, self.estimate()));
         let of = (reference.poses.len(), estimate.poses.len());
         let refuse = |what: String| {
             let (a, b) = (self.reference.display(), self.estimate().display());
@@ -113,8 +122,46 @@ impl Eval {
         };
         let broken = (1..belong.len()).filter(|&k| broken(&belong[k - 1], &belong[k]));
         let stretches = std::iter::once(0).chain(broken).collect();
-        let (reference, estimate) = belong.iter().map(|&(i, j)| (reference.poses[i], estimate.poses[j])).unzip();
-        Ok(Matched { reference, estimate, stamps, stretches, of, covered })
+        let mut both: Vec<(Pose, Pose)> =
+            belong.iter().map(|&(i, j)| (reference.poses[i], estimate.poses[j])).collect();
+        if let (SyncMethod::Interpolation, Some(a), Some(b)) = (self.sync_method, &reference.stamps, &estimate.stamps) {
+            // The trajectory with more poses is resampled at the stamps of the other.
+            for ((i, j), pair) in belong.iter().zip(&mut both) {
+                let (reference_ns, estimate_ns) = (i128::from(a[*i]), i128::from(b[*j]));
+                match of.1 > of.0 {
+                    true => pair.1 = interpolate(b, &estimate.poses, reference_ns - i128::from(offset)),
+                    false => pair.0 = interpolate(a, &reference.poses, estimate_ns + i128::from(offset)),
+                }
+            }
+        }
+        let (reference, estimate) = both.into_iter().unzip();
+        Ok(Matched { reference, estimate, stamps, stretches, of, covered, without_attitude })
+    }
+
+    /// Removes the poses of the reference outside the evaluated time.
+    fn cut(&self, reference: &mut Trajectory) -> Result<(), Failure> {
+        if self.t_start.is_none() && self.t_end.is_none() {
+            return Ok(());
+        }
+        let Some(stamps) = &reference.stamps else {
+            return Err(Failure::new(USAGE, "--t-start and --t-end need a reference with stamps"));
+        };
+        let (start, end) = (self.t_start.unwrap_or(f64::NEG_INFINITY), self.t_end.unwrap_or(f64::INFINITY));
+        let seconds = |stamp: &u64| *stamp as f64 * 1e-9;
+        let from = stamps.partition_point(|stamp| seconds(stamp) < start);
+        let to = stamps.partition_point(|stamp| seconds(stamp) <= end);
+        if from >= to {
+            let what = format!("no pose of {} between --t-start and --t-end", self.reference.display());
+            return Err(Failure::new(
+                INPUT,
+                format!("{what}; it covers {} to {} s", seconds(&stamps[0]), seconds(&stamps[stamps.len() - 1])),
+            ));
+        }
+        reference.stamps = Some(stamps[from..to].to_vec());
+        reference.poses = reference.poses[from..to].to_vec();
+        reference.breaks =
+            reference.breaks.iter().filter(|at| (from + 1..to).contains(at)).map(|at| at - from).collect();
+        Ok(())
     }
 
     pub(super) fn alignment(&self, matched: &Matched) -> Result<Option<Alignment>, Failure> {

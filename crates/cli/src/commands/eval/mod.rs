@@ -3,17 +3,19 @@
 mod matched;
 mod output;
 
+use matched::Matched;
+
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
 use seafix_data::trajectory::{Format, LoggedTrajectory, Trajectory};
 use seafix_evaluation::trajectory::{
-    Alignment, Delta, DriftSegment, Relation, Summary, ape, drift, pairs, path_lengths, rpe,
+    Alignment, Delta, DriftSegment, Plane, Relation, Summary, ape, drift, drift_of_positions, pairs, path_lengths, rpe,
 };
 
 use crate::{
-    atomic_file,
-    exit::{DONE, Ended, Failure, USAGE},
+    atomic_file::{AtomicFile, Replacing},
+    exit::{DONE, Ended, Failure, INPUT, USAGE},
     terminal::{notify, print},
 };
 
@@ -62,6 +64,18 @@ pub(crate) struct Eval {
     /// Maximum difference of associated stamps (s).
     #[arg(long, default_value_t = 0.01)]
     t_max_diff: f64,
+    /// Association of the poses in time.
+    #[arg(long, value_enum, default_value = "nearest-time")]
+    sync_method: SyncMethod,
+    /// First time of the reference (s); earlier poses are not evaluated.
+    #[arg(long, allow_negative_numbers = true)]
+    t_start: Option<f64>,
+    /// Last time of the reference (s); later poses are not evaluated.
+    #[arg(long, allow_negative_numbers = true)]
+    t_end: Option<f64>,
+    /// Project both trajectories into a plane of the reference, after the alignment.
+    #[arg(long, value_enum, value_name = "PLANE")]
+    project_to_plane: Option<PlaneArgument>,
     /// Sort lines by time and keep the first of each stamp; by default unsorted lines are an error.
     #[arg(long)]
     sort_stamps: bool,
@@ -74,6 +88,8 @@ pub(crate) struct Eval {
     /// Write the matched, aligned estimate to this file: `.tum`, `.kitti` or `.csv` (EuRoC).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -114,6 +130,34 @@ enum Unit {
     R,
 }
 
+/// The association of two trajectories in time.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum SyncMethod {
+    /// Each pose of the shorter trajectory with the nearest one of the longer.
+    #[value(alias = "nearest_time")]
+    NearestTime,
+    /// The same poses, with those of the longer trajectory interpolated at the stamps of the shorter one.
+    Interpolation,
+}
+
+/// A coordinate plane.
+#[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
+enum PlaneArgument {
+    Xy,
+    Xz,
+    Yz,
+}
+
+impl From<PlaneArgument> for Plane {
+    fn from(plane: PlaneArgument) -> Self {
+        match plane {
+            PlaneArgument::Xy => Self::Xy,
+            PlaneArgument::Xz => Self::Xz,
+            PlaneArgument::Yz => Self::Yz,
+        }
+    }
+}
+
 /// A trajectory of a log.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 enum TrajectoryArgument {
@@ -141,6 +185,14 @@ struct Errors {
     /// The distance of the last poses (m) after alignment of the first; `None` after a break.
     end: Option<f64>,
     alignment: Option<Alignment>,
+    /// The relation of the relative error.
+    relation: Relation,
+}
+
+/// The relations of the absolute and of the relative error.
+struct Measures {
+    ape: Option<Relation>,
+    rpe: Relation,
 }
 
 /// A count as text: `once`, `2 times`.
@@ -152,12 +204,16 @@ impl Eval {
     pub(crate) fn execute(&self) -> Ended {
         let delta = self.delta()?;
         let mut matched = self.matched()?;
+        let measures = self.measures(&matched)?;
         let alignment = self.alignment(&matched)?;
         if let Some(alignment) = &alignment {
             matched.estimate.iter_mut().for_each(|pose| *pose = alignment.apply(pose));
         }
-        let Name(relation) = self.relation;
-        let absolute = relation.is_absolute().then(|| ape(&matched.reference, &matched.estimate, relation));
+        if let Some(plane) = self.project_to_plane {
+            let plane = Plane::from(plane);
+            matched.reference.iter_mut().chain(&mut matched.estimate).for_each(|pose| *pose = plane.project(pose));
+        }
+        let absolute = measures.ape.map(|relation| ape(&matched.reference, &matched.estimate, relation));
         let along = if self.pairs_from_reference { &matched.reference } else { &matched.estimate };
         // Motions across a break are unknown and not evaluated.
         let (mut both, mut segments) = (Vec::new(), Vec::new());
@@ -166,7 +222,10 @@ impl Eval {
             let own = pairs(&along[scale_error.clone()], delta, self.all_pairs, self.delta_tol);
             both.extend(own.into_iter().map(|(i, j)| (from + i, from + j)));
             let (reference, estimate) = (&matched.reference[scale_error.clone()], &matched.estimate[scale_error]);
-            let own = drift(reference, estimate, &self.segments);
+            let own = match matched.without_attitude {
+                None => drift(reference, estimate, &self.segments),
+                Some(_) => drift_of_positions(reference, estimate, &self.segments),
+            };
             segments.extend(own.into_iter().map(|segment| DriftSegment {
                 from: from + segment.from,
                 to: from + segment.to,
@@ -175,11 +234,12 @@ impl Eval {
         }
         let found = Errors {
             ape: absolute.map(|errors| Summary::of(&errors)),
-            rpe: Summary::of(&rpe(&matched.reference, &matched.estimate, &both, relation)),
+            rpe: Summary::of(&rpe(&matched.reference, &matched.estimate, &both, measures.rpe)),
             segments,
             path: path_lengths(&matched.reference).last().copied().unwrap_or(0.0),
-            end: matched.end(),
+            end: if matched.without_attitude.is_none() { matched.end() } else { None },
             alignment,
+            relation: measures.rpe,
         };
         if matched.stretches.len() > 1 {
             notify(&format!(
@@ -205,11 +265,44 @@ impl Eval {
         }
         if let Some(file) = &self.out {
             let breaks = matched.stretches[1..].to_vec();
-            let trajectory = Trajectory { stamps: matched.stamps.clone(), poses: matched.estimate.clone(), breaks };
-            atomic_file::write(file, trajectory.print(Format::of_name(file)))?;
+            let trajectory = Trajectory {
+                stamps: matched.stamps.clone(),
+                poses: matched.estimate.clone(),
+                breaks,
+                has_attitude: true,
+                warnings: Vec::new(),
+            };
+            let inputs = [&*self.reference, self.estimate()];
+            let file_out = AtomicFile::begin(file, self.replacing, &inputs)?;
+            file_out.finish(trajectory.print(Format::of_name(file)))?;
         }
         print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;
         Ok(DONE)
+    }
+
+    /// The relations that the attitudes of the two files allow.
+    fn measures(&self, matched: &Matched) -> Result<Measures, Failure> {
+        let Name(relation) = self.relation;
+        let ape = relation.is_absolute().then_some(relation);
+        let Some(file) = &matched.without_attitude else { return Ok(Measures { ape, rpe: relation }) };
+        let refuse = |what: &str| {
+            let remedy = "positions allow trans_part (APE), point_distance and point_distance_error_ratio";
+            Err(Failure::new(INPUT, format!("no attitude in {}: {what}; {remedy}", file.display())))
+        };
+        if self.align_origin {
+            return refuse("--align-origin needs one; use --align");
+        }
+        if matches!(self.delta_unit, Unit::D | Unit::R) {
+            return refuse("a --delta of an angle needs one; give frames or metres");
+        }
+        match relation {
+            Relation::Translation => {
+                notify(&format!("warning: no attitude in {}: the RPE is that of point_distance", file.display()));
+                Ok(Measures { ape, rpe: Relation::PointDistance })
+            }
+            Relation::PointDistance | Relation::PointDistanceRatio => Ok(Measures { ape, rpe: relation }),
+            _ => refuse(&format!("{} needs one", relation.name())),
+        }
     }
 
     /// The file of the estimate.

@@ -65,7 +65,8 @@ impl Eval {
             Unit::R => "rad",
         };
         let kind = if self.all_pairs { "all pairs" } else { "consecutive" };
-        row(format!("RPE over {} {unit}, {kind}", self.delta), &found.rpe);
+        let of = if found.relation == relation { "" } else { "point_distance " };
+        row(format!("RPE {of}over {} {unit}, {kind}", self.delta), &found.rpe);
         let heads = ["mean %", "rms %", "median %", "p95 %", "deg/m", "segments"].map(str::to_owned);
         text += &format!("\n{:32}{}", "drift over", columns(&heads));
         for (length, fraction, turn) in self.segments(found) {
@@ -115,6 +116,7 @@ impl Eval {
             "unit": relation.unit(),
             "ape": found.ape.as_ref().map(summary),
             "rpe": summary(&found.rpe),
+            "rpe_relation": found.relation.name(),
             "segments": segments,
             "breaks": matched.stretches[1..].iter().map(|&at| match &matched.stamps {
                 Some(stamps) => json!({ "pose": at, "stamp_ns": stamps[at] }),

@@ -1,12 +1,17 @@
 //! Protection levels against analytic values.
 
-use nalgebra::Vector3;
-use seafix_geometry::{Point, UncertainPoint};
+use nalgebra::{Matrix3, Vector3};
+use seafix_geometry::{Point, UncertainPoint, so3};
 
-use super::*;
-use crate::{Mahalanobis, Observation, Solver};
+use super::{protection::semi_axis, *};
+use crate::{
+    observations::Observation,
+    solve::{mahalanobis::Mahalanobis, solver::Solver},
+};
 
 const SIGMA: f64 = 0.002;
+/// The alert limit (m).
+const ALERT: f64 = 0.1;
 
 fn seen(count: usize) -> (Observations<'static>, Transform<Object, Camera>) {
     let places =
@@ -18,14 +23,14 @@ fn seen(count: usize) -> (Observations<'static>, Transform<Object, Camera>) {
         model: Point::from(at),
         model_sigma: 0.0,
     });
-    (Observations { points: points.collect(), rig: None }, pose)
+    (Observations { points: points.collect(), edges: Vec::new(), rig: None }, pose)
 }
 
 fn of(data: &Observations<'_>, acceptance: &Acceptance) -> (Option<f64>, Option<Protection>) {
     let witness = Mahalanobis::default();
     let pose = witness.solve(data).unwrap();
     let covariance = witness.covariance(data, &pose).unwrap();
-    let all = protection(data, &pose, &covariance, acceptance, &Transfer::of(&[], &pose), 0.0);
+    let all = protection(data, &pose, &covariance, acceptance, &Transfer::of(&[], &pose), ALERT, 0.0);
     assert_eq!(all.two.is_some(), acceptance.two_wrong_rate > 0.0 && data.points.len() >= 5);
     (all.one, all.protection)
 }
@@ -60,7 +65,7 @@ fn what_the_points_may_be_mistaken_for_is_taken_from_the_risk() {
     let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
     let level = |risk: f64, misidentified: f64| {
         let acceptance = Acceptance { risk, ..Acceptance::default() };
-        protection(&data, &pose, &covariance, &acceptance, &Transfer::of(&[], &pose), misidentified).protection
+        protection(&data, &pose, &covariance, &acceptance, &Transfer::of(&[], &pose), ALERT, misidentified).protection
     };
     assert_eq!(level(1e-4, 7e-5), level(1e-4 - 7e-5, 0.0));
     assert!(level(1e-4, 9.9e-5).is_some());
@@ -74,7 +79,7 @@ fn every_fix_of_four_points_has_a_scale_error() {
         let (mut data, pose) = seen(count);
         data.points[0].measured.covariance[(0, 0)] = if exact { 1e-16 } else { SIGMA * SIGMA };
         let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
-        protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), 0.0).scale_error
+        protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), ALERT, 0.0).scale_error
     };
     assert_eq!(scale_error(3, false), None);
     for count in [4, 6] {
@@ -136,16 +141,22 @@ fn octahedron(sigma: f64) -> Observations<'static> {
         model: vertex(k).into(),
         model_sigma: 0.0,
     });
-    Observations { points: points.collect(), rig: None }
+    Observations { points: points.collect(), edges: Vec::new(), rig: None }
+}
+
+/// The separation of the maximum-likelihood pose with its own covariance, for objects that have no displaced part.
+fn solution_separation(data: &Observations<'_>, acceptance: &Acceptance) -> Separation {
+    with_parts(data, &Acceptance { moved_part_rate: 0.0, ..acceptance.clone() })
 }
 
 /// The separation of the maximum-likelihood pose with its own covariance.
-fn solution_separation(data: &Observations<'_>, acceptance: &Acceptance) -> Separation {
+fn with_parts(data: &Observations<'_>, acceptance: &Acceptance) -> Separation {
     let witness = Mahalanobis::default();
     let pose = witness.solve(data).unwrap();
     let covariance = witness.covariance(data, &pose).unwrap();
-    let model: Vec<_> = data.points.iter().map(|point| crate::ModelPoint::exact("", point.model)).collect();
-    protection(data, &pose, &covariance, acceptance, &Transfer::of(&model, &pose), 0.0)
+    let model: Vec<_> =
+        data.points.iter().map(|point| crate::site::model::ModelPoint::exact("", point.model)).collect();
+    protection(data, &pose, &covariance, acceptance, &Transfer::of(&model, &pose), ALERT, 0.0)
 }
 
 fn close(found: f64, expected: f64) -> bool {
@@ -347,7 +358,7 @@ fn points_near_a_line_have_a_scale_and_no_level() {
     }
     let pose = Transform::identity();
     let covariance = Covariance6::isotropic(1e-3, 1e-3);
-    let found = protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), 0.0);
+    let found = protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), ALERT, 0.0);
     assert_eq!((found.one, found.two, found.protection), (None, None, None));
     assert_eq!(found.hinge, Some((0, f64::INFINITY)));
     let scale_error = found.scale_error.unwrap();
@@ -388,4 +399,52 @@ fn levels_are_exceeded_with_no_more_than_the_risk() {
         exceeded += usize::from(pose.translation().norm() > level.position);
     }
     assert!((1..120).contains(&exceeded), "{exceeded} of {trials}");
+}
+
+/// The corners of two cubes, one of them displaced by `off` (m).
+fn cubes(off: f64) -> Observations<'static> {
+    let points = (0..16).map(|k| {
+        let bit = |b: usize| f64::from(u8::from(k >> b & 1 == 1));
+        let at = Vector3::new(bit(0) + 3.0 * bit(3), bit(1), bit(2));
+        Observation {
+            measured: UncertainPoint::isotropic((at + Vector3::new(0.0, bit(3) * off, -4.0)).into(), SIGMA),
+            pixels: None,
+            model: at.into(),
+            model_sigma: 0.0,
+        }
+    });
+    Observations { points: points.collect(), edges: Vec::new(), rig: None }
+}
+
+/// A displaced cube is found with its displacement; the levels cover the poses of both cubes, and the covariance their
+/// difference. Cubes as modelled are consistent, and their levels are those of a third of the risk or wider.
+///
+/// The pose of all points is off by half of the displacement and turned by the moment of the other half.
+#[test]
+fn a_displaced_part_is_found_and_covered() {
+    const OFF: f64 = 0.02;
+    let acceptance = Acceptance::default();
+    let even = with_parts(&cubes(0.0), &acceptance);
+    let found = even.consistency.unwrap();
+    assert!(found.bayes_factor < 1.0 && found.shift < 1e-9 && even.spread.is_none(), "{found:?}");
+    let rigid = solution_separation(&cubes(0.0), &acceptance).protection.unwrap();
+    let level = even.protection.unwrap();
+    assert!(level.position > rigid.position && level.position < 3.0 * rigid.position, "{level:?} {rigid:?}");
+
+    let apart = with_parts(&cubes(OFF), &acceptance);
+    let found = apart.consistency.unwrap();
+    assert!(found.bayes_factor > 1e6 && found.moved == 8 && (found.shift - OFF).abs() < 3.0 * found.sigma, "{found:?}");
+    // Either cube may be the object.
+    let data = cubes(OFF);
+    let pose = Mahalanobis::default().solve(&data).unwrap();
+    let level = apart.protection.unwrap();
+    for half in [&data.points[..8], &data.points[8..]] {
+        let other = Mahalanobis::default()
+            .solve(&Observations { points: half.to_vec(), edges: Vec::new(), rig: None })
+            .unwrap();
+        let (moved, turned) = super::apart(&pose, &other);
+        assert!(moved < level.position && turned < level.attitude, "{moved} {turned} {level:?}");
+    }
+    assert!(apart.spread.is_some_and(|spread| spread.symmetric_eigenvalues().max() > (0.3 * OFF).powi(2)));
+    assert!(solution_separation(&data, &acceptance).consistency.is_none());
 }

@@ -4,7 +4,12 @@ use nalgebra::Vector3;
 use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 
 use super::*;
-use crate::{Candidates, Correspondence, ModelPoint, Tolerance, search::bitset::BitMatrix};
+use crate::{
+    candidates::Candidates,
+    problem::{Correspondence, Tolerance},
+    search::bitset::BitMatrix,
+    site::model::ModelPoint,
+};
 
 /// Points for the model and the cloud of a graph with given edges.
 struct Points {
@@ -36,6 +41,7 @@ impl Points {
             candidates: &self.candidates,
             tolerance: Tolerance::Fixed(0.01),
             prior: None,
+            edges: Default::default(),
         }
     }
 }

@@ -260,7 +260,7 @@ impl<'a> Bounds<'a> {
 
 /// The mean residual cost of `k` true pairs under their own pose (nats): ½χ² of 3k − 6 degrees of freedom, limited to
 /// [`DISTORTION`].
-fn distortion(k: usize) -> f64 {
+pub(super) fn distortion(k: usize) -> f64 {
     (1.5 * k as f64 - 3.0).clamp(0.0, DISTORTION)
 }
 
@@ -273,8 +273,10 @@ mod tests {
 
     use super::*;
     use crate::{
-        Candidates, ModelPoint, Problem, Tolerance,
+        candidates::Candidates,
+        problem::{Problem, Tolerance},
         search::consensus::bits::{intersect, is_set, ones},
+        site::model::ModelPoint,
     };
 
     /// The bound of some pairs and of those of a set from a rank on, computed pair by pair.
@@ -305,7 +307,14 @@ mod tests {
         let pairs = each.iter().enumerate().flat_map(|(i, &count)| (0..count).map(move |j| (i, (37 * i + j) % 400)));
         let candidates = Candidates::from_pairs(model.len(), pairs);
         let tolerance = Tolerance::Fixed(0.5);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::prior_terms::{BOUND_SIGMAS, Known};
-use crate::Problem;
+use crate::problem::Problem;
 
 /// Number of nested boxes about a predicted place, each half as wide as the previous.
 const BOXES: usize = 3;
@@ -115,7 +115,12 @@ mod tests {
     use seafix_geometry::{MeasuredPoint, Transform, UncertainPoint};
 
     use super::*;
-    use crate::{Candidates, ModelPoint, Prior, PriorBound, Tolerance, search::consensus::prior_terms::PriorTerms};
+    use crate::{
+        candidates::Candidates,
+        problem::{Prior, PriorBound, Tolerance},
+        search::consensus::prior_terms::PriorTerms,
+        site::model::ModelPoint,
+    };
 
     const HALF: f64 = 0.4;
 
@@ -134,7 +139,14 @@ mod tests {
             bound: PriorBound::Box(HALF),
         };
         let (tolerance, prior) = (Tolerance::Fixed(0.04), Some(&prior));
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("a prior");
         let of_pose: Vec<usize> = (0..80).filter(|j| of_pose && j % 10 >= 7).collect();
         let known = prior_terms.known.as_ref().expect("a prior");

@@ -1,49 +1,72 @@
 //! Local density of clutter: in dense clutter some points fit any pose.
 
-use std::collections::BTreeMap;
-
-use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 use super::{
     clumped_clutter::ClumpedClutter,
     graph::ConsistencyGraph,
     likelihood::{Mode, Terms},
+    line_density::{Densities, LineDensity, NEAR},
     prior_terms::PriorTerms,
     visible::ln_visible,
 };
-use crate::{Correspondence, Problem};
+use crate::{
+    a_contrario::{coordinates::shuffled, sample::spread_sample},
+    problem::{Correspondence, Problem},
+};
 
-/// Number of neighbours that define the density about a point, and number of neighbours looked up.
-const NEIGHBOURS: usize = 3;
-const MAX_NEIGHBOURS: usize = 8;
-/// Ratio to the expected density up to which it may be random: uniform clutter exceeds it at one point in 25.
-const DENSE: f64 = 4.0;
-
+/// Number of cloud points from which the fractions of structured clutter are estimated.
+const SAMPLE: usize = 64;
+/// Number of rounds of that estimate; it changes by less than a hundredth afterwards.
+const ROUNDS: usize = 20;
+/// Maximum number of members whose density is computed; the others of a larger set have their mean excess.
+const MAX_MEMBERS: usize = 64;
+/// Ratio of the density k/V_k by the k-th neighbour, whose reciprocal has no bias, to (k − 1)/V_k, which has none
+/// itself.
+///
+/// A pose's evidence is a product of reciprocal densities. Without the object its expectation is at most one only if
+/// E[1/ρ̂] ≤ 1/ρ for each factor, and V_k is the sum of k exponential volumes: E[V_k] = k/ρ.
+const RECIPROCAL: f64 = NEAR as f64 / (NEAR - 1) as f64;
+/// Maximum ratio of the density at the centre of a clump to its mean over the ball through the third neighbour.
+///
+/// In a Gaussian clump of m points the ball has the radius at which χ²₃ reaches the probability 3/m. The ratio is 1.4
+/// for 13 points, 1.7 for eight, and 2.25 for five, the fewest of a clump.
+const PEAK: f64 = 2.25;
+/// Ratio of the densities within the third and within the sixteenth neighbour above which a point lies in a clump.
+///
+/// It is exceeded in uniform clutter at one point in 80.
+const CLUMP: f64 = 4.0;
 /// Distance (standard deviations) below which two points may be one place measured twice.
 const SYMMETRIC: f64 = 5.0;
 
 /// The local density of the cloud about its points.
 ///
 /// The terms of a pose assume uniform clutter in each gate. On the edges of a box or in clumps, a pose finds fitting
-/// points much more often, and each has less evidence.
+/// points much more often, and each has less evidence. Clutter is therefore a mixture of uniform points, of points on
+/// lines and of points in clumps, ρ = Σ_m w_m ρ_m ([`LineDensity`]). The frame determines the fractions w: those that
+/// maximise the likelihood of its own points, each predicted by the others (stacked density estimation, Smyth and
+/// Wolpert 1999, by expectation maximisation). Clumps about the predicted
+/// places of all model points are counted together ([`ClumpedClutter`]); the denser of both holds.
 #[derive(Default)]
 pub(in crate::search) struct ClutterDensity {
-    /// The nearest neighbours of the cloud points looked up, by squared distance (m²), ascending.
-    nearest: BTreeMap<usize, Vec<(f64, usize)>>,
-    /// The cloud points that count as clutter.
-    counted: Option<Counted>,
+    lines: Option<Lines>,
     /// The clutter about the predicted places.
     clumped_clutter: Option<ClumpedClutter>,
     /// A distance (m) and the fraction of candidates with another so near; `None` until it is needed.
     duplicates: Option<(f64, f64)>,
 }
 
+/// The densities along lines and in clumps, and the fractions of clutter that have them.
+struct Lines {
+    density: LineDensity,
+    fractions: [f64; 2],
+}
+
 impl ClutterDensity {
     /// Recomputes the evidence of a mode with the local clutter density about each of its points.
     ///
-    /// The density is that about the point, or that about the predicted places of all model points
-    /// ([`ClumpedClutter`]). A point in dense clutter may contribute negatively; it is then rather clutter than the
-    /// object's. The evidence is summed over the subsets of members that are the object's ([`ln_visible`]).
+    /// A point in dense clutter may contribute negatively; it is then rather clutter than the object's. The evidence is
+    /// summed over the subsets of members that are the object's ([`ln_visible`]).
     pub(in crate::search) fn weigh(
         &mut self,
         problem: &Problem<'_>,
@@ -53,29 +76,57 @@ impl ClutterDensity {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
         let known = prior_terms.known.as_ref();
-        let excess = known.map(|known| {
+        let clumped = known.map(|known| {
             let clumped_clutter = self.clumped_clutter.get_or_insert_with(|| ClumpedClutter::of(problem, known));
             (known, clumped_clutter.beside(&members))
         });
-        let dense: Vec<f64> = (0..members.len())
+        let every = members.len().div_ceil(MAX_MEMBERS).max(1);
+        let excess: Vec<f64> = (0..members.len())
+            .step_by(every)
             .map(|at| {
                 let v = mode.members[at];
-                let clutter_density = self.cost(problem, terms, graph, v, &members);
                 let Correspondence { model, cloud } = graph.vertices[v];
                 let place = &problem.cloud[cloud].position.at.coords;
-                let clumped = excess.as_ref().map_or(0.0, |(known, excess)| excess.about(known, model, place));
+                let excess = self.excess(problem, (terms, graph), v, &members);
+                let clumped = clumped.as_ref().map(|(known, clumped)| clumped.about(known, model, place));
                 let duplicate = self.duplicate(problem, terms, graph, v, &members[..at]);
-                any_of(terms, graph, v, mode, even[at]) - clutter_density.max(duplicate).max(clumped)
+                // Sparser clutter than the gate's counts in favour of a point, unless one of these is found.
+                [clumped, duplicate].into_iter().flatten().filter(|of| *of > 0.0).fold(excess, f64::max)
             })
             .collect();
+        let mean = excess.iter().sum::<f64>() / excess.len().max(1) as f64;
+        let excess = |at: usize| if at.is_multiple_of(every) { excess[at / every] } else { mean };
+        let dense: Vec<f64> =
+            (0..members.len()).map(|at| any_of(terms, graph, mode.members[at], mode, even[at]) - excess(at)).collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_fraction[even.len()];
         let (even, dense) = (ln_visible(&even, &terms.ln_fraction), ln_visible(&dense, &terms.ln_fraction));
         mode.ln_evidence = of_pose + dense;
         mode.ln_clutter_density = even - dense;
     }
 
-    /// The excess density (nats) of a point measured beside an earlier member. The second of two points a few standard
-    /// deviations apart is as frequent as candidates have another so near.
+    /// ln ρ/ρ_even at the cloud point of a vertex if `members` are the object's.
+    fn excess(
+        &mut self,
+        problem: &Problem<'_>,
+        (terms, graph): (&Terms, &ConsistencyGraph),
+        v: usize,
+        members: &[usize],
+    ) -> f64 {
+        let lines = self.lines.get_or_insert_with(|| Lines::of(problem, (terms, graph), members));
+        let cloud = graph.vertices[v].cloud;
+        let Densities { along, near, wide } = lines.density.at(cloud, |j| members.contains(&j));
+        let peak = (near / (CLUMP * wide).max(f64::MIN_POSITIVE)).clamp(1.0, PEAK);
+        let density = [along, peak * RECIPROCAL * near];
+        let even = even(problem, (terms, graph), &lines.density, v);
+        libm::log1p(density.iter().zip(lines.fractions).map(|(density, w)| w * (density / even - 1.0)).sum())
+    }
+
+    /// The excess density (nats) of a point measured beside an earlier member.
+    ///
+    /// The second of two points a few standard deviations apart is as frequent as candidates have another so near.
+    /// Putative pairs: a point beside r earlier members is matched beside one of them with the probability 1 − (1 −
+    /// g)^r, where g is the fraction of neighbouring pairs of points that are matched to neighbouring points.
+    /// Descriptors of overlapping neighbourhoods are alike, and so are their wrong matches.
     fn duplicate(
         &mut self,
         problem: &Problem<'_>,
@@ -83,52 +134,76 @@ impl ClutterDensity {
         graph: &ConsistencyGraph,
         v: usize,
         before: &[usize],
-    ) -> f64 {
+    ) -> Option<f64> {
         let pair = graph.vertices[v];
         let seen = &problem.cloud[pair.cloud].position;
         let reach = SYMMETRIC * (seen.covariance.trace() / 3.0).sqrt();
-        if !before.iter().any(|&j| problem.cloud[j].position.at.distance(&seen.at) <= reach) {
-            return 0.0;
+        let beside = before.iter().filter(|&&j| problem.cloud[j].position.at.distance(&seen.at) <= reach).count();
+        if beside == 0 {
+            return None;
         }
+        let putative = shuffled(problem);
         let fraction = match self.duplicates {
             Some((of, fraction)) if of == reach => fraction,
+            _ if putative => neighbours_matched(problem, reach),
             _ => duplicates(problem, reach),
         };
         self.duplicates = Some((reach, fraction));
+        let fraction = if putative { 1.0 - (1.0 - fraction).powi(beside as i32) } else { fraction };
         let volume = 4.0 / 3.0 * std::f64::consts::PI * reach.powi(3);
-        (libm::log(fraction / volume) - terms.ln_density_about(v, pair.model)).max(0.0)
+        Some(libm::log(fraction / volume) - terms.ln_density_about(v, pair.model))
     }
+}
 
-    /// The excess density about the cloud point of a vertex over the expected (nats).
-    fn cost(
-        &mut self,
-        problem: &Problem<'_>,
-        terms: &Terms,
-        graph: &ConsistencyGraph,
-        v: usize,
-        members: &[usize],
-    ) -> f64 {
-        let pair = graph.vertices[v];
-        let counted = self.counted.get_or_insert_with(|| Counted::of(problem));
-        let place = &problem.cloud[pair.cloud].position.at.coords;
-        let nearest = self.nearest.entry(pair.cloud).or_insert_with(|| counted.nearest(pair.cloud, place));
-        let Some(&(square, _)) = nearest.iter().filter(|(_, j)| !members.contains(j)).nth(NEIGHBOURS - 1) else {
-            return 0.0;
-        };
-        // Points nearer than the noise are one place.
-        let noise = problem.cloud[pair.cloud].position.covariance.trace() / 3.0;
-        let volume = 4.0 / 3.0 * std::f64::consts::PI * square.max(noise).max(f64::MIN_POSITIVE).powf(1.5);
-        // For candidates given without a prior, the other points of the cloud are at random distances.
-        let even = match problem.prior {
-            Some(_) => terms.ln_density_about(v, pair.model),
-            None => {
-                let own = problem.candidates.lists[pair.model].len().max(1);
-                terms.ln_density_about(v, pair.model) + libm::log(counted.points.len() as f64 / own as f64)
+impl Lines {
+    fn of(problem: &Problem<'_>, (terms, graph): (&Terms, &ConsistencyGraph), members: &[usize]) -> Self {
+        let mut density = LineDensity::of(problem);
+        let taken: BTreeSet<usize> = members.iter().copied().collect();
+        // The vertices of each cloud point; that of the first model point represents them.
+        let mut of_cloud: Vec<Option<usize>> = vec![None; problem.cloud.len()];
+        for (v, pair) in graph.vertices.iter().enumerate() {
+            if !taken.contains(&pair.cloud)
+                && of_cloud[pair.cloud].is_none_or(|known| graph.vertices[known].model > pair.model)
+            {
+                of_cloud[pair.cloud] = Some(v);
             }
-        };
-        let times = libm::log(NEIGHBOURS as f64 / volume) - even;
-        if times > libm::log(DENSE) { times } else { 0.0 }
+        }
+        let mut sample: Vec<usize> = (0..of_cloud.len()).filter(|&j| of_cloud[j].is_some()).collect();
+        spread_sample(problem.cloud, &mut sample, SAMPLE);
+        let ratios: Vec<[f64; 2]> = sample
+            .iter()
+            .filter_map(|&j| Some((j, of_cloud[j]?)))
+            .map(|(j, v)| {
+                let even = even(problem, (terms, graph), &density, v);
+                let Densities { along, near, .. } = density.at(j, |other| taken.contains(&other));
+                [along / even, near / even]
+            })
+            .filter(|ratios| ratios.iter().all(|ratio| ratio.is_finite()))
+            .collect();
+        let mut fractions = [1.0 / 3.0; 2];
+        for _ in 0..ROUNDS {
+            // A uniform prior of the fractions: one more point that is a third of each kind.
+            let mut sums = [1.0 / 3.0; 2];
+            for ratios in &ratios {
+                let of: [f64; 2] = std::array::from_fn(|m| fractions[m] * ratios[m]);
+                let all = 1.0 - fractions.iter().sum::<f64>() + of.iter().sum::<f64>();
+                (0..2).for_each(|m| sums[m] += of[m] / all);
+            }
+            fractions = sums.map(|sum| sum / (ratios.len() + 1) as f64);
+        }
+        Self { density, fractions }
     }
+}
+
+/// The density (1/m³) of cloud points about a vertex if clutter is uniform; without a prior that of all candidates.
+fn even(problem: &Problem<'_>, (terms, graph): (&Terms, &ConsistencyGraph), of: &LineDensity, v: usize) -> f64 {
+    let Correspondence { model, .. } = graph.vertices[v];
+    let own = terms.ln_density_about(v, model);
+    libm::exp(match problem.prior {
+        Some(_) => own,
+        // Candidates given without a prior: the other points of the cloud are at random distances.
+        None => own + libm::log(of.len() as f64 / problem.candidates.lists[model].len().max(1) as f64),
+    })
 }
 
 /// ln of the likelihood ratio of a member's model point over all its candidates: Σ_j r_ij over those near its place.
@@ -161,67 +236,36 @@ fn duplicates(problem: &Problem<'_>, reach: f64) -> f64 {
     duplicate.iter().filter(|duplicate| **duplicate).count() as f64 / all.len() as f64
 }
 
-/// The cloud points that are clutter unless they are the object's: without a prior the candidates, else all.
-struct Counted {
-    points: Vec<usize>,
-    /// Their coordinates by axis.
-    places: [Vec<f64>; 3],
-    /// Their squared distances from a place (m²).
-    squares: Vec<f64>,
-}
-
-impl Counted {
-    fn of(problem: &Problem<'_>) -> Self {
-        let mut points: Vec<usize> = match problem.prior {
-            Some(_) => (0..problem.cloud.len()).collect(),
-            None => problem.candidates.lists.iter().flatten().copied().collect(),
-        };
-        points.sort_unstable();
-        points.dedup();
-        let column = |axis: usize| points.iter().map(|&j| problem.cloud[j].position.at.coords[axis]).collect();
-        let places = std::array::from_fn(column);
-        Self { places, squares: vec![0.0; points.len()], points }
-    }
-
-    /// The nearest neighbours of a cloud point with their squared distances.
-    fn nearest(&mut self, of: usize, at: &Vector3<f64>) -> Vec<(f64, usize)> {
-        squares(&self.places, at, &mut self.squares);
-        let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(MAX_NEIGHBOURS + 1);
-        let mut farthest = f64::INFINITY;
-        for (&square, &j) in self.squares.iter().zip(&self.points) {
-            // Negated comparison: NaN is skipped, and every finite distance passes while few are known.
-            if !(square < farthest) || j == of {
-                continue;
-            }
-            let place = nearest.partition_point(|(known, _)| *known <= square);
-            nearest.insert(place, (square, j));
-            nearest.truncate(MAX_NEIGHBOURS);
-            if nearest.len() == MAX_NEIGHBOURS {
-                farthest = nearest[MAX_NEIGHBOURS - 1].0;
-            }
+/// The fraction of pairs of model points within `reach` (m) whose partners are within `reach` too.
+fn neighbours_matched(problem: &Problem<'_>, reach: f64) -> f64 {
+    let lists = problem.candidates.lists.iter().enumerate();
+    let mut all: Vec<Correspondence> = lists
+        .flat_map(|(model, list)| list.iter().map(move |&cloud| Correspondence { model, cloud }))
+        .filter(|pair| problem.model[pair.model].at.coords.x.is_finite())
+        .collect();
+    let at = |pair: &Correspondence| &problem.model[pair.model].at;
+    all.sort_by(|a, b| at(a).coords.x.total_cmp(&at(b).coords.x).then(a.cmp(b)));
+    let (mut near, mut both) = (0u64, 0u64);
+    for (i, a) in all.iter().enumerate() {
+        let next = all[i + 1..].iter().take_while(|b| at(b).coords.x - at(a).coords.x <= reach);
+        for b in next.filter(|b| a.model != b.model && a.cloud != b.cloud && at(a).distance(at(b)) <= reach) {
+            near += 1;
+            both += u64::from(problem.measured(a.cloud, b.cloud) <= reach);
         }
-        nearest
     }
-}
-
-/// The squared distances of some places from one.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn squares([x, y, z]: &[Vec<f64>; 3], at: &Vector3<f64>, squares: &mut [f64]) {
-    for (square, ((x, y), z)) in squares.iter_mut().zip(x.iter().zip(y).zip(z)) {
-        let (x, y, z) = (x - at.x, y - at.y, z - at.z);
-        *square = x * x + y * y + z * z;
-    }
+    both as f64 / near.max(1) as f64
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Matrix3;
+    use nalgebra::{Matrix3, Vector3};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::{MeasuredPoint, UncertainPoint};
 
-    use super::{super::Motion, *};
-    use crate::{Candidates, ModelPoint, Tolerance};
+    use super::*;
+    use crate::search::consensus::motion::Motion;
+    use crate::{candidates::Candidates, problem::Tolerance, site::model::ModelPoint};
 
     const SIGMA: f64 = 0.1;
     const HALF: f64 = 1.0;
@@ -236,14 +280,28 @@ mod tests {
         let model = [ModelPoint::exact("a", [0.0; 3].into())];
         let candidates = Candidates::all(1, cloud.len());
         let tolerance = Tolerance::Sigmas(4.0);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("no prior to reject");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);
         let motion = Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() };
         let gain = |v: &usize| terms.residual_gain(*v, &motion);
         let nearest = (0..cloud.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("a candidate");
-        let mode = Mode { members: vec![nearest], motion, ln_evidence: 0.0, ln_even: 0.0, ln_clutter_density: 0.0 };
+        let mode = Mode {
+            members: vec![nearest],
+            edges: Vec::new(),
+            motion,
+            ln_evidence: 0.0,
+            ln_even: 0.0,
+            ln_clutter_density: 0.0,
+        };
         let own = gain(&nearest);
         (libm::exp(own), libm::exp(any_of(&terms, &graph, nearest, &mode, own)))
     }

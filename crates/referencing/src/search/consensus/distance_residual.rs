@@ -76,7 +76,12 @@ mod tests {
     use seafix_geometry::{MeasuredPoint, UncertainPoint};
 
     use super::*;
-    use crate::{Correspondence, Kabsch, ModelPoint, Observations, Solver};
+    use crate::{
+        observations::Observations,
+        problem::Correspondence,
+        site::model::ModelPoint,
+        solve::{kabsch::Kabsch, solver::Solver},
+    };
 
     const SIGMA: f64 = 0.01;
 

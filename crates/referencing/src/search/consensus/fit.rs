@@ -3,8 +3,9 @@
 use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3, Vector6};
 
 use super::{
-    Motion,
-    likelihood::{HALF_LN_2PI, Terms},
+    gaussian::HALF_LN_2PI,
+    likelihood::Terms,
+    motion::Motion,
     prior_terms::PriorTerms,
     solve6::{factor as factor_of, solve},
 };

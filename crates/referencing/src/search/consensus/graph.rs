@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use super::{super::association::reach, prior_terms::PriorTerms};
 use crate::{
-    Correspondence, Problem, Tolerance,
     lanes::{LANES, packed},
+    problem::{Correspondence, Problem, Tolerance},
 };
 
 /// Maximum rotation between two pairs, in standard deviations of the prior.

@@ -1,13 +1,14 @@
 //! Mislabelled putative pairs: matches that confuse model points of similar appearance.
 
 use super::{
+    fractions::ln_fraction,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms, ln_fraction},
+    likelihood::{Mode, Terms},
     structured_clutter::{Occupied, StructuredClutter},
 };
 use crate::{
-    Problem,
-    a_contrario::{Shuffled, shuffled},
+    a_contrario::{coincidence::Shuffled, coordinates::shuffled},
+    problem::Problem,
 };
 
 /// Minimum number of wrong pairs at one pose that form a pattern.

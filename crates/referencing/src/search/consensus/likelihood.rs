@@ -1,14 +1,17 @@
 //! The likelihood ratio of a pose against clutter alone.
 
-use nalgebra::{Cholesky, Const, Matrix3, Matrix6, U6, Vector3};
+use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 
-use super::{Motion, fit::fit, graph::ConsistencyGraph, prior_terms::PriorTerms, solve6::factor as factor_of};
-use crate::{Correspondence, Problem, Tolerance, parts::Parts};
-
-/// ½ ln 2π. The maximum of a Gaussian of d dimensions is exp(−d·½ ln 2π − ½ ln det Σ); a maximum of a density with the
-/// information H has the volume exp(d·½ ln 2π − ½ ln det H).
-pub(in crate::search) const HALF_LN_2PI: f64 = 0.918_938_533_204_672_7;
+use super::{
+    edge_terms::EdgeTerms, fit::fit, fractions::fractions, graph::ConsistencyGraph, motion::Motion,
+    prior_terms::PriorTerms, solve6::factor as factor_of,
+};
+use crate::search::consensus::gaussian::{HALF_LN_2PI, half_ln_det};
+use crate::{
+    parts::Parts,
+    problem::{Correspondence, Problem, Tolerance},
+};
 
 /// Gate of a pair about its place under the pose (χ²₃).
 const FAR: f64 = 25.0;
@@ -67,7 +70,8 @@ pub(in crate::search) struct Terms {
 
 impl Terms {
     pub(in crate::search) fn of(problem: &Problem<'_>, prior_terms: &PriorTerms, graph: &ConsistencyGraph) -> Self {
-        let n = problem.candidates.lists.len();
+        // A model point for which a matcher proposed no partner could not be identified if it were visible.
+        let n = if problem.prior.is_some() { problem.candidates.lists.len() } else { graph.starts.len() - 1 };
         let ln_density = densities(problem, prior_terms);
         let count = graph.vertices.len();
         let of_parts = |parts: &Parts| graph.vertices.iter().map(|pair| parts.ln_excess(pair.cloud)).collect();
@@ -164,7 +168,8 @@ fn densities(problem: &Problem<'_>, prior_terms: &PriorTerms) -> Vec<f64> {
         .places
         .iter()
         .map(|(place, spread)| {
-            let half = spread * super::prior_terms::BOUND_SIGMAS;
+            // A box prior bounds the candidates: beyond its gate their density may be another.
+            let half = known.half.map_or(spread * super::prior_terms::BOUND_SIGMAS, Vector3::repeat);
             let count = inside((&x, &y, &z), place, &half);
             libm::log(count.max(1) as f64)
                 - (half * 2.0).iter().map(|side| libm::log(side.max(f64::MIN_POSITIVE))).sum::<f64>()
@@ -184,22 +189,6 @@ fn inside((x, y, z): (&[f64], &[f64], &[f64]), place: &Vector3<f64>, half: &Vect
     count
 }
 
-fn fractions(n: usize) -> Vec<f64> {
-    // B(0) = 1/(n + 1); B(k) = B(k − 1) · k/(n − k + 1).
-    let mut fractions = vec![-libm::log((n + 1) as f64)];
-    for k in 1..=n {
-        let last = fractions[k - 1];
-        fractions.push(last + libm::log(k as f64 / (n - k + 1) as f64));
-    }
-    fractions
-}
-
-/// ln B(k) for n points.
-pub(in crate::search) fn ln_fraction(k: usize, n: usize) -> f64 {
-    let ln_factorial = |k: usize| libm::lgamma(k as f64 + 1.0);
-    ln_factorial(k) + ln_factorial(n - k) - ln_factorial(n + 1)
-}
-
 /// ln of the density of a measurement given its true place; `None` beyond the gate.
 pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vector3<f64>) -> Option<f64> {
     let r = seen.at.coords - place;
@@ -215,6 +204,8 @@ pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vect
 pub(in crate::search) struct Mode {
     /// Vertices, ascending.
     pub(in crate::search) members: Vec<usize>,
+    /// The vertices of edges, ascending.
+    pub(in crate::search) edges: Vec<usize>,
     pub(in crate::search) motion: Motion,
     /// ln of the evidence ratio against absence by Laplace's approximation: the likelihood ratio and the prior density
     /// at the maximum, times the posterior volume (2π)³/√det H.
@@ -229,6 +220,13 @@ impl Mode {
     /// The pairs, in the order of the model points.
     pub(in crate::search) fn pairs(&self, graph: &ConsistencyGraph) -> Vec<Correspondence> {
         let mut pairs: Vec<Correspondence> = self.members.iter().map(|&v| graph.vertices[v]).collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// The pairs of edges, in the order of the model.
+    pub(in crate::search) fn edge_pairs(&self, edges: &EdgeTerms<'_>) -> Vec<Correspondence> {
+        let mut pairs: Vec<Correspondence> = self.edges.iter().map(|&v| edges.vertices[v].pair).collect();
         pairs.sort_unstable();
         pairs
     }
@@ -267,11 +265,6 @@ fn information(lever: &Vector3<f64>, w: &Matrix3<f64>) -> Matrix6<f64> {
     h.fixed_view_mut::<3, 3>(3, 0).copy_from(&sw.transpose());
     h.fixed_view_mut::<3, 3>(3, 3).copy_from(w);
     h
-}
-
-/// ½ ln det of a matrix.
-pub(in crate::search) fn half_ln_det<const N: usize>(chol: &Cholesky<f64, Const<N>>) -> f64 {
-    chol.l_dirty().diagonal().iter().map(|&x| libm::log(x)).sum()
 }
 
 /// ln of the volume of a posterior with this information: (2π)³/√det H.

@@ -5,14 +5,14 @@ use std::{cell::Cell, collections::BTreeSet};
 use nalgebra::{Cholesky, U6, Vector3};
 
 use super::{
-    Motion,
     bits::is_set,
     fit::{Linear, fit, fit_on},
     graph::ConsistencyGraph,
     likelihood::{Mode, Terms, ln_volume},
+    motion::Motion,
     prior_terms::PriorTerms,
 };
-use crate::ModelPoint;
+use crate::site::model::ModelPoint;
 
 /// Maximum number of rounds of choosing pairs and fitting.
 const ROUNDS: usize = 8;
@@ -80,6 +80,15 @@ impl Climb<'_> {
         self.mode(chosen, motion, &factor)
     }
 
+    /// The mode reached from a motion.
+    pub(in crate::search) fn near(&self, motion: &Motion) -> Option<Mode> {
+        let members = self.choose(motion);
+        if members.len() < MIN {
+            return None;
+        }
+        self.from(&members, motion, f64::NEG_INFINITY, |_| false)
+    }
+
     /// The mode of these pairs (ascending) under their MAP motion; `None` if the prior's box excludes the motion.
     pub(in crate::search) fn mode(&self, members: Vec<usize>, motion: Motion, factor: &Factor) -> Option<Mode> {
         if !self.prior_terms.holds(self.model, &motion, factor) {
@@ -91,6 +100,7 @@ impl Climb<'_> {
         let ln_evidence = score + ln_volume(factor).min(-self.prior_terms.ln_peak);
         ln_evidence.is_finite().then_some(Mode {
             members,
+            edges: Vec::new(),
             motion,
             ln_evidence,
             ln_even: ln_evidence,
@@ -137,6 +147,15 @@ impl Climb<'_> {
     /// Greedy: the better of two pairs that share a model point or a cloud point wins, so that a model point that loses
     /// its best pair to another takes its next. The set keeps the number of pairs that maximises the likelihood.
     fn choose(&self, motion: &Motion) -> Vec<usize> {
+        self.choose_with_min(MIN, motion)
+    }
+
+    /// The set of [`choose`](Self::choose) with any number of pairs, as edges may determine the motion.
+    pub(in crate::search) fn choose_any(&self, motion: &Motion) -> Vec<usize> {
+        self.choose_with_min(0, motion)
+    }
+
+    fn choose_with_min(&self, min: usize, motion: &Motion) -> Vec<usize> {
         self.compared.set(self.compared.get() + self.graph.vertices.len() as u64);
         let starts = &self.graph.starts;
         let mut best: Vec<(f64, usize)> = Vec::with_capacity(starts.len());
@@ -167,11 +186,12 @@ impl Climb<'_> {
             }
             first
         });
-        let (mut sum, mut max, mut keep) = (0.0, f64::NEG_INFINITY, MIN.min(best.len()));
+        let nothing = if min == 0 { self.terms.ln_fraction[0] } else { f64::NEG_INFINITY };
+        let (mut sum, mut max, mut keep) = (0.0, nothing, min.min(best.len()));
         for (k, (gain, _)) in best.iter().enumerate() {
             sum += gain;
             let total = sum + self.terms.ln_fraction[k + 1];
-            if k + 1 >= MIN && total > max {
+            if k + 1 >= min && total > max {
                 (max, keep) = (total, k + 1);
             }
         }
@@ -187,7 +207,10 @@ mod tests {
     use seafix_geometry::{MeasuredPoint, UncertainPoint};
 
     use super::*;
-    use crate::{Candidates, Problem, Tolerance};
+    use crate::{
+        candidates::Candidates,
+        problem::{Problem, Tolerance},
+    };
 
     /// Two model points 10 cm apart are both nearest to a cloud point between them; the second has another 7 cm beyond.
     ///
@@ -202,7 +225,14 @@ mod tests {
             seen.iter().map(|at| MeasuredPoint { position: measured(at), pixels: None }).collect();
         let candidates = Candidates::all(5, 5);
         let tolerance = Tolerance::Fixed(0.2);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);

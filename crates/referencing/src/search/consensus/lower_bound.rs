@@ -3,9 +3,9 @@
 use nalgebra::{Cholesky, Matrix6, U6};
 
 use super::{
-    Motion,
     fit::Linear,
     likelihood::{Terms, ln_volume},
+    motion::Motion,
     prior_terms::PriorTerms,
 };
 

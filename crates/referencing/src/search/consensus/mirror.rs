@@ -5,26 +5,23 @@ use std::{cell::Cell, collections::BTreeSet};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    Motion,
-    bits::ones,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Term, Terms},
+    likelihood::{Mode, Terms},
     local_maxima::Climb,
+    motion::Motion,
+    places::Places,
     prior_terms::PriorTerms,
 };
-use crate::{
-    ModelPoint,
-    lanes::{LANES, packed},
-};
+use crate::site::model::ModelPoint;
 
 /// Minimum evidence (nats) of an image over the pose, since a planar object is its own image.
 const MARGIN: f64 = 3.0;
+/// Number of standard deviations by which an image must fit the common pairs better (see [`beyond_noise`]).
+const SIGMAS: f64 = 3.0;
 /// Limits of the reflected triples: number of members, number of triples, and number of pairs for each triple.
 const SPREAD: usize = 10;
 const MAX_THREES: usize = 64;
 const PAIRS_A_THREE: usize = 8;
-/// Gate about a motion from three noisy points (χ²₃).
-const LOOSE: f64 = 50.0;
 
 /// The mirror image of the model that shares a planar part with the mode, if it has more evidence.
 ///
@@ -50,7 +47,7 @@ pub(in crate::search) fn mirror_image(
     let own = climb.from(&mode.members, &mode.motion, f64::NEG_INFINITY, |_| false)?;
     let image = |members: &[usize], motion: &Motion| {
         let image = climb.from(members, motion, f64::NEG_INFINITY, |_| false)?;
-        (image.ln_evidence > own.ln_evidence + MARGIN).then_some(image)
+        (image.ln_evidence > own.ln_evidence + MARGIN + beyond_noise(terms, &own, &image)).then_some(image)
     };
     let of_all = reflected(&mode.motion, &centre, &normal);
     image(&mode.members, &of_all).or_else(|| {
@@ -63,10 +60,22 @@ pub(in crate::search) fn mirror_image(
             let motion = Motion::of_three(model, three.map(|v| &terms.pairs[v].cloud)).zip(normal.try_normalize(0.0));
             let Some(motion) = motion.map(|(motion, normal)| reflected(&motion, model[0], &normal)) else { continue };
             let known = largest.as_ref().map_or(mode.members.len(), |(members, _)| members.len());
-            largest = near(terms, graph, &places, &motion, known).map(|members| (members, motion)).or(largest);
+            largest = places.near(terms, graph, &motion, known).map(|members| (members, motion)).or(largest);
         }
         largest.and_then(|(members, motion)| image(&members, &motion))
     })
+}
+
+/// The evidence (nats) by which an image of a planar set may exceed the pose by noise.
+///
+/// A planar set is its own image. The noise of model and cloud across the plane adds up for one of them and cancels for
+/// the other: each common pair contributes d_i to the difference of evidence, with either sign equally probable, so
+/// that the standard deviation of their sum is √Σ d_i². Pairs of which the plane contains the model point have d_i = 0,
+/// as the planar remainder of a true image has.
+fn beyond_noise(terms: &Terms, own: &Mode, image: &Mode) -> f64 {
+    let common = own.members.iter().filter(|&&v| image.holds(v));
+    let off = |v: &usize| terms.residual_gain(*v, &image.motion) - terms.residual_gain(*v, &own.motion);
+    SIGMAS * common.map(|v| off(v).powi(2)).sum::<f64>().sqrt()
 }
 
 /// A motion preceded by the reflection of the model in the plane through a point with this normal.
@@ -83,83 +92,6 @@ fn threes(members: &[usize], max: usize) -> impl Iterator<Item = [usize; 3]> {
     let all: Vec<[usize; 3]> = (0..k).flat_map(of).map(|three| three.map(|i| some[i])).collect();
     let step = all.len().div_ceil(max).max(1);
     all.into_iter().step_by(step)
-}
-
-/// The best pair within the gate of each model point; `None` if they are not more than `more_than`.
-fn near(
-    terms: &Terms,
-    graph: &ConsistencyGraph,
-    places: &Places,
-    motion: &Motion,
-    more_than: usize,
-) -> Option<Vec<usize>> {
-    let mut within = Vec::new();
-    within_reach(places, motion, &mut within);
-    if within.iter().map(|word| word.count_ones() as usize).sum::<usize>() <= more_than {
-        return None;
-    }
-    let mut best: Vec<(f64, usize)> = Vec::new();
-    for v in ones(&within, 0) {
-        let pair = &terms.pairs[v];
-        let d2 = pair.distance(&(pair.cloud - motion.apply(&pair.model)));
-        if !(d2 <= LOOSE) {
-            continue;
-        }
-        match best.last_mut() {
-            Some(last) if graph.rank[last.1] == graph.rank[v] => {
-                if d2 < last.0 {
-                    *last = (d2, v);
-                }
-            }
-            _ => best.push((d2, v)),
-        }
-    }
-    (best.len() > more_than).then(|| best.into_iter().map(|(_, v)| v).collect())
-}
-
-/// The pairs' coordinates in model and cloud by axis, with their squared gates (m²) about a motion.
-///
-/// The columns are padded to complete words with entries that are within reach of nothing.
-struct Places {
-    at: [Vec<f64>; 6],
-    reach2: Vec<f64>,
-}
-
-impl Places {
-    fn of(terms: &Terms) -> Self {
-        let full = terms.pairs.len().next_multiple_of(LANES);
-        let filled = |value: &dyn Fn(&Term) -> f64| {
-            let mut column: Vec<f64> = terms.pairs.iter().map(value).collect();
-            column.resize(full, f64::NAN);
-            column
-        };
-        // χ² is at least that of the greatest variance.
-        Self {
-            at: std::array::from_fn(|axis| {
-                filled(&|pair| if axis < 3 { pair.model[axis] } else { pair.cloud[axis - 3] })
-            }),
-            reach2: filled(&|pair| LOOSE * pair.variance),
-        }
-    }
-}
-
-/// The pairs within reach of a motion, one bit each.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512vl+avx512bw+avx512dq", "x86_64+avx2+bmi1+bmi2"))]
-fn within_reach(places: &Places, motion: &Motion, within: &mut Vec<u64>) {
-    let [mx, my, mz, cx, cy, cz] = places.at.each_ref().map(|column| column.as_chunks::<LANES>().0);
-    let (r, t) = (&motion.rotation, &motion.translation);
-    for (word, reach2) in places.reach2.as_chunks::<LANES>().0.iter().enumerate() {
-        let (mx, my, mz, cx, cy, cz) = (&mx[word], &my[word], &mz[word], &cx[word], &cy[word], &cz[word]);
-        let mut near = [0u8; LANES];
-        for k in 0..LANES {
-            let off = |row: usize, measured: f64| {
-                measured - (r[(row, 0)] * mx[k] + r[(row, 1)] * my[k] + r[(row, 2)] * mz[k] + t[row])
-            };
-            let (x, y, z) = (off(0, cx[k]), off(1, cy[k]), off(2, cz[k]));
-            near[k] = u8::from(x * x + y * y + z * z <= reach2[k]);
-        }
-        within.push(packed(&near));
-    }
 }
 
 #[cfg(test)]

@@ -94,7 +94,7 @@ impl Plane {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Observation, solve::least_squares};
+    use crate::{observations::Observation, solve::closed_form::fit as least_squares};
     use seafix_geometry::UncertainPoint;
 
     #[test]

@@ -1,11 +1,7 @@
 //! Upper bounds of the posterior volume relative to the prior.
 
-use super::{
-    graph::ConsistencyGraph,
-    likelihood::{HALF_LN_2PI, Terms},
-    prior_terms::PriorTerms,
-};
-use crate::ModelPoint;
+use super::{gaussian::HALF_LN_2PI, graph::ConsistencyGraph, likelihood::Terms, prior_terms::PriorTerms};
+use crate::site::model::ModelPoint;
 
 /// Maximum number of model points for which triples are listed; beyond, the information bound is zero.
 const MAX_POINTS: usize = 64;
@@ -103,8 +99,9 @@ mod tests {
 
     use super::*;
     use crate::{
-        Candidates, Prior, PriorBound, Problem, Tolerance,
-        search::consensus::{Motion, fit::Linear},
+        candidates::Candidates,
+        problem::{Prior, PriorBound, Problem, Tolerance},
+        search::consensus::{fit::Linear, motion::Motion},
     };
 
     /// The posterior volume of every set of a few points, with a prior and without, is below its bound.
@@ -127,7 +124,14 @@ mod tests {
             let prior = Prior { object_from_camera: Transform::new(UnitQuaternion::identity(), -shift), bound };
             let prior = (round % 2 == 0).then_some(&prior);
             let tolerance = Tolerance::Sigmas(3.0);
-            let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
+            let problem = Problem {
+                model: &model,
+                cloud: &cloud,
+                candidates: &candidates,
+                tolerance,
+                prior,
+                edges: Default::default(),
+            };
             let prior_terms = PriorTerms::of(&problem).expect("a box");
             let graph = ConsistencyGraph::of(&problem, &prior_terms);
             let terms = Terms::of(&problem, &prior_terms, &graph);

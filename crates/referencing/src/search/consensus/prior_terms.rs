@@ -4,10 +4,14 @@ use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, U6, Vector3, Vector6};
 use seafix_geometry::so3::{log_of_matrix, skew};
 
 use super::{
-    Motion,
-    likelihood::{HALF_LN_2PI, half_ln_det},
+    gaussian::{HALF_LN_2PI, half_ln_det},
+    motion::Motion,
 };
-use crate::{ModelPoint, Prior, PriorBound, Problem, parts::Parts};
+use crate::{
+    parts::Parts,
+    problem::{Prior, PriorBound, Problem},
+    site::model::ModelPoint,
+};
 
 /// Number of standard deviations that a bound of the prior stands for, since bounds are given to hold.
 pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;

@@ -5,7 +5,6 @@ use std::{cell::Cell, collections::BTreeSet};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::{
-    Motion,
     bits::{Held, intersect},
     bound::{After, Bounds},
     distance_residual::residual_of_two,
@@ -14,11 +13,12 @@ use super::{
     likelihood::{Mode, Terms},
     local_maxima::Climb,
     lower_bound::{Fits, LaplacePosterior, ROUNDS},
+    motion::Motion,
     posterior_volume::ln_posterior_volume,
     prior_terms::{PriorTerms, spread},
     seeds::Swept,
 };
-use crate::{ModelPoint, lanes::ones_of};
+use crate::{lanes::ones_of, site::model::ModelPoint};
 
 /// Evidence difference (nats) below which two sets are equal, since a fit ends only near its maximum.
 const EQUAL: f64 = 1e-3;

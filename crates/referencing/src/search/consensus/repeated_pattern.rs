@@ -3,10 +3,17 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::{
+    fractions::ln_fraction,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms, ln_fraction, ln_measured},
+    likelihood::{Mode, Terms, ln_measured},
+    pattern_shifts::{ln_phase, ln_shifted},
+    prior_terms::PriorTerms,
 };
-use crate::{ModelPoint, Problem, site::diameter};
+use crate::{
+    problem::Problem,
+    search::posterior::LN_RESEMBLES,
+    site::{model::ModelPoint, target::diameter},
+};
 
 /// Maximum number of model points for the detection of a pattern, which takes cubic time.
 const MAX_POINTS: usize = 128;
@@ -19,6 +26,8 @@ const OFF_FRACTION: f64 = 0.015;
 const MIN_STEP: f64 = 3.0;
 /// Number of points outside the pattern that suffice to identify an object.
 const TELLING: usize = 3;
+/// Maximum number of shifts whose places are compared.
+const MAX_REGION: usize = 64;
 /// Sine of the angle between two steps below which they are one direction.
 const SAME: f64 = 0.3;
 
@@ -28,17 +37,41 @@ const SAME: f64 = 0.3;
 pub(in crate::search) struct Pattern {
     /// Whether a model point belongs to the pattern.
     repeats: Vec<bool>,
+    /// The points of the pattern (object frame).
+    at: Vec<Vector3<f64>>,
     /// The next places beyond the model (object frame).
-    beyond: Vec<Vector3<f64>>,
+    pub(super) beyond: Vec<Vector3<f64>>,
+    /// Tolerance of a place (m).
+    off: f64,
+    /// The steps of the pattern, one to three (object frame).
+    pub(super) basis: Vec<Vector3<f64>>,
 }
 
-/// ln evidence of a repeated pattern in the cloud, relative to clutter alone (nats).
+/// ln evidence of a pattern that continues beyond the object at a pose, relative to clutter alone (nats).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RepeatedPattern {
-    /// The pattern continues at the best pose, and the object is absent.
-    pub alone: f64,
-    /// The pattern continues, and the object is present.
-    pub around: f64,
+pub(in crate::search) struct Continued {
+    /// The pattern alone: the object is absent.
+    pub(in crate::search) alone: f64,
+    /// The pattern around the object.
+    pub(in crate::search) around: f64,
+    /// The evidence without the numbers of seen and unseen points of the pattern.
+    in_blocks: f64,
+    /// The prior density of the pose.
+    ln_prior: f64,
+    /// Whether the pose identifies a point outside the pattern.
+    identifies: bool,
+    /// Whether a point of the cloud continues the pattern.
+    pub(super) continues: bool,
+}
+
+impl Continued {
+    /// ln of the odds of this shift against another, without the numbers of seen and unseen points.
+    pub(super) fn against(&self, other: &Self) -> f64 {
+        match self.identifies || other.identifies {
+            true => self.in_blocks - other.in_blocks,
+            false => self.ln_prior - other.ln_prior,
+        }
+    }
 }
 
 impl Pattern {
@@ -74,7 +107,8 @@ impl Pattern {
         if basis.is_empty() {
             return None;
         }
-        let mut pattern = Self { repeats: vec![false; n], beyond: Vec::new() };
+        let mut pattern = Self { repeats: vec![false; n], at: Vec::new(), beyond: Vec::new(), off, basis };
+        let basis = pattern.basis.clone();
         let next = |i: usize| basis.iter().flat_map(|step| [*step, -step]).map(move |step| (i, step));
         for (i, step) in (0..n).flat_map(next) {
             if near(&(at[i] + step)) {
@@ -97,6 +131,7 @@ impl Pattern {
                 pattern.beyond.push(place);
             }
         }
+        pattern.at = (0..n).filter(|&i| pattern.repeats[i]).map(|i| at[i]).collect();
         Some(pattern)
     }
 
@@ -106,17 +141,101 @@ impl Pattern {
         (distinctive.iter().filter(|&&distinctive| distinctive).count() >= TELLING).then_some(distinctive)
     }
 
-    /// The evidence of the pattern alone, and around the object, for the points of a mode.
+    /// Adds to each mode the evidence of the pattern around the object; the best mode is then the first.
     ///
-    /// Points of the pattern are as visible within the object as beyond it, and all numbers are equally probable;
-    /// points outside the pattern belong to the object only.
-    pub(in crate::search) fn repeated_pattern(
+    /// Detectors and matchers lose a pattern in blocks, such as a row. If the pattern continues beyond the object,
+    /// unseen points therefore do not distinguish the shifts within it: a shift has at least the evidence of the best
+    /// mode, changed by the prior, by the residuals and by the points outside the pattern alone. Poses that identify no
+    /// such point are compared by the prior alone: a few corners with larger errors than stated decide their residuals.
+    ///
+    /// Returns the evidence of the pattern without the object at the best mode; `None` without modes.
+    pub(in crate::search) fn weigh(
         &self,
         problem: &Problem<'_>,
-        terms: &Terms,
-        graph: &ConsistencyGraph,
+        parts: (&Terms, &PriorTerms, &ConsistencyGraph),
+        modes: &mut Vec<Mode>,
+    ) -> Option<f64> {
+        let shifts = self.shifts_from_first(modes);
+        let add = |(at, mut mode): (usize, Mode)| {
+            let others = shifts[at].iter().flat_map(|own| shifts.iter().flatten().map(move |other| other - own));
+            let beyond = self.beyond_all(others);
+            let continued = self.continued(problem, parts, &mode, &beyond);
+            let around = continued.around;
+            let (less, more) =
+                if around < mode.ln_evidence { (around, mode.ln_evidence) } else { (mode.ln_evidence, around) };
+            mode.ln_evidence = more + libm::log1p(libm::exp(less - more));
+            (mode, continued, shifts[at].is_some())
+        };
+        let mut ranked: Vec<(Mode, Continued, bool)> = modes.drain(..).enumerate().map(add).collect();
+        let by_evidence =
+            |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
+        ranked.sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
+        if let Some((best, of_best, true)) = ranked.first()
+            && of_best.continues
+        {
+            let (ln_evidence, of_best) = (best.ln_evidence, *of_best);
+            for (other, continued, _) in ranked.iter_mut().filter(|(.., shifted)| *shifted) {
+                // Not above the best: only evidence decides which of them is the first.
+                let equal = ln_evidence + continued.against(&of_best).min(0.0);
+                other.ln_evidence = other.ln_evidence.max(equal);
+            }
+            ranked[1..].sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
+        }
+        let alone = ranked.first().map(|(_, continued, _)| continued.alone);
+        modes.extend(ranked.into_iter().map(|(mode, ..)| mode));
+        alone
+    }
+
+    /// The shift of each mode from the first, if it is one: the same attitude, and a step onto the pattern itself.
+    fn shifts_from_first(&self, modes: &[Mode]) -> Vec<Option<Vector3<f64>>> {
+        let lattice = Lattice::of(&self.basis, 1.0);
+        let reach = self.at.iter().map(|p| p.norm()).fold(0.0, f64::max);
+        let shift = |mode: &Mode| {
+            let first = &modes[0].motion;
+            let turned = (mode.motion.rotation - first.rotation).norm() * reach;
+            let centroid = self.at.iter().sum::<Vector3<f64>>() / self.at.len() as f64;
+            let step = first.rotation.transpose() * (mode.motion.apply(&centroid) - first.apply(&centroid));
+            (turned <= MIN_STEP * self.off && lattice.off(&step) <= MIN_STEP * self.off).then(|| lattice.nearest(&step))
+        };
+        modes.iter().map(shift).collect()
+    }
+
+    /// The places beyond the object at which the pattern may continue, if the object may also be at these shifts.
+    ///
+    /// Poses that differ by a shift are compared over the same places: what one explains as the object, the other
+    /// explains as the pattern around it. With the next places of each pose alone, a pose that lies further within the
+    /// pattern would explain more of the cloud.
+    fn beyond_all(&self, shifts: impl Iterator<Item = Vector3<f64>>) -> Vec<Vector3<f64>> {
+        let mut beyond = self.beyond.clone();
+        let same = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).norm() <= 2.0 * self.off;
+        for shift in shifts.take(MAX_REGION).filter(|shift| *shift != Vector3::zeros()) {
+            for place in self.at.iter().chain(&self.beyond).map(|place| place + shift) {
+                if !self.at.iter().chain(&beyond).any(|known| same(known, &place)) {
+                    beyond.push(place);
+                }
+            }
+        }
+        beyond
+    }
+
+    /// The evidence of the continued pattern at the pose of a mode, over the places `beyond` the object.
+    ///
+    /// Let k of n model points be seen, and m of the M places beyond the object. The pattern alone shows them all
+    /// with one visible fraction, B(k + m, n + M), since the object ends nowhere in it; around the object it has a
+    /// fraction of its own, B(k, n)·B(m, M). Points outside the pattern belong to the object only.
+    ///
+    /// A pattern without the object is one of two. The object's own pattern may hold the object at another shift: that
+    /// has the prior probability of the other shifts ([`ln_shifted`]). If points of the object are unseen while the
+    /// pattern continues, both are equally likely, since matchers lose a pattern in blocks: only a complete
+    /// identification shows where the object ends. Another pattern with the same steps has the prior probability of
+    /// structured clutter ([`LN_RESEMBLES`]), and its phase is uniform ([`ln_phase`]).
+    pub(in crate::search) fn continued(
+        &self,
+        problem: &Problem<'_>,
+        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
         mode: &Mode,
-    ) -> RepeatedPattern {
+        beyond: &[Vector3<f64>],
+    ) -> Continued {
         let repeats = |v: &&usize| self.repeats[graph.vertices[**v].model];
         let of_pattern: Vec<usize> = mode.members.iter().filter(repeats).copied().collect();
         let own: f64 = mode.members.iter().filter(|v| !repeats(v)).map(|&v| terms.residual_gain(v, &mode.motion)).sum();
@@ -125,25 +244,31 @@ impl Pattern {
         let ln_clutter = of_pattern.iter().map(|&v| terms.ln_density_about(v, graph.vertices[v].model)).sum::<f64>()
             / seen.max(1) as f64;
         let (mut further, mut gains) = (0, 0.0);
-        for place in self.beyond.iter().map(|place| mode.motion.apply(place)) {
-            let free = problem
-                .cloud
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| mode.members.iter().all(|&v| graph.vertices[v].cloud != *j));
+        let mut taken = vec![false; problem.cloud.len()];
+        mode.members.iter().for_each(|&v| taken[graph.vertices[v].cloud] = true);
+        for place in beyond.iter().map(|place| mode.motion.apply(place)) {
+            let free = problem.cloud.iter().zip(&taken).filter(|(_, taken)| !**taken);
             let gain = free
-                .filter_map(|(_, point)| ln_measured(&point.position, &place))
+                .filter_map(|(point, _)| ln_measured(&point.position, &place))
                 .map(|ln_density| ln_density - ln_clutter)
                 .fold(0.0, f64::max);
             gains += gain;
             further += usize::from(gain > 0.0);
         }
+        let beyond = beyond.len();
         let shown = mode.ln_evidence - ln_fraction(k, n) - own;
-        let goes_on = gains + ln_fraction(seen + further, all + self.beyond.len());
+        let goes_on = gains + ln_fraction(seen + further, all + beyond);
         // Enough points outside the pattern must identify the object: the pattern itself may end anywhere.
         let ends = if n - all >= TELLING { ln_fraction(seen, all) } else { f64::NEG_INFINITY };
-        let alone = shown + goes_on.max(ends);
-        RepeatedPattern { alone, around: alone + own + ln_fraction(k - seen, n - all) }
+        let around = mode.ln_evidence + gains + ln_fraction(further, beyond);
+        let likely = shown + goes_on.max(ends);
+        let incomplete = seen < all && further > 0;
+        let own_pattern = if incomplete { likely.max(around - own) } else { likely };
+        let another = likely + LN_RESEMBLES + ln_phase(&self.basis, prior_terms, &mode.motion);
+        let alone = another.max(own_pattern + ln_shifted(&self.basis, prior_terms, &mode.motion));
+        let in_blocks = mode.ln_evidence - ln_fraction(k, n) + ln_fraction(k - seen, n - all) + gains;
+        let ln_prior = prior_terms.known.as_ref().map_or(0.0, |_| prior_terms.ln_density(&mode.motion));
+        Continued { alone, around, in_blocks, ln_prior, identifies: k > seen, continues: further > 0 }
     }
 }
 
@@ -195,11 +320,15 @@ impl Lattice {
         Self { multiples: inverse.unwrap_or_else(|| DMatrix::zeros(basis.len(), 3)), basis }
     }
 
+    /// The nearest lattice vector of a step.
+    fn nearest(&self, step: &Vector3<f64>) -> Vector3<f64> {
+        let multiples = &self.multiples * step;
+        self.basis.iter().zip(multiples.iter()).map(|(basis, m)| basis * m.round()).sum()
+    }
+
     /// The distance of a step from the nearest lattice vector.
     fn off(&self, step: &Vector3<f64>) -> f64 {
-        let multiples = &self.multiples * step;
-        let full = self.basis.iter().zip(multiples.iter()).map(|(basis, m)| basis * m.round());
-        (step - full.sum::<Vector3<f64>>()).norm()
+        (step - self.nearest(step)).norm()
     }
 }
 

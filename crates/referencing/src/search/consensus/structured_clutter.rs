@@ -3,11 +3,12 @@
 use nalgebra::Vector3;
 
 use super::{
+    fractions::ln_fraction,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms, ln_fraction},
+    likelihood::{Mode, Terms},
     prior_terms::PriorTerms,
 };
-use crate::{Problem, search::alike::slack};
+use crate::{problem::Problem, search::alike::slack};
 
 /// The evidence of clutter that resembles the object, from a pose elsewhere.
 ///
@@ -82,7 +83,8 @@ impl<'a> Occupied<'a> {
         let reported: f64 = reported.iter().map(|&v| terms.residual_gain(v, &self.best.motion).max(0.0)).sum();
         let given = other.ln_evidence_of(terms, prior_terms, &own) + ln_fraction(other.members.len(), all);
         StructuredClutter {
-            ln_evidence: other.ln_evidence - given + ln_fraction(s, s + empty),
+            // `given` assumes uniform clutter; sparser clutter must not count as structure.
+            ln_evidence: other.ln_evidence + other.ln_clutter_density.min(0.0) - given + ln_fraction(s, s + empty),
             ln_alone: ln_fraction(k.len() + s, imitable + f)
                 - ln_fraction(k.len(), imitable)
                 - ln_fraction(s, f)

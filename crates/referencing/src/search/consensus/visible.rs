@@ -38,7 +38,7 @@ pub(super) fn ln_visible(gains: &[f64], ln_fraction: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::likelihood::ln_fraction, *};
+    use super::{super::fractions::ln_fraction, *};
 
     fn fractions(n: usize) -> Vec<f64> {
         (0..=n).map(|k| ln_fraction(k, n)).collect()

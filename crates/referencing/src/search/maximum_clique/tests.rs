@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 
 use super::*;
-use crate::{Candidates, ModelPoint, Tolerance};
+use crate::{candidates::Candidates, problem::Tolerance, site::model::ModelPoint};
 
 #[test]
 fn settings_out_of_range_are_refused() {
@@ -48,6 +48,7 @@ impl Scene {
             candidates: &self.candidates,
             tolerance: Tolerance::Fixed(0.01),
             prior: None,
+            edges: Default::default(),
         }
     }
 

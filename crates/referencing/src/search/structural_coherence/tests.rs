@@ -2,7 +2,7 @@ use rand::SeedableRng;
 use seafix_geometry::{MeasuredPoint, Point, UncertainPoint};
 
 use super::*;
-use crate::{Candidates, ModelPoint, Tolerance};
+use crate::{candidates::Candidates, problem::Tolerance, site::model::ModelPoint};
 
 #[test]
 fn a_search_without_a_budget_is_refused() {
@@ -61,6 +61,7 @@ impl Scene {
             candidates: &self.candidates,
             tolerance: Tolerance::Fixed(0.01),
             prior: None,
+            edges: Default::default(),
         }
     }
 }

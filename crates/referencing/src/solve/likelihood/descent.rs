@@ -97,6 +97,11 @@ pub(crate) fn model_errors(
 }
 
 impl Linearized {
+    /// The normal equations with these parts.
+    pub(crate) fn from_parts(normal: &Matrix6<f64>, gradient: Vector6<f64>, cost: f64) -> Self {
+        Self { normal: Normal::of_matrix(normal), gradient, cost }
+    }
+
     /// The sum with the terms of `other`.
     pub(crate) fn plus(mut self, other: &Self) -> Self {
         self.normal.join(&other.normal);
@@ -122,6 +127,11 @@ impl Linearized {
         inverse(&self.normal.matrix())
     }
 
+    /// The information on ξ, Σ Jᵀ W J.
+    pub(crate) fn information(&self) -> Matrix6<f64> {
+        self.normal.matrix()
+    }
+
     /// The squared length of a step in standard deviations: ξᵀ Σ⁻¹ ξ.
     pub(crate) fn away(&self, step: &Vector6<f64>) -> f64 {
         step.dot(&(self.normal.matrix() * step))
@@ -143,7 +153,7 @@ impl Linearized {
         decrement.is_finite().then_some((step, decrement))
     }
 
-    fn determined(&self, damping: f64) -> Result<(Vector6<f64>, f64), Degenerate> {
+    pub(crate) fn determined(&self, damping: f64) -> Result<(Vector6<f64>, f64), Degenerate> {
         self.step(damping).ok_or_else(|| singular(&self.normal.matrix()))
     }
 }
@@ -236,7 +246,7 @@ const MIN_FRACTION: f64 = 0.01;
 const SHRINK: f64 = 1e-2;
 
 /// `pose · Exp(step)` to second order, with an exact rotation.
-fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Object, Camera> {
+pub(crate) fn moved(pose: &Transform<Object, Camera>, step: &Vector6<f64>) -> Transform<Object, Camera> {
     // A rotation of more than half a radian exceeds the validity of the normal equations.
     let turn = step.fixed_rows::<3>(0).norm();
     let step = if turn > 0.5 { step * (0.5 / turn) } else { *step };

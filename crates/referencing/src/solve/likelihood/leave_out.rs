@@ -1,5 +1,6 @@
 //! Leave-out poses: the maximum-likelihood pose without some of the points.
 
+use nalgebra::{Matrix6, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::{
@@ -9,6 +10,7 @@ use crate::{
         likelihood::{
             descent::{Linearized, Terms, linearize},
             initial_poses::STARTS,
+            mixed::Mixed,
             pixel_terms::rig_of_pixels,
             point_fit::{covariance, solved},
             scale_error::{ScaleError, scale_error},
@@ -18,14 +20,20 @@ use crate::{
 
 /// The contribution of each point to the normal equations; an exclusion costs one 6×6 solve.
 pub(crate) struct Deletions<'a> {
-    data: &'a Observations<'a>,
-    pose: Transform<Object, Camera>,
-    all: Linearized,
-    each: Vec<Linearized>,
+    pub(super) data: &'a Observations<'a>,
+    pub(super) pose: Transform<Object, Camera>,
+    pub(super) all: Linearized,
+    pub(super) each: Vec<Linearized>,
+    /// The place of each feature: of a point, or of the middle of an edge (object frame).
+    pub(crate) places: Vec<Vector3<f64>>,
+    /// The part of the covariance by model errors that edges share.
+    shared: Matrix6<f64>,
     /// The scale error of all points; `None` if they determine none.
     pub(crate) scale_error: Option<ScaleError>,
 }
 
+/// Decrement of a negligible step of a pose of points and edges.
+const SMALL: f64 = 1e-12;
 /// Minimum number of remaining points for a single step; with fewer another minimum may be the best.
 const ENOUGH: usize = 5;
 /// Largest squared step (standard deviations) that counts as linear.
@@ -34,6 +42,34 @@ const NEAR: f64 = 1.0;
 const SURE: f64 = 0.01;
 
 impl<'a> Deletions<'a> {
+    /// The contributions about the maximum near a pose of all features; `None` if they determine no pose.
+    ///
+    /// The pose matters for sets with edges only.
+    pub(crate) fn near(data: &'a Observations<'a>, pose: &Transform<Object, Camera>) -> Option<Self> {
+        if data.edges.is_empty() {
+            return Self::of(data);
+        }
+        let rig = rig_of_pixels(data);
+        let mixed = Mixed::of(data, rig, data.rig).ok()?;
+        // The contributions are those without shared errors, and so is the pose at which their sum vanishes.
+        let (pose, _) = mixed.independent_minimum(pose, SMALL).ok()?;
+        let here = mixed.shared(&pose).ok()?;
+        let each = mixed.each(&pose).ok()?;
+        let mut all = *each.first()?;
+        each[1..].iter().for_each(|one| all = all.plus(one));
+        let shared = here.covariance().ok()? - all.covariance().ok()?;
+        let points = data.points.iter().map(|point| point.model.coords);
+        let edges = data.edges.iter().map(|edge| (edge.model[0].coords + edge.model[1].coords) / 2.0);
+        let places = points.chain(edges).collect();
+        // Any three points have a scale of their own.
+        let enough = data.points.len() > 3;
+        let scale_error = enough.then(|| {
+            let points = Observations { edges: Vec::new(), ..data.clone() };
+            Deletions::of(&points).and_then(|of_points| of_points.scale_error)
+        });
+        Some(Self { data, pose, all, each, places, shared, scale_error: scale_error.flatten() })
+    }
+
     /// `None` if all points together determine no pose.
     pub(crate) fn of(data: &'a Observations<'a>) -> Option<Self> {
         let solved = likely(data, |pose, terms| {
@@ -44,7 +80,8 @@ impl<'a> Deletions<'a> {
         let (pose, each, scale_error) = solved.ok()?;
         let mut all = *each.first()?;
         each[1..].iter().for_each(|one| all = all.plus(one));
-        Some(Self { data, pose, all, each, scale_error })
+        let places = data.points.iter().map(|point| point.model.coords).collect();
+        Some(Self { data, pose, all, each, places, shared: Matrix6::zeros(), scale_error })
     }
 
     /// The maximum-likelihood pose without the points `out`, and its covariance.
@@ -59,12 +96,20 @@ impl<'a> Deletions<'a> {
                 && let Some((step, decrement)) = left.step(0.0)
                 && decrement <= NEAR
             {
+                let edges = !self.data.edges.is_empty();
+                let covariance = if edges { covariance + self.shared } else { covariance };
                 return Some((self.pose.perturbed(&step), Covariance6::new(covariance)));
             }
         }
         let mut fewer = self.data.clone();
         let mut place = 0..;
         fewer.points.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
+        fewer.edges.retain(|_| place.next().is_none_or(|k| !out.contains(&k)));
+        if !fewer.edges.is_empty() {
+            let mixed = Mixed::of(&fewer, rig_of_pixels(&fewer), fewer.rig).ok()?;
+            let (pose, here) = mixed.minimum(&self.pose).ok()?;
+            return Some((pose, Covariance6::new(here.covariance().ok()?)));
+        }
         likely(&fewer, |pose, terms| Ok((*pose, covariance(&fewer, pose, terms)?))).ok()
     }
 }
@@ -83,9 +128,8 @@ mod tests {
     use super::*;
     use crate::{
         observations::Observation,
-        solve::{Mahalanobis, Solver},
+        solve::{mahalanobis::Mahalanobis, solver::Solver},
     };
-    use nalgebra::Vector3;
     use seafix_geometry::{Point, UncertainPoint};
 
     /// Seven points without pixels, one of them with a small error.
@@ -102,7 +146,7 @@ mod tests {
                 model_sigma: 0.0,
             }
         });
-        Observations { points: points.collect(), rig: None }
+        Observations { points: points.collect(), edges: Vec::new(), rig: None }
     }
 
     #[test]

@@ -46,6 +46,12 @@ impl Normal {
         self.shift -= other.shift;
     }
 
+    /// The sums whose matrix this symmetric one is.
+    pub(crate) fn of_matrix(all: &Matrix6<f64>) -> Self {
+        let block = |row: usize, column: usize| all.fixed_view::<3, 3>(row, column).into_owned();
+        Self { turn: block(0, 0), mixed: block(0, 3), shift: block(3, 3) }
+    }
+
     pub(crate) fn matrix(&self) -> Matrix6<f64> {
         let mut all = Matrix6::zeros();
         all.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.turn);

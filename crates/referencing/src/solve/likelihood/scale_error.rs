@@ -88,7 +88,7 @@ mod tests {
             model: corner(k),
             model_sigma: 0.0,
         };
-        let data = Observations { points: (0..8).map(seen).collect(), rig: None };
+        let data = Observations { points: (0..8).map(seen).collect(), edges: Vec::new(), rig: None };
         solved(&data, None, 1, |pose, terms| Ok(scale_error(&data.points, pose, terms))).unwrap()
     }
 
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn no_points_have_none() {
-        let data = Observations { points: Vec::new(), rig: None };
+        let data = Observations { points: Vec::new(), edges: Vec::new(), rig: None };
         let pose = Transform::exp(&[0.0; 6].into());
         assert_eq!(scale_error(&data.points, &pose, &|_, _: &_| None), None);
     }

@@ -58,7 +58,7 @@ impl<'a> StereoCameras<'a> {
 
 impl<'a> CameraModel<'a> {
     fn of(camera: &'a Pinhole) -> Self {
-        let plain = camera.distortion().shortest().is_empty();
+        let plain = camera.distortion().is_none();
         Self { camera, plain, focal: camera.focal(), principal: camera.principal() }
     }
 

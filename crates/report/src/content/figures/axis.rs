@@ -11,7 +11,7 @@ use crate::{
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::{distinct, headed, short},
     number::{Key, Number},
-    paper::PAPER_FIT_RMS,
+    published::Published,
     run::{Run, Trial},
     summary::{Distribution, Row, RunSummary},
 };
@@ -19,7 +19,7 @@ use crate::{
 /// A quantity with its distribution in a row and its axis label.
 type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
 
-/// The figure of fit RMS and TRE over the condition, with the paper's range.
+/// The figure of fit RMS and TRE over the condition, with published ranges.
 ///
 /// Over distance it also shows growth with z and z².
 pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
@@ -40,6 +40,7 @@ pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let mut data =
         Table::new("error-over-condition", text!["The data of the figure of error over the condition."], heads);
     let metrics: [Metric; 2] = [(Field::Fit, |row| row.fit, "fit RMS (mm)"), (Field::Tre, |row| row.tre, "TRE (mm)")];
+    let published = Published::of(run);
     let mut plotted = Vec::new();
     for (field, value, label) in metrics {
         let mut layers = Vec::new();
@@ -79,10 +80,7 @@ pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
         if ranges(&key) {
             layers.splice(0..0, laws(&ticks, &all));
         }
-        if field == Field::Fit {
-            let [from, to] = PAPER_FIT_RMS.map(|m| m * 1e3);
-            layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
-        }
+        layers.splice(0..0, Published::shaded(&published, field));
         let x = Axis { logarithmic: wide, ..Axis::linear(headed(&key)) }.at(ticks.clone());
         let y = Axis::logarithmic(label);
         plotted.push(Panel { title: String::new(), x, y, layers, equal: false });
@@ -91,8 +89,9 @@ pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let chart = Chart { panels: plotted, columns: 2, page: true, shape: 0.78, legend };
     let laws = if ranges(&key) { " Thin grey lines: growth with the distance z and with its square." } else { "" };
     let message = format!(
-        "Error over {}: medians of the fixes, with bars from the 5 % to the 95 % quantile, slightly shifted apart. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m.{laws}",
-        short(&key)
+        "Error over {}: medians of the fixes, with bars from the 5 % to the 95 % quantile, slightly shifted apart.{laws}{}",
+        short(&key),
+        Published::caption(&published, &metrics.map(|(field, ..)| field))
     );
     figure("error-over-condition", caption(&message, run), &chart, data)
 }

@@ -9,7 +9,7 @@ use crate::{
     field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::distinct,
-    paper::PAPER_FIT_RMS,
+    published::Published,
     run::Run,
     summary::RunSummary,
 };
@@ -60,14 +60,12 @@ pub(crate) fn errors(run: &Run) -> Option<Figure> {
             );
         }
     }
+    let published = Published::of(run);
     let panels = metrics.into_iter().zip(points).map(|((field, label), points)| {
         let marks = points.into_iter().enumerate();
         let mut layers: Vec<Layer> =
             marks.map(|(series, points)| Layer::Marks { series, points, radius: 1.8 }).collect();
-        if field == Field::Fit {
-            let [from, to] = PAPER_FIT_RMS.map(|m| m * 1e3);
-            layers.insert(0, Layer::Range { from, to, note: "the paper, 2–5 m".to_owned() });
-        }
+        layers.splice(0..0, Published::shaded(&published, field));
         Panel { x: Axis::linear("frame"), y: Axis::logarithmic(label), layers, ..Panel::default() }
     });
     let legend = if names.len() > 1 {
@@ -76,6 +74,9 @@ pub(crate) fn errors(run: &Run) -> Option<Figure> {
         Vec::new()
     };
     let chart = Chart { panels: panels.collect(), columns: 2, page: true, shape: 0.7, legend };
-    let message = "Error of every fix over the frames; a frame without a mark has no fix. Shaded: the fit RMS that the paper reports for its virtual scene at 2–5 m, which has another scene and camera.";
-    figure("error-over-frames", caption(message, run), &chart, data)
+    let message = format!(
+        "Error of every fix over the frames; a frame without a mark has no fix.{}",
+        Published::caption(&published, &metrics.map(|(field, _)| field))
+    );
+    figure("error-over-frames", caption(&message, run), &chart, data)
 }

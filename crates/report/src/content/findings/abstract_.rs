@@ -3,10 +3,8 @@
 use crate::{
     content::{findings::answer, phrases},
     document::{Text, bold, code, text},
-    format::number,
     number::Number,
     paired::Comparison,
-    paper::{self, PAPER_FIT_RMS},
     run::{Run, Trial},
     summary::{Row, RunSummary},
 };
@@ -54,15 +52,7 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     }
     let mut texts: Vec<Text> = changed(run).into_iter().chain([first]).collect();
     texts.extend(answer::sentences(run, summary, comparisons));
-    // The paper's figure is comparable only with its own solver, on images.
-    if !summary.rows.iter().any(|row| row.solver == "triad") || run.trials.iter().all(|trial| !trial.images) {
-        return texts;
-    }
-    let [low, high] = PAPER_FIT_RMS.map(|m| number(Some(m * 1e3), 0));
-    texts.push(text![format!(
-        "For comparison, the paper reports a fit RMS of {low}–{high} mm for its own virtual scene at 2–5 m; it reports neither fix rates nor pose errors ({}).",
-        paper::CITATION
-    )]);
+    texts.extend(summary.published.iter().map(|sentence| text![sentence.clone()]));
     texts
 }
 

@@ -134,7 +134,13 @@ fn targets(header: &TrialHeader) -> String {
 
 fn camera(camera: &CameraRecord) -> String {
     let k = camera.matrix;
-    let distortion = if camera.distortion.iter().all(|k| *k == 0.0) { "no distortion" } else { "with distortion" };
+    let distortion = if camera.equidistant {
+        "equidistant"
+    } else if camera.distortion.iter().all(|k| *k == 0.0) {
+        "no distortion"
+    } else {
+        "with distortion"
+    };
     format!("{} × {} px, f = {:.1}, {:.1} px, {distortion}", camera.size[0], camera.size[1], k[0][0], k[1][1])
 }
 

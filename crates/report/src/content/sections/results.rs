@@ -11,9 +11,7 @@ use crate::{
     },
     document::{Block, Cell, Head, Section, Span, Table, italic, text},
     field::Field,
-    format::number,
     paired::Comparison,
-    paper::PAPER_FIT_RMS,
     run::Run,
     summary::{Distribution, Row, RunSummary},
 };
@@ -145,13 +143,6 @@ fn errors(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Table 
         line.push(phrases::statistic(trial, "mean", Field::Nees, "found", row.nees_mean, (Unit::Plain, 2)).into());
         table.line(breaks(summary, index), line);
     }
-    let [low, high] = PAPER_FIT_RMS.map(|m| number(Some(m * 1e3), 0));
-    let mut line = vec![Cell::from("The paper")];
-    line.extend((1..heads(summary).len()).map(|_| Cell::from("")));
-    line.push("–".into());
-    line.push(Cell::over(2, format!("{low}–{high}")));
-    line.push(Cell { minor: true, ..Cell::over(10, "virtual scene, three points, 2–5 m; no other figure reported") });
-    table.line(true, line);
     table
 }
 

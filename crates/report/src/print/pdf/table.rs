@@ -1,7 +1,7 @@
 //! Tables with columns as wide as their content, split over several pages if long.
 
 use crate::{
-    document::{Cell, Head, Line, Span, Table, bold},
+    document::{Head, Line, Span, Table, bold},
     fonts::Font,
     print::pdf::{
         SMALL,
@@ -122,40 +122,29 @@ impl Grid {
     }
 
     /// The style of a cell with its position.
-    fn of_cell(&self, table: &Table, place: usize, cell: &Cell) -> Style {
-        let align = match cell.width() {
-            1 if table.numbers(place) => Align::Right,
-            1 => Align::Left,
-            _ => Align::Centre,
-        };
-        self.style(self.span(place, cell.width()), align, Font::Regular)
+    fn of_cell(&self, table: &Table, place: usize) -> Style {
+        let align = if table.numbers(place) { Align::Right } else { Align::Left };
+        self.style(self.span(place, 1), align, Font::Regular)
     }
 
     fn height(&self, table: &Table, line: &Line) -> f64 {
-        let mut place = 0;
         let mut max = 1;
-        for cell in &line.cells {
-            if cell.prose {
-                max = max.max(paragraph::lines(&cell.text, self.of_cell(table, place, cell)));
-            }
-            place += cell.width();
+        for (place, cell) in line.cells.iter().enumerate().filter(|(_, cell)| cell.prose) {
+            max = max.max(paragraph::lines(&cell.text, self.of_cell(table, place)));
         }
         max as f64 * self.size * LEADING
     }
 
     fn line(&self, sheets: &mut Sheets, table: &Table, line: &Line, top: f64) {
-        let mut place = 0;
-        for cell in &line.cells {
-            let style = self.of_cell(table, place, cell);
+        for (place, cell) in line.cells.iter().enumerate() {
+            let style = self.of_cell(table, place);
             // Cells other than prose stay on one line, even if rounding makes them slightly too wide.
             let style = match (cell.prose, style.align) {
                 (true, _) => style,
                 (_, Align::Right) => Style { left: style.left - 40.0, width: style.width + 40.0, ..style },
                 _ => Style { width: style.width + 40.0, ..style },
             };
-            let style = if style.align == Align::Centre { Style { width: style.width - 40.0, ..style } } else { style };
             set_at(sheets, &cell.text, style, top);
-            place += cell.width();
         }
     }
 
@@ -207,14 +196,7 @@ impl Grid {
 }
 
 fn prose(table: &Table, place: usize) -> bool {
-    table.lines.iter().any(|line| {
-        let mut at = 0;
-        line.cells.iter().any(|cell| {
-            let here = at == place && cell.prose;
-            at += cell.width();
-            here
-        })
-    })
+    table.lines.iter().any(|line| line.cells.get(place).is_some_and(|cell| cell.prose))
 }
 
 /// The width of the widest cell or head of one column (pt).
@@ -222,14 +204,8 @@ fn needed(table: &Table, place: usize, size: f64) -> f64 {
     let style = Style { size, align: Align::Left, left: 0.0, width: f64::INFINITY, font: Font::Regular };
     let head = table.heads.last().and_then(|heads| heads.get(place)).map_or("", |head| &head.text[..]);
     let mut max = natural(&[Span::Italic(head.to_owned())], style);
-    for line in &table.lines {
-        let mut at = 0;
-        for cell in &line.cells {
-            if at == place && cell.width() == 1 {
-                max = max.max(natural(&cell.text, style));
-            }
-            at += cell.width();
-        }
+    for cell in table.lines.iter().filter_map(|line| line.cells.get(place)) {
+        max = max.max(natural(&cell.text, style));
     }
     max + 0.01
 }

@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::keys::{COLUMNS, Keys, Three, count_of_key, key_of_count, key_of_number, number_of_key};
-use crate::Table;
+use crate::describe::Table;
 
 /// The number of left descriptors that are compared at once: their sums fit in registers and do not wait for each
 /// other.

@@ -5,8 +5,9 @@ use seafix_geometry::{Covariance6, MeasuredPoint, Transform, UncertainPoint};
 
 use super::*;
 use crate::{
-    Candidates, Prior, PriorBound, Problem, Tolerance,
-    search::consensus::{Seeds, bits::is_set, likelihood::ln_volume},
+    candidates::Candidates,
+    problem::{Prior, PriorBound, Problem, Tolerance},
+    search::consensus::{bits::is_set, likelihood::ln_volume, seeds::Seeds},
 };
 
 const POINTS: usize = 6;
@@ -88,14 +89,28 @@ fn fractions_are_no_more_than_what_all_cost() {
             model.iter().map(seen).map(|position| MeasuredPoint { position, pixels: None }).collect();
         let candidates = Candidates::from_pairs(10, (0..10).map(|i| (i, i)));
         let tolerance = Tolerance::Fixed(0.1);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);
         let none = BTreeSet::new();
         let motion = Motion { rotation: Matrix3::identity(), translation: ahead };
         // Every set examined has less evidence: none becomes the best.
-        let other = Mode { members: Vec::new(), motion, ln_evidence: 1e9, ln_even: 1e9, ln_clutter_density: 0.0 };
+        let other = Mode {
+            members: Vec::new(),
+            edges: Vec::new(),
+            motion,
+            ln_evidence: 1e9,
+            ln_even: 1e9,
+            ln_clutter_density: 0.0,
+        };
         let mut prover = Prover::of(&model, (&terms, &prior_terms, &graph), &none, &other, 0);
         let begun = (0..4).fold(Begun::default(), |begun, v| prover.join(&begun, v));
         let begun = prover.fitted(&begun);
@@ -134,7 +149,14 @@ fn compare(rounds: u64) {
         };
         let prior = bound.map(|bound| Prior { object_from_camera: at, bound });
         let (tolerance, prior) = (Tolerance::Fixed(0.3), prior.as_ref());
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);

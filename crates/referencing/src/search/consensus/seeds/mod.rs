@@ -1,6 +1,7 @@
 //! Best-first enumeration of the coherent triples that may lead to a pose of interest.
 
 mod elsewhere;
+mod guided;
 mod queue;
 #[cfg(test)]
 mod tests;
@@ -10,17 +11,17 @@ use std::{cell::Cell, collections::BTreeSet};
 use nalgebra::Vector3;
 
 use super::{
-    Motion,
     bits::{Held, intersect, is_set, ones, shared},
     bound::{After, Bounds},
     distance_residual::{Edge, lost_to, residual_of_three},
     graph::ConsistencyGraph,
     likelihood::{Mode, Terms},
     local_maxima::Climb,
+    motion::Motion,
     prior_terms::PriorTerms,
 };
-use crate::{ModelPoint, lanes::ones_of};
-pub(in crate::search) use queue::Pair;
+use crate::{lanes::ones_of, site::model::ModelPoint};
+use queue::Pair;
 use queue::{Queue, order};
 
 /// Evidence (nats) below the best at which a pose is not searched for.
@@ -64,7 +65,7 @@ impl Swept {
     /// Adds modes found later; they replace known modes of the same members.
     pub(in crate::search) fn insert(&mut self, modes: Vec<Mode>) {
         for mode in modes {
-            self.modes.retain(|known| known.members != mode.members);
+            self.modes.retain(|known| known.members != mode.members || known.edges != mode.edges);
             insert(&mut self.modes, mode);
         }
     }
@@ -72,11 +73,17 @@ impl Swept {
 
 /// Inserts a mode in order, unless it is known.
 fn insert(modes: &mut Vec<Mode>, mode: Mode) {
-    if modes.iter().any(|known| known.members == mode.members) {
+    if modes.iter().any(|known| known.members == mode.members && known.edges == mode.edges) {
         return;
     }
     let before = |known: &Mode| {
-        known.ln_evidence.total_cmp(&mode.ln_evidence).reverse().then_with(|| known.members.cmp(&mode.members)).is_lt()
+        known
+            .ln_evidence
+            .total_cmp(&mode.ln_evidence)
+            .reverse()
+            .then_with(|| known.members.cmp(&mode.members))
+            .then_with(|| known.edges.cmp(&mode.edges))
+            .is_lt()
     };
     let place = modes.partition_point(before);
     modes.insert(place, mode);
@@ -135,6 +142,8 @@ pub(in crate::search) struct Seeds<'a> {
     /// The current set, and the sets from which an ascent started: they would lead to the same mode again.
     members: Vec<usize>,
     climbed: BTreeSet<Vec<usize>>,
+    /// Maximum work of guided seeds; none without.
+    guided: u64,
 }
 
 impl<'a> Seeds<'a> {
@@ -170,6 +179,7 @@ impl<'a> Seeds<'a> {
             of_three: Vec::new(),
             members: Vec::new(),
             climbed: BTreeSet::new(),
+            guided: 0,
         }
     }
 
@@ -180,12 +190,13 @@ impl<'a> Seeds<'a> {
     }
 
     pub(in crate::search) fn sweep(mut self) -> Swept {
+        let found = self.guide();
         let (full_sets, parts, complete) = self.pairs();
         let until = self.spent.saturating_add(self.parts.follow);
         self.parts.until = until;
         let looked_for = self.threshold();
         let (pairs, followed) = self.follow_all(full_sets, self.budget);
-        let complete = followed && complete;
+        let complete = found || followed && complete;
         let followed = self.follow_all(parts, until).1 && self.spent <= until;
         let parts = followed && self.parts.every == 1 && !self.parts.dropped;
         Swept { modes: self.modes, complete, pairs, looked_for, parts, pair_tests: self.spent }

@@ -4,7 +4,10 @@ use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{MeasuredPoint, UncertainPoint};
 
 use super::*;
-use crate::{Candidates, Problem, Tolerance};
+use crate::{
+    candidates::Candidates,
+    problem::{Problem, Tolerance},
+};
 
 const POINTS: usize = 9;
 const SEEN: usize = 6;
@@ -37,7 +40,14 @@ fn a_part_is_found_without_limits_and_the_complete_set_always() {
         let (model, cloud) = scene(&mut rng);
         let candidates = Candidates::all(POINTS, cloud.len());
         let tolerance = Tolerance::Fixed(0.06);
-        let problem = Problem { model: &model, cloud: &cloud, candidates: &candidates, tolerance, prior: None };
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);
@@ -58,4 +68,46 @@ fn a_part_is_found_without_limits_and_the_complete_set_always() {
         assert_eq!(clouds(&all), (0..POINTS).collect::<Vec<_>>());
         assert!(all.complete && all.pair_tests < seeds(&none, MIN).sweep().pair_tests);
     }
+}
+
+/// Putative pairs of a model of 1500 points, of which 60 are true.
+///
+/// Without guided seeds the enumeration reaches its budget. With them the set is found and counts as the best, and a
+/// second search without its points ends too. Fails if the seeds are not followed.
+#[test]
+fn a_large_set_is_found_by_guided_seeds() {
+    const PAIRS: usize = 1500;
+    const TRUE: usize = 60;
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut place = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+    let model: Vec<ModelPoint> = (0..PAIRS).map(|_| ModelPoint::exact("", place(1.0).into())).collect();
+    let turn = Rotation3::from_scaled_axis(place(1.0));
+    let seen = |i: usize, at: Vector3<f64>, clutter: Vector3<f64>| if i < TRUE { turn * at } else { clutter };
+    let cloud: Vec<MeasuredPoint> = (0..PAIRS)
+        .map(|i| seen(i, model[i].at.coords + place(0.02), place(1.0)))
+        .map(|at| MeasuredPoint { position: UncertainPoint::isotropic(at.into(), 0.02), pixels: None })
+        .collect();
+    let candidates = Candidates::from_pairs(PAIRS, (0..PAIRS).map(|i| (i, i)));
+    let tolerance = Tolerance::Fixed(0.085);
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance,
+        prior: None,
+        edges: Default::default(),
+    };
+    let prior_terms = PriorTerms::of(&problem).expect("a box");
+    let graph = ConsistencyGraph::of(&problem, &prior_terms);
+    let terms = Terms::of(&problem, &prior_terms, &graph);
+    let seeds = |taken, budget| Seeds::new(&model, (&terms, &prior_terms, &graph), taken, (MIN, 3.0), budget);
+    let (none, all): (_, BTreeSet<usize>) = (BTreeSet::new(), (0..TRUE).collect());
+    const SMALL: u64 = 1_000_000;
+    assert!(!seeds(&none, SMALL).sweep().complete);
+    let found = seeds(&none, SMALL).guided(100 * SMALL).sweep();
+    let members = found.modes.first().map(|mode| mode.pairs(&graph)).unwrap_or_default();
+    let right = members.iter().filter(|pair| pair.model < TRUE).count();
+    assert!(found.complete && right > 50 && members.len() - right < 3, "{right} of {}", members.len());
+    let copies = seeds(&all, SMALL).with_parts(50, SMALL, SMALL).guided(100 * SMALL).sweep();
+    assert!(copies.complete && copies.modes.iter().all(|mode| mode.members.len() < 20));
 }

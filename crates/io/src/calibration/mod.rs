@@ -1,0 +1,140 @@
+//! Stereo calibrations as other programs write them, one format a file.
+//!
+//! Every reader gives the numbers of a [`RigNumbers`]; a pixel's centre has whole coordinates, lengths are in metres.
+
+mod camera_info;
+mod colmap;
+mod euroc;
+mod found;
+mod kalibr;
+mod kitti;
+mod matlab;
+mod metashape;
+mod opencv;
+mod opencv_xml;
+mod text;
+
+use std::path::{Path, PathBuf};
+
+use seafix_component::{Fault, read_text};
+use seafix_geometry::StereoRig;
+
+use crate::dataset::RigNumbers;
+use found::Found;
+pub use found::Given;
+use text::Source;
+
+/// A stereo calibration with its origin.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    /// The numbers, as a data set description holds them.
+    pub numbers: RigNumbers,
+    /// The rig.
+    pub rig: StereoRig,
+    /// The name of the file's format.
+    pub format: &'static str,
+    /// What the file left open and how it was taken.
+    pub notes: Vec<String>,
+}
+
+/// Reads the calibration in `files`: one file, or one a camera (left, right), or intrinsics and extrinsics.
+///
+/// A partner that stands beside the first file under its usual name need not be named.
+///
+/// # Errors
+/// A file that cannot be read, has an unknown format, or an invalid number; a missing partner.
+pub fn read(files: &[PathBuf], given: Given) -> Result<Calibration, Fault> {
+    let mut sources = files.iter().map(|file| Source::read(file)).collect::<Result<Vec<_>, Fault>>()?;
+    let first = sources[0].file.clone();
+    if sources.len() == 1
+        && let Some(partner) = partner(&first)
+    {
+        sources.push(Source::read(&partner)?);
+    }
+    let readers = [
+        kalibr::read,
+        camera_info::read,
+        euroc::read,
+        opencv::read,
+        colmap::read,
+        metashape::read,
+        matlab::read,
+        kitti::read,
+    ];
+    for reader in readers {
+        if let Some(found) = reader(&sources, given)? {
+            return checked(found, &first);
+        }
+    }
+    let fault = Fault::new("not a known stereo calibration", &first);
+    Err(fault.remedy(
+        "give dataset.toml, Kalibr's camchain, ROS's left.yaml and right.yaml, OpenCV's yml or xml, EuRoC's sensor.yaml, \
+         COLMAP's cameras.txt and rigs.txt, Metashape's xml, MATLAB's Calib_Results_stereo.m or json, or KITTI's calib.txt",
+    ))
+}
+
+/// The file that usually stands beside `file` and completes it.
+fn partner(file: &Path) -> Option<PathBuf> {
+    let name = file.file_name()?.to_str()?;
+    let pairs = [
+        ("left", "right"),
+        ("Left", "Right"),
+        ("LEFT", "RIGHT"),
+        ("cam0", "cam1"),
+        ("camera0", "camera1"),
+        ("intrinsics", "extrinsics"),
+        ("cameras.txt", "rigs.txt"),
+        ("rigs.txt", "cameras.txt"),
+    ];
+    let beside = pairs
+        .iter()
+        .filter(|(from, _)| name.contains(from))
+        .map(|(from, to)| file.with_file_name(name.replacen(from, to, 1)));
+    // EuRoC has one folder a camera.
+    let folder = file.parent()?;
+    let other = folder.file_name().is_some_and(|name| name == "cam0").then(|| folder.with_file_name("cam1").join(name));
+    beside.chain(other).find(|partner| partner.is_file())
+}
+
+fn checked(found: Found, file: &Path) -> Result<Calibration, Fault> {
+    let Found { numbers, format, notes } = found;
+    let invalid = |(path, message): (Vec<&'static str>, String)| {
+        let (what, remedy) = message.split_once("; ").unwrap_or((&message, "correct the calibration"));
+        Fault::new(what, file).value(path.join(".")).remedy(remedy)
+    };
+    let rig = numbers.build().map_err(invalid)?;
+    Ok(Calibration { numbers, rig, format, notes })
+}
+
+/// Whether the text of `file` is that of a data set description or of another file of this program.
+pub fn is_foreign(file: &Path) -> bool {
+    file.extension().is_some_and(|end| ["yaml", "yml", "xml", "txt", "m", "json"].iter().any(|known| end == *known))
+}
+
+/// Whether `file` can be read as a calibration; its name alone does not tell.
+pub fn is_calibration(file: &Path) -> bool {
+    is_foreign(file)
+        && read_text(file).is_ok_and(|text| {
+            [
+                "cam0",
+                "camera_matrix",
+                "opencv_storage",
+                "%YAML",
+                "camera_model",
+                "distortion_model",
+                "<calibration",
+                "<sensors",
+                "CAMERA_ID",
+                "fc_left",
+                "RotationOfCamera2",
+                "PoseCamera2",
+                "P_rect_00",
+                "P0:",
+            ]
+            .iter()
+            .any(|word| text.contains(word))
+        })
+}
+
+#[cfg(test)]
+mod tests;

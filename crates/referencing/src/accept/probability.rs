@@ -1,0 +1,177 @@
+//! The probabilities that the object is absent, and that a pose is not the object's.
+//!
+//! This file alone turns what a search found into probabilities; the single setting
+//! [`Acceptance::max_p_wrong`](super::Acceptance::max_p_wrong) compares them with one number.
+
+use crate::{
+    a_contrario::{AContrario, expected_sets},
+    problem::{Correspondence, Problem},
+    search::{
+        identification::Identification,
+        limits::NEEDED,
+        posterior::{COPY, PosteriorProbabilities},
+    },
+};
+
+/// The probabilities by which an answer is accepted or rejected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Probability {
+    /// The probability that the object is absent.
+    pub(super) absent: f64,
+    /// The probability that the pose is not the object's: the object is absent, or has another pose.
+    pub(super) wrong: f64,
+}
+
+impl Probability {
+    /// The probabilities with other poses of this probability, given that the object is present.
+    pub(super) fn of(absent: f64, elsewhere: f64) -> Self {
+        Self { absent, wrong: absent + (1.0 - absent) * elsewhere }
+    }
+
+    /// The probabilities of pairs that a search counted.
+    ///
+    /// Such a search weighs no other pose: another pose that passes the tests makes the answer ambiguous.
+    pub(super) fn counted(problem: &Problem<'_>, pairs: &[Correspondence]) -> Self {
+        Self::of(by_nfa(expected_sets(problem, pairs)), 0.0)
+    }
+
+    /// The probabilities for one of `count` poses between which the data do not decide.
+    pub(super) fn among(self, count: usize) -> Self {
+        Self::of(self.absent, 1.0 - 1.0 / count.max(1) as f64)
+    }
+
+    /// The probabilities with further poses of this probability.
+    pub(super) fn beside(self, elsewhere: f64) -> Self {
+        Self { absent: self.absent, wrong: self.wrong + (1.0 - self.wrong) * elsewhere }
+    }
+
+    /// The probabilities of a search without a pose.
+    ///
+    /// The data show as little of an object with fewer than three visible points as of an absent one, so absence keeps
+    /// its prior probability of one half.
+    pub(super) const NOTHING_FOUND: Self = Self { absent: 0.5, wrong: 1.0 };
+}
+
+/// The probability of absence by the number of false alarms alone, NFA/(1 + NFA).
+///
+/// The NFA bounds the probability that frames without the object show such a set. With even prior odds of absence, and
+/// the set certain if the object is present, the odds of absence are at most the NFA. A NaN remains a NaN.
+pub(crate) fn by_nfa(nfa: f64) -> f64 {
+    // Not NFA/(1 + NFA): an infinite NFA has the probability one.
+    1.0 / (1.0 + 1.0 / nfa)
+}
+
+/// What is known of a set of pairs: the parts of which its probabilities are made.
+pub(super) struct Evidence<'a> {
+    problem: &'a Problem<'a>,
+    pairs: &'a [Correspondence],
+    /// The number of identified edges.
+    edges: usize,
+    /// The number of false alarms of points and edges together.
+    nfa_with_edges: Option<f64>,
+    /// The posterior of the search; `None` for a search that counts pairs.
+    posterior: Option<PosteriorProbabilities>,
+    /// The numbers of false alarms, computed on demand.
+    a_contrario: &'a AContrario<'a>,
+}
+
+impl<'a> Evidence<'a> {
+    /// The evidence for the answer of a search; poses within `limit` (m, RMS over the model points) are one answer.
+    pub(super) fn of(
+        problem: &'a Problem<'a>,
+        found: &'a Identification,
+        limit: f64,
+        a_contrario: &'a AContrario<'a>,
+    ) -> Self {
+        let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(problem.model, limit));
+        let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
+        let nfa_with_edges = ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp);
+        Self { problem, pairs: &found.pairs, edges: found.edges.len(), nfa_with_edges, posterior, a_contrario }
+    }
+
+    /// The probabilities of the answer.
+    pub(super) fn probability(&self) -> Probability {
+        match self.posterior {
+            None => Probability::counted(self.problem, self.pairs),
+            Some(posterior) => self.weighted(&posterior),
+        }
+    }
+
+    /// The probabilities if a second copy of the object is no clutter.
+    ///
+    /// Two sets that each explain the object are copies; neither is clutter of the other.
+    pub(super) fn with_copies(&self) -> Probability {
+        let without =
+            |of: PosteriorProbabilities| PosteriorProbabilities { absent: of.absent - of.clutter, clutter: 0.0, ..of };
+        self.posterior.map_or_else(|| self.probability(), |posterior| self.weighted(&without(posterior)))
+    }
+
+    /// Whether a pose beside the answer counts as a second copy of the object.
+    ///
+    /// Its evidence `ln_evidence` (nats) would be accepted by itself at `max`, or is nine nats: two possible objects
+    /// forbid a choice even if the second is not certain.
+    pub(super) fn is_copy(&self, ln_evidence: f64, max: f64) -> bool {
+        ln_evidence >= COPY || 1.0 / (1.0 + libm::exp(ln_evidence)) <= max
+    }
+
+    /// The number of false alarms: that of the points or, with edges, the smaller of it and that of all features.
+    ///
+    /// Each bounds the probability of such an answer without the object.
+    pub(super) fn nfa(&self) -> f64 {
+        match self.nfa_with_edges {
+            None => self.a_contrario.sets_as_good(),
+            Some(all) if all <= 1e-6 => all,
+            Some(all) => all.min(self.a_contrario.sets_as_good()),
+        }
+    }
+
+    /// The probabilities of an answer with a posterior.
+    ///
+    /// The posterior weighs the pose against clutter with the density that the frame itself shows. The NFA counts the
+    /// poses that clutter without any structure produces, and permuted partners those of mislabelled pairs; each is a
+    /// kind of absence that the evidence does not model, and the most probable kind holds.
+    fn weighted(&self, posterior: &PosteriorProbabilities) -> Probability {
+        let PosteriorProbabilities { absent, elsewhere, .. } = *posterior;
+        // Of a present object fewer points than determine a pose are visible with the probability 3/(n + 1); the data
+        // are then those of an absent one, and the pose is clutter.
+        let unseen = (absent * NEEDED as f64 / (self.problem.model.len() + 1) as f64).min(1.0);
+        // Too few edges as well: one at most.
+        let edges = self.problem.edges.with_candidates() as f64;
+        let unseen = if self.edges > 0 { unseen * (2.0 / (edges + 1.0)).min(1.0) } else { unseen };
+        let permuted = by_nfa(self.a_contrario.at_their_pose());
+        let absent_by_any = larger(larger(absent, permuted), by_nfa(self.nfa()));
+        let present = 1.0 - absent;
+        Probability::of(absent_by_any, if present > 0.0 { ((elsewhere + unseen) / present).min(1.0) } else { 0.0 })
+    }
+}
+
+/// The larger of two probabilities; a NaN if one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fails if the odds are not those of a prior of one half, and if no or infinitely many false alarms are undefined.
+    #[test]
+    fn the_odds_of_absence_are_the_number_of_false_alarms() {
+        for nfa in [1e-300, 1e-9, 1e-3, 1.0, 1e9] {
+            let p = by_nfa(nfa);
+            assert!((p / (1.0 - p) / nfa - 1.0).abs() < 1e-6, "{nfa}: {p}");
+        }
+        assert_eq!((by_nfa(0.0), by_nfa(f64::INFINITY)), (0.0, 1.0));
+        assert!(by_nfa(f64::NAN).is_nan());
+    }
+
+    #[test]
+    fn other_poses_and_absence_exclude_each_other() {
+        let one = Probability::of(0.2, 0.5);
+        assert!((one.wrong - 0.6).abs() < 1e-15 && (one.beside(0.5).wrong - 0.8).abs() < 1e-15);
+        assert_eq!(one.beside(0.0), one);
+        // Four equal poses: three of four are not this one.
+        assert_eq!(Probability::of(0.0, 0.0).among(4), Probability::of(0.0, 0.75));
+        assert_eq!(one.among(1), Probability::of(0.2, 0.0));
+    }
+}

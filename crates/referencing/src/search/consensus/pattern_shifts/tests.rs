@@ -1,0 +1,94 @@
+use nalgebra::UnitQuaternion;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::{Covariance6, MeasuredPoint, Point, Transform, UncertainPoint};
+
+use super::*;
+use crate::{
+    candidates::{Candidates, Gate},
+    problem::{Prior, PriorBound, Tolerance},
+    search::{identification::Search, posterior::PosteriorProbabilities, rigid_consensus::RigidConsensus},
+    site::model::ModelPoint,
+};
+
+const STEP: f64 = 0.1;
+const COLUMNS: i8 = 5;
+
+fn lattice(columns: std::ops::Range<i8>) -> impl Iterator<Item = Vector3<f64>> {
+    columns.flat_map(|x| (0..4).map(move |y| STEP * Vector3::new(f64::from(x), f64::from(y), 0.0)))
+}
+
+fn prior(sigma: f64) -> Prior {
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(0.002, sigma));
+    let at = Vector3::new(0.0, 0.0, -2.0);
+    Prior { object_from_camera: Transform::new(UnitQuaternion::identity(), at), bound }
+}
+
+/// The probabilities for a lattice of five columns 2 m ahead of which the cloud shows these columns; the prior has this
+/// standard deviation of the position (m). Also the shifts (columns) of the explanations.
+fn shown(columns: std::ops::Range<i8>, sigma: f64) -> (PosteriorProbabilities, Vec<i32>) {
+    let model: Vec<ModelPoint> = lattice(0..COLUMNS).map(|at| ModelPoint::exact("", Point::from(at))).collect();
+    let measured = |at: Vector3<f64>| UncertainPoint::isotropic((at + Vector3::new(0.0, 0.0, 2.0)).into(), 0.003);
+    let cloud: Vec<MeasuredPoint> =
+        lattice(columns).map(|at| MeasuredPoint { position: measured(at), pixels: None }).collect();
+    let (tolerance, prior) = (Tolerance::Sigmas(3.0), prior(sigma));
+    let candidates = crate::candidates::candidates(&model, &cloud, Some(&prior), &Gate::default(), None);
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance,
+        prior: Some(&prior),
+        edges: Default::default(),
+    };
+    let found = RigidConsensus::default().search(&problem, &mut ChaCha8Rng::seed_from_u64(0)).expect("a pose");
+    let posterior = found.posterior.expect("a posterior");
+    let by = |pose: &Transform<_, _>| (pose.inverse().translation().x / STEP).round() as i32;
+    let mut shifts: Vec<i32> = posterior.explanations.iter().map(|other| by(&other.object_from_camera)).collect();
+    shifts.sort_unstable();
+    shifts.dedup();
+    (posterior.probabilities(&model, 0.03), shifts)
+}
+
+/// A lattice that continues by two columns to each side: a prior of a tenth of a step decides where the object is; a
+/// prior of three steps leaves it open. Listed are all shifts at which more than half of the object shows: five of them
+/// show all of it, a shift by four shows three of its five columns.
+#[test]
+fn the_prior_decides_between_the_shifts() {
+    let (sure, _) = shown(-2..COLUMNS + 2, 0.1 * STEP);
+    assert!(sure.map_estimate > 0.999, "{sure:?}");
+    let (open, shifts) = shown(-2..COLUMNS + 2, 3.0 * STEP);
+    assert!(open.map_estimate < 0.5, "{open:?}");
+    assert_eq!(shifts, [-4, -3, -2, -1, 0, 1, 2, 3, 4]);
+}
+
+/// A lattice that ends where the object ends is the object, even for a prior of three steps.
+#[test]
+fn a_complete_identification_decides() {
+    let (complete, _) = shown(0..COLUMNS, 3.0 * STEP);
+    assert!(complete.map_estimate > 0.999, "{complete:?}");
+}
+
+/// A row of step s: ln N(x; 0, σ²) of its own direction against 1/s.
+#[test]
+fn the_phase_of_a_pattern_is_uniform_over_a_cell() {
+    let model: Vec<ModelPoint> = lattice(0..COLUMNS).map(|at| ModelPoint::exact("", Point::from(at))).collect();
+    let candidates = Candidates::all(model.len(), 0);
+    let (tolerance, prior) = (Tolerance::Sigmas(3.0), prior(0.03));
+    let problem = Problem {
+        model: &model,
+        cloud: &[],
+        candidates: &candidates,
+        tolerance,
+        prior: Some(&prior),
+        edges: Default::default(),
+    };
+    let prior_terms = PriorTerms::of(&problem).expect("a prior");
+    let known = &prior_terms.known.as_ref().expect("a prior").motion;
+    let moved = Motion { translation: known.translation + Vector3::new(0.05, 0.0, 0.7), ..*known };
+    let found = ln_phase(&[Vector3::new(STEP, 0.0, 0.0)], &prior_terms, &moved);
+    // The attitude moves the centroid, 2 m ahead, by 0.002 · 2 m.
+    let variance = 0.03f64.powi(2) + 0.004f64.powi(2);
+    let ln_density = -HALF_LN_2PI - 0.5 * variance.ln() - 0.5 * 0.05f64.powi(2) / variance;
+    assert!((found + STEP.ln() + ln_density).abs() < 0.01, "{found}");
+}

@@ -1,0 +1,153 @@
+//! The validation of an object's edges.
+
+use nalgebra::Vector3;
+use seafix_component::{counted, number};
+use seafix_geometry::Point;
+
+use super::{
+    check::{COINCIDENT, Checker, suggestion},
+    edge::{End, ModelEdge},
+    file::{EdgeFile, EndFile, FORMAT, FORMAT_WITH_EDGES, ObjectFile},
+    model::ModelPoint,
+};
+
+/// The minimum length of an edge (m).
+const MIN_LENGTH: f64 = 0.02;
+/// The length (m) above which an edge is suspicious: over longer ones a structure bends.
+const LONG: f64 = 5.001;
+/// The maximum number of edges of an object.
+const MAX_EDGES: usize = 500;
+/// The allowed difference of a normal's length from one; files give six digits.
+const UNIT: f64 = 1e-5;
+/// The sine of the largest angle between parallel edges.
+const PARALLEL: f64 = 0.02;
+
+/// The edges of an object; faults and warnings go to `check`.
+pub(super) fn edges(
+    check: &mut Checker<'_>,
+    raw: &ObjectFile,
+    points: &[ModelPoint],
+    format: &str,
+    of: &str,
+    object: &str,
+) -> Vec<ModelEdge> {
+    let Some(first) = raw.edges.first() else { return Vec::new() };
+    if format != FORMAT_WITH_EDGES {
+        let fault = check.at(format!("{of}: edge `{}` in a file of another format", first.id), &["format"]);
+        check.fault(fault.value(format!("`{FORMAT}`")).remedy(format!("give format = \"{FORMAT_WITH_EDGES}\"")));
+    }
+    if raw.edges.len() > MAX_EDGES {
+        let fault = check.at(format!("{of} has too many edges"), &["object", object]);
+        let value = counted(raw.edges.len(), "edge");
+        check.fault(fault.value(value).remedy(format!("give at most {MAX_EDGES}, the longest and most distinct ones")));
+    }
+    check.unique(&format!("{of}: edge"), raw.edges.iter().map(|edge| edge.id.as_str()), |index| {
+        ["object", object, "edge", index, "id"].map(str::to_owned).to_vec()
+    });
+    let before = check.faults.len();
+    let read: Vec<Option<ModelEdge>> =
+        raw.edges.iter().enumerate().map(|(i, edge)| one(check, edge, points, of, object, &i.to_string())).collect();
+    if check.faults.len() > before {
+        return Vec::new(); // a comparison of invalid edges would only repeat the faults
+    }
+    let edges: Vec<ModelEdge> = read.into_iter().flatten().collect();
+    twice(check, &edges, points, of, object);
+    parallel(check, &edges, points, of, object);
+    edges
+}
+
+/// One edge; `None` after a fault.
+fn one(
+    check: &mut Checker<'_>,
+    raw: &EdgeFile,
+    points: &[ModelPoint],
+    of: &str,
+    object: &str,
+    index: &str,
+) -> Option<ModelEdge> {
+    let before = check.faults.len();
+    let name = format!("{of}, edge `{}`", raw.id);
+    let path = |key: &'static str| ["object", object, "edge", index, key];
+    check.sigma(&format!("{name}: `sigma`"), raw.sigma, &path("sigma"));
+    let mut end = |key: &'static str, end: &EndFile| match end {
+        EndFile::At(at) => {
+            check.finite(&format!("{name}: `{key}`"), at, &path(key));
+            Some(End::At(Point::from(*at)))
+        }
+        EndFile::Point(id) => {
+            let found = points.iter().position(|point| point.id == *id);
+            if found.is_none() {
+                let fault = check.at(format!("{name}: unknown point in `{key}`"), &path(key));
+                let ids = points.iter().map(|point| point.id.as_str());
+                check.fault(fault.value(format!("`{id}`")).remedy(suggestion(id, ids)));
+            }
+            found.map(End::Point)
+        }
+    };
+    let ends = [end("from", &raw.from), end("to", &raw.to)];
+    if raw.faces.len() > 2 {
+        let fault = check.at(format!("{name} has too many faces"), &path("faces"));
+        check.fault(fault.value(raw.faces.len()).remedy("give the outward normals of the two faces that meet there"));
+    }
+    for face in &raw.faces {
+        check.finite(&format!("{name}: `faces`"), face, &path("faces"));
+        let length = Vector3::from(*face).norm();
+        if length.is_finite() && (length - 1.0).abs() > UNIT {
+            let fault = check.at(format!("{name}: a face normal is not a unit vector"), &path("faces"));
+            check.fault(fault.value(format!("{face:?}, of length {}", number(length))).remedy("give unit vectors"));
+        }
+    }
+    if check.faults.len() > before {
+        return None;
+    }
+    let [Some(from), Some(to)] = ends else { return None };
+    let edge = ModelEdge {
+        id: raw.id.clone(),
+        ends: [from, to],
+        sigma: raw.sigma,
+        faces: raw.faces.iter().map(|face| Vector3::from(*face)).collect(),
+    };
+    let [a, b] = edge.places(points);
+    let length = a.distance(&b);
+    if length < MIN_LENGTH {
+        let fault = check.at(format!("{name} is too short"), &path("to"));
+        let remedy = format!("an edge is at least {} m long; remove it or correct its ends", number(MIN_LENGTH));
+        check.fault(fault.value(format!("{} m", number(length))).remedy(remedy));
+        return None;
+    }
+    if length > LONG {
+        let warning = check.at(format!("{name} is long"), &path("to"));
+        let remedy = "check that the edge is straight over its whole length, or split it";
+        check.warnings.push(warning.value(format!("{} m", number(length))).remedy(remedy));
+    }
+    Some(edge)
+}
+
+/// Adds a fault for every two edges whose ends coincide within two standard deviations.
+fn twice(check: &mut Checker<'_>, edges: &[ModelEdge], points: &[ModelPoint], of: &str, object: &str) {
+    for (i, one) in edges.iter().enumerate() {
+        let ([a, b], [sa, sb]) = (one.places(points), one.sigmas(points));
+        for other in &edges[..i] {
+            let ([c, d], [sc, sd]) = (other.places(points), other.sigmas(points));
+            let near = |p: &Point<_>, s: f64, q: &Point<_>, t: f64| p.distance(q) <= (2.0 * s.hypot(t)).max(COINCIDENT);
+            if (near(&a, sa, &c, sc) && near(&b, sb, &d, sd)) || (near(&a, sa, &d, sd) && near(&b, sb, &c, sc)) {
+                let fault = check.at(format!("{of}: the same edge twice"), &["object", object, "edge", &i.to_string()]);
+                check.fault(fault.value(format!("`{}` and `{}`", other.id, one.id)).remedy("remove one"));
+            }
+        }
+    }
+}
+
+/// Warns if all edges have one direction: they leave a shift along it open.
+fn parallel(check: &mut Checker<'_>, edges: &[ModelEdge], points: &[ModelPoint], of: &str, object: &str) {
+    let direction = |edge: &ModelEdge| {
+        let [a, b] = edge.places(points);
+        (b - a).normalize()
+    };
+    let Some(first) = edges.first().map(direction) else { return };
+    if edges.len() > 1 && edges.iter().all(|edge| direction(edge).cross(&first).norm() < PARALLEL) {
+        let warning = check.at(format!("{of}: all edges are parallel"), &["object", object, "edge", "0"]);
+        let remedy = "add edges of another direction; parallel edges do not measure a shift along them";
+        check.warnings.push(warning.value(counted(edges.len(), "edge")).remedy(remedy));
+    }
+}

@@ -1,0 +1,5 @@
+//! Laws of edges: the bound of the solvers, and the search with acceptance.
+
+mod bound;
+mod scene;
+mod search;

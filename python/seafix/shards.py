@@ -1,0 +1,160 @@
+"""Runs that are divided among processes or machines."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ._seafix import merge_runs, run_experiment
+from .runs import Run, _settings, _threads
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A part of a run; calling it computes the part.
+
+    A shard is a small value that can be pickled, so that any engine can send it to a worker: ``executor.submit(shard)``
+    of :mod:`concurrent.futures` and of ``dask.distributed``, or ``ray.remote(shard.__call__)``. A shard that was
+    interrupted is called again and continues where it stopped.
+
+    Attributes
+    ----------
+    experiment : str
+        The experiment file or the folder of a data set, as a path that the worker can read.
+    number, count : int
+        The part, 1 to `count`, and the number of parts.
+    out : str
+        The folder of the part, which the worker can write.
+    threads : int
+        Number of threads of the worker.
+    timed : bool
+        Whether durations are logged.
+    settings : tuple of str
+        Changed settings, ``key=value``.
+    """
+
+    experiment: str
+    number: int
+    count: int
+    out: str
+    threads: int = 1
+    timed: bool = True
+    settings: tuple[str, ...] = field(default=())
+
+    def __call__(self) -> str:
+        """Compute the part.
+
+        Returns
+        -------
+        str
+            The folder of the part.
+
+        Raises
+        ------
+        ValueError
+            The experiment has faults.
+        OSError
+            The folder cannot be written.
+        """
+        folder, _ = run_experiment(
+            self.experiment,
+            self.out,
+            self.threads,
+            list(self.settings),
+            "resume",
+            f"{self.number}/{self.count}",
+            self.timed,
+            None,
+        )
+        return str(folder)
+
+
+def shards(
+    experiment: str | os.PathLike[str],
+    count: int,
+    out: str | os.PathLike[str],
+    *,
+    threads: int = 1,
+    timed: bool = True,
+    settings: Mapping[str, Any] | Sequence[str] = (),
+) -> list[Shard]:
+    """Divide a run into parts.
+
+    Parameters
+    ----------
+    experiment : str or os.PathLike
+        An experiment file, or the folder of a data set.
+    count : int
+        Number of parts.
+    out : str or os.PathLike
+        The folder below which each part has a folder of its own.
+    threads : int, default 1
+        Number of threads of each part.
+    timed : bool, default True
+        Log durations. Without them the merged run has the bytes of an undivided one.
+    settings : mapping or sequence of str, optional
+        Changed settings by dotted key.
+
+    Returns
+    -------
+    list of Shard
+        The parts. :func:`merge` joins their folders.
+
+    Raises
+    ------
+    ValueError
+        Fewer than one part.
+
+    Examples
+    --------
+    >>> with concurrent.futures.ProcessPoolExecutor() as pool:
+    ...     folders = list(pool.map(sf.Shard.__call__, sf.shards("experiment.toml", 4, "parts")))
+    >>> run = sf.merge(folders, "run")
+    """
+    if count < 1:
+        raise ValueError(f"`count` is {count}; give 1 or more parts")
+    source, folder = str(Path(experiment).absolute()), Path(out).absolute()
+    changed = tuple(_settings(settings))
+    return [
+        Shard(source, number, count, str(folder / f"{number}-of-{count}"), _threads(threads), timed, changed)
+        for number in range(1, count + 1)
+    ]
+
+
+def merge(
+    folders: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    threads: int | None = None,
+    existing: str = "refuse",
+) -> Run:
+    """Join the parts of a run.
+
+    Parameters
+    ----------
+    folders : sequence of str or os.PathLike
+        The folders of all parts.
+    out : str or os.PathLike
+        The folder of the run, new or empty.
+    threads : int, optional
+        Number of threads. By default all cores.
+    existing : {"refuse", "resume", "overwrite"}, default "refuse"
+        Treatment of a run that the folder already holds.
+
+    Returns
+    -------
+    Run
+        The joined run. Except for durations its bytes are those of an undivided run.
+
+    Raises
+    ------
+    ValueError
+        Parts of different runs, or missing or damaged parts.
+    OSError
+        The folder cannot be written.
+    """
+    folder, _ = merge_runs([Path(folder) for folder in folders], out, _threads(threads), existing)
+    return Run(folder)
