@@ -6,14 +6,15 @@ use nalgebra::{Matrix3, Matrix4, Matrix6, Quaternion, UnitQuaternion};
 use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 use seafix_evaluation::{Solved, alert_limit};
 use seafix_geometry::{
-    Covariance6, Frame, MeasuredPoint, Object, Pixel, Point, StereoPixels, Transform, UncertainPixels, UncertainPoint,
-    World,
+    Covariance6, Frame, MeasuredLine, MeasuredPoint, NormalOffset, Object, Pixel, Point, StereoPixels, StereoSegments,
+    Transform, UncertainPixels, UncertainPoint, World,
 };
 use seafix_log::{
-    AnswerRecord, CloudPoint, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TargetModel, TrueState,
+    AnswerRecord, CloudPoint, ExactPose, Inputs, Line, Offset, ProblemRecord, SensorReading, SitePoint, TargetModel,
+    TrueState,
 };
 use seafix_navigation::{Device, Reading};
-use seafix_referencing::{ModelPoint, Prior, PriorBound, Site, Target, problem_file::CoherenceProblem};
+use seafix_referencing::{ModelEdge, ModelPoint, Prior, PriorBound, Site, Target, problem_file::CoherenceProblem};
 use seafix_vision::Image;
 
 use crate::sequence::{TrueAnswer, Truth};
@@ -55,7 +56,7 @@ pub fn is_exact(frame_data: &FrameData) -> bool {
     let full = |image: &Image| image.pixels().iter().all(|&level| level.fract() == 0.0);
     match frame_data {
         FrameData::Stereo(left, right) => full(left) && full(right),
-        FrameData::Points(_) => false,
+        FrameData::Points(_) | FrameData::Features(..) => false,
     }
 }
 
@@ -155,6 +156,46 @@ pub fn cloud(points: &[CloudPoint], inputs: &Inputs) -> Option<Vec<MeasuredPoint
         .collect()
 }
 
+/// The log's record of a measured line.
+pub fn line_record(line: &MeasuredLine) -> Line {
+    let offset = |offset: &NormalOffset| Offset {
+        at: [offset.at.u, offset.at.v],
+        normal: offset.normal.into(),
+        sigma: offset.sigma,
+        texture: offset.texture,
+        common: offset.common,
+    };
+    Line {
+        ends: line.ends.map(|end| end.coords.into()),
+        covariance: std::array::from_fn(|r| std::array::from_fn(|c| line.offsets[(r, c)])),
+        depth: line.depth,
+        segments: line
+            .segments
+            .as_ref()
+            .map(|both| [both.left, both.right].map(|segment| segment.each_ref().map(offset))),
+    }
+}
+
+/// The measured line in a log's record.
+pub fn line(record: &Line) -> MeasuredLine {
+    let offset = |offset: &Offset| NormalOffset {
+        at: Pixel { u: offset.at[0], v: offset.at[1] },
+        normal: offset.normal.into(),
+        sigma: offset.sigma,
+        texture: offset.texture,
+        common: offset.common,
+    };
+    MeasuredLine {
+        ends: record.ends.map(Point::from),
+        offsets: Matrix4::from_fn(|r, c| record.covariance[r][c]),
+        segments: record.segments.as_ref().map(|both| {
+            let [left, right] = both.each_ref().map(|segment| segment.each_ref().map(offset));
+            StereoSegments { left, right }
+        }),
+        depth: record.depth,
+    }
+}
+
 /// The hints in a log's record.
 pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint]) -> Hints {
     if let Some(names) = &inputs.names {
@@ -210,11 +251,16 @@ pub fn model(target: &Target) -> TargetModel {
         at: point.at.coords.into(),
         sigma: point.sigma,
     };
+    let edge = |edge: &ModelEdge| seafix_log::ModelEdge {
+        id: edge.id.clone(),
+        ends: edge.places(&target.points).map(|end| end.coords.into()),
+    };
     TargetModel {
         id: target.name.clone(),
         site_from_object: None,
         points: target.points.iter().map(point).collect(),
         alert_limit: alert_limit(target.diameter()),
+        edges: target.edges.iter().map(edge).collect(),
     }
 }
 

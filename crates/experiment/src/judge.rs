@@ -12,10 +12,10 @@ use seafix_referencing::{Correspondence, Fix, Outcome, Site, Target, TargetKind}
 use seafix::{FrameResult, NavigationState};
 use seafix_data::{log_conversion, source::Truth};
 
-use crate::inspect;
+use crate::{inspect, true_edges::TrueEdges};
 
 /// The maximum distance (px) between a correct pair's cloud point and its model point's true projections.
-const CORRECT_PX: f64 = 2.0;
+pub(crate) const CORRECT_PX: f64 = 2.0;
 
 /// A target with its ground truth at one instant.
 struct TrueTarget<'a> {
@@ -53,11 +53,18 @@ impl<'a> Evaluator<'a> {
         record.poi = inspect::poi(truth, self.site, rig, kind, frame_result, navigation_state);
         for (attempt, row) in frame_result.attempts.iter().zip(record.targets.iter_mut()) {
             let Some(known) = &self.known(attempt.target) else { continue };
-            let identified = row.evaluation.identified;
-            let visible = count_visible(known, rig);
-            let alert_limit = Some(alert_limit(known.target.diameter()));
-            row.evaluation =
-                Evaluation { identified, visible, wrong: Some(false), alert_limit, ..Evaluation::default() };
+            let Evaluation { identified, edges_identified, .. } = row.evaluation;
+            let edges = (!known.target.edges.is_empty())
+                .then(|| TrueEdges::of(known.target, &known.points, &camera_from(known, truth), rig));
+            row.evaluation = Evaluation {
+                identified,
+                edges_identified,
+                visible: count_visible(known, rig),
+                edges_visible: edges.as_ref().map(TrueEdges::visible),
+                wrong: Some(false),
+                alert_limit: Some(alert_limit(known.target.diameter())),
+                ..Evaluation::default()
+            };
             if let Some((_, bound)) =
                 truth.bound.filter(|(object, _)| kind != TargetKind::Site && *object == attempt.target)
             {
@@ -68,6 +75,8 @@ impl<'a> Evaluator<'a> {
             }
             if let Outcome::Fix(fix) = &attempt.answer.outcome {
                 evaluate(&mut row.evaluation, fix, known, frame_result, truth, rig);
+                row.evaluation.correct_edges =
+                    edges.as_ref().map(|edges| edges.correct(&fix.edges, &frame_result.lines));
             }
         }
     }
@@ -154,6 +163,11 @@ fn visible_points(known: &TrueTarget<'_>) -> Vec<VisiblePoint> {
     let mask = known.visible.as_deref().unwrap_or_default();
     let seen = mask.iter().enumerate().filter(|(_, seen)| **seen);
     seen.map(|(point, _)| VisiblePoint { object: known.target.name.clone(), point: point as u32 }).collect()
+}
+
+/// The true pose of a target in the camera's frame.
+fn camera_from(known: &TrueTarget<'_>, truth: &Truth) -> Transform<Camera, Object> {
+    truth.world_from_camera.inverse() * known.world_from_object
 }
 
 /// The number of the target's points in view of both cameras: by the data set, otherwise by projection.

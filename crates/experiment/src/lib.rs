@@ -37,6 +37,7 @@ mod results;
 mod run;
 mod settings;
 mod sweep;
+mod true_edges;
 
 pub use diff::{Change, Difference, diff};
 pub use experiment::{Experiment, Plan, Trial};

@@ -25,7 +25,7 @@ impl Pictures {
             FrameData::Stereo(left, right) => {
                 level.logged(grey(left)).zip(level.logged(grey(right))).map(<[_; 2]>::from)
             }
-            FrameData::Points(_) => None,
+            FrameData::Points(_) | FrameData::Features(..) => None,
         };
         let are_exact = level == ImagesLogged::All && log_conversion::is_exact(frame_data);
         // An image that cannot be compressed is reported by the writer of the log.

@@ -8,9 +8,9 @@ use seafix_data::{
 };
 use seafix_geometry::{LensModel, MeasuredPoint, Object, Pinhole, Pixel, StereoPixels, StereoRig, Transform};
 use seafix_log::{
-    Alternative, Axis, BestPose, CameraRecord, CloudPoint, Component, FrameRecord, FrameTimes, Inputs, Integrity,
-    NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome as Logged, Pair, PixelPair, PriorRecord,
-    RigRecord, SharedStages, TargetModel, TargetRecord, TargetTimes, TrialHeader,
+    Alternative, Axis, BestPose, CameraRecord, CloudPoint, Component, EdgePair, FrameRecord, FrameTimes, Inputs,
+    Integrity, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Outcome as Logged, Pair, PixelPair,
+    PriorRecord, RigRecord, SharedStages, TargetModel, TargetRecord, TargetTimes, TrialHeader,
 };
 use seafix_navigation::{FUSIONS, Navigated, ODOMETRIES, POLICIES};
 use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, TargetKind};
@@ -123,6 +123,7 @@ pub(crate) fn complete(
         pixels: point.pixels.map(|pixels| pixel_pair(&pixels.at)),
     };
     record.cloud = frame_result.cloud.iter().map(point).collect();
+    record.lines = frame_result.lines.iter().map(log_conversion::line_record).collect();
     record.prior = sensor_frame.prior.map(|prior| PriorRecord { world_from_camera: prior.world_from_camera.rows() });
 }
 
@@ -145,14 +146,18 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
     });
     record.pair_tests = answer.pair_tests;
     record.pairs = pairs(&answer.identified);
+    record.edges = edge_pairs(&answer.identified_edges);
     record.evaluation.identified = Some(answer.identified.len() as u32);
+    record.evaluation.edges_identified = (!target.edges.is_empty()).then_some(answer.identified_edges.len() as u32);
     match &answer.outcome {
         Outcome::Fix(fix) => {
             record.outcome = Logged::Fix;
             record.object_from_camera = Some(fix.object_from_camera.rows());
             record.covariance = Some(rows6(&fix.covariance.matrix));
             record.pairs = pairs(&fix.pairs);
+            record.edges = edge_pairs(&fix.edges);
             record.evaluation.identified = Some(fix.pairs.len() as u32);
+            record.evaluation.edges_identified = (!target.edges.is_empty()).then_some(fix.edges.len() as u32);
             record.used = fix.used.iter().map(|&index| index as u32).collect();
             record.residual_rms = Some(fix.residual_rms);
             record.integrity = Some(integrity(&fix.integrity));
@@ -294,6 +299,10 @@ fn camera(camera: &Pinhole) -> CameraRecord {
 
 fn pairs(pairs: &[Correspondence]) -> Vec<Pair> {
     pairs.iter().map(|pair| Pair { model: pair.model as u32, cloud: pair.cloud as u32 }).collect()
+}
+
+fn edge_pairs(pairs: &[Correspondence]) -> Vec<EdgePair> {
+    pairs.iter().map(|pair| EdgePair { model: pair.model as u32, line: pair.cloud as u32 }).collect()
 }
 
 pub(crate) fn pixel_pair(pixels: &StereoPixels) -> PixelPair {

@@ -148,6 +148,9 @@ quantities! {
     VISIBLE: Target Integer "visible" "" "/metrics/evaluation" "The number of model points that both cameras truly see." = |r: &TargetRecord| count(r.evaluation.visible);
     IDENTIFIED: Target Integer "identified" "" "/metrics/evaluation" "The number of identified pairs." = |r: &TargetRecord| count(r.evaluation.identified);
     CORRECT_PAIRS: Target Integer "correct_pairs" "" "/metrics/evaluation" "The number of identified pairs within 2 px of the true projections in both images." = |r: &TargetRecord| count(r.evaluation.correct_pairs);
+    EDGES_VISIBLE: Target Integer "edges_visible" "" "/metrics/evaluation" "The number of model edges that face the camera and lie in both images by at least a quarter; bodies that hide them are not considered." = |r: &TargetRecord| count(r.evaluation.edges_visible);
+    EDGES_IDENTIFIED: Target Integer "edges_identified" "" "/metrics/evaluation" "The number of identified edges." = |r: &TargetRecord| count(r.evaluation.edges_identified);
+    CORRECT_EDGES: Target Integer "correct_edges" "" "/metrics/evaluation" "The number of identified edges whose measured line lies within 2 px of the true edge at both ends, in both images." = |r: &TargetRecord| count(r.evaluation.correct_edges);
     FIT_RMS: Target Real "fit_rms" "m" "/metrics/evaluation" "The RMS residual of the correctly identified pairs at the estimated pose (the paper's measure)." = |r: &TargetRecord| r.evaluation.fit_rms;
     FIT_RMS_UNUSED: Target Real "fit_rms_unused" "m" "/metrics/evaluation" "The fit RMS without the points that the solver used." = |r: &TargetRecord| r.evaluation.fit_rms_unused;
     TRE_RMS: Target Real "tre_rms" "m" "/metrics/evaluation" "The target registration error: the RMS error of all model points that the pose transfers." = |r: &TargetRecord| r.evaluation.tre_rms;

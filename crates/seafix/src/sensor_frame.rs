@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Transform, World};
+use seafix_geometry::{Camera, Covariance6, MeasuredLine, MeasuredPoint, Transform, World};
 use seafix_navigation::Reading as SensorReading;
 use seafix_referencing::{Prior, Target, problem_file::CoherenceProblem};
 use seafix_vision::Image;
@@ -55,6 +55,8 @@ pub enum FrameData {
     Stereo(Image, Image),
     /// A cloud of measured points (camera frame, m) without images.
     Points(Vec<MeasuredPoint>),
+    /// A cloud of measured points and measured straight edges (camera frame, m) without images.
+    Features(Vec<MeasuredPoint>, Vec<MeasuredLine>),
 }
 
 /// A prior pose of the left camera in the world.

@@ -88,6 +88,14 @@ pub struct Cloud {
     total_ms: f64,
 }
 
+impl Cloud {
+    /// Features that were measured elsewhere.
+    fn given(points: &[MeasuredPoint], lines: &[MeasuredLine]) -> Self {
+        let times = FrameTimes::default();
+        Self { keypoints: Arc::default(), points: points.into(), lines: lines.into(), times, total_ms: 0.0 }
+    }
+}
+
 /// The candidates of one target and the result of the search among them. Both are independent of the solver, so that
 /// trials with different solvers share them.
 #[derive(Debug, Clone)]
@@ -229,10 +237,10 @@ impl PipelineStages {
     /// Straight edges are measured if a target has some.
     pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig, targets: &[Target], regions: &[Regions; 2]) -> Cloud {
         let (left, right) = match frame_data {
-            FrameData::Points(cloud) => {
-                let times = FrameTimes::default();
-                let (keypoints, lines) = (Arc::default(), Arc::default());
-                return Cloud { keypoints, points: cloud[..].into(), lines, times, total_ms: 0.0 };
+            FrameData::Points(cloud) => return Cloud::given(cloud, &[]),
+            FrameData::Features(cloud, lines) => {
+                let lines = if self.settings.edges == UseOfEdges::On { &lines[..] } else { &[] };
+                return Cloud::given(cloud, lines);
             }
             FrameData::Stereo(left, right) => (left, right),
         };

@@ -207,7 +207,8 @@ impl Sequence for Logged {
                 return Err(fault.remedy("replay the clouds, or run again with full images in the log"));
             }
             Some([left, right]) => FrameData::Stereo(image(left).map_err(broken)?, image(right).map_err(broken)?),
-            None => FrameData::Points(cloud),
+            None if frame.lines.is_empty() => FrameData::Points(cloud),
+            None => FrameData::Features(cloud, frame.lines.iter().map(log_conversion::line).collect()),
         };
         Ok(SensorFrame { stamp_ns: frame.stamp_ns, frame_data, prior, hints, readings })
     }

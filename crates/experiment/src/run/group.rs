@@ -324,7 +324,7 @@ fn frame_bytes(sequence: &dyn Sequence, level: ImagesLogged) -> Result<u64, Faul
         return Ok((fraction * (pixels[0] + pixels[1]) + CLOUD_BYTES) as u64);
     }
     let points = match sequence.sensor_frame(0)?.frame_data {
-        FrameData::Points(cloud) => cloud.len(),
+        FrameData::Points(cloud) | FrameData::Features(cloud, _) => cloud.len(),
         FrameData::Stereo(..) => 0,
     };
     // A fit to logs with 3 to 50 points, with some reserve.

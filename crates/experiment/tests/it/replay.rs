@@ -7,13 +7,14 @@ use seafix_log::{FrameRecord, FrameTimes, TargetTimes, read};
 use tempfile::TempDir;
 
 /// Sources of every kind, shortened, with a pipeline for their frames.
-const EXPERIMENTS: [(&str, &str); 7] = [
+const EXPERIMENTS: [(&str, &str); 8] = [
     ("points", "[source]\nname = 'virtual-points'\nframes = 6\n"),
     ("images", "[source]\nname = 'virtual-images'\nframes = 2\nrig.size = [512, 384]\nrig.focal = 250.0\n"),
     (
         "readings",
         "[source]\nname = 'dive'\nframes = 5\nrate = 2.0\nrig.size = [512, 384]\nrig.focal = 250.0\n[navigation]\nodometry = 'dvl-gyro'\npolicy = { name = 'interval', seconds = 1.0 }\n",
     ),
+    ("edges", "[source]\nname = 'dive'\nframes = 2\nroute.altitude = 2.5\nrig.size = [512, 384]\nrig.focal = 250.0\n"),
     ("layouts", "[source]\nname = 'virtual-layouts'\nlayouts = 3\nframes = 6\nsurvey-sigma = 0.01\n"),
     (
         "joint",
@@ -76,6 +77,8 @@ fn the_logged_configuration_gives_the_logged_results() {
             let moved = original.iter().filter_map(|frame| frame.navigation.as_ref()?.odometry.motion).count();
             assert!(name != "readings" || reported > 20 && moved == 4, "{reported} readings, {moved} motions");
         }
+        let edges = original.iter().flat_map(|frame| &frame.targets).map(|target| target.edges.len()).sum::<usize>();
+        assert_eq!(edges > 0, ["edges", "readings"].contains(&name), "{name}: {edges} identified edges");
         if name == "images" {
             let replay = Replay { from: ReplayFrom::Images, ..Replay::default() }.plan(&log).unwrap();
             assert_eq!(frames(&replay, folder.path(), 2), original);

@@ -71,6 +71,7 @@ pub(crate) fn bare_frame_record(message: BareFrame) -> Result<FrameRecord, Malfo
         prior: None,
         truth,
         navigation: message.navigation,
+        lines: Vec::new(),
     })?;
     let unknown = [f64::NAN; 3];
     let point = |pixels| crate::record::CloudPoint { at: unknown, covariance: [unknown; 3], pixels };

@@ -2,6 +2,7 @@
 
 use super::{
     fields::{Malformed, flat, matrix},
+    line::{line_message, line_record},
     navigation::{navigation_message, navigation_record},
 };
 use crate::{
@@ -21,6 +22,7 @@ pub(crate) fn frame_message(frame: &FrameRecord) -> proto::Frame {
         prior: frame.prior.as_ref().map(|prior| proto::Prior { world_from_camera: flat(&prior.world_from_camera) }),
         truth: frame.truth.as_ref().map(truth_message),
         navigation: frame.navigation.as_deref().map(navigation_message),
+        lines: frame.lines.iter().map(line_message).collect(),
     }
 }
 
@@ -55,6 +57,7 @@ pub(crate) fn frame_record(message: proto::Frame) -> Result<FrameRecord, Malform
         stamp_ns: message.stamp_ns,
         key_points: key_points.to_vec(),
         cloud: message.cloud.into_iter().map(point_record).collect::<Result<_, _>>()?,
+        lines: message.lines.iter().map(line_record).collect::<Result<_, _>>()?,
         prior: message.prior.map(prior).transpose()?,
         truth: message.truth.map(truth_record).transpose()?,
         navigation: message.navigation.map(navigation_record).transpose()?.map(Box::new),

@@ -1,6 +1,9 @@
 //! The header of a trial.
 
-use super::fields::{Malformed, flat, matrix, matrix_if_any, required};
+use super::{
+    fields::{Malformed, flat, matrix, matrix_if_any, required},
+    line::{edge_message, edge_record},
+};
 use crate::{
     proto,
     record::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader},
@@ -77,6 +80,7 @@ pub(super) fn target_message(target: TargetModel) -> proto::Target {
         points: target.points.into_iter().map(point).collect(),
         id: target.id,
         alert_limit: target.alert_limit,
+        edges: target.edges.into_iter().map(edge_message).collect(),
     }
 }
 
@@ -135,5 +139,6 @@ pub(super) fn target_record(message: proto::Target) -> Result<TargetModel, Malfo
         points: message.points.into_iter().map(point).collect(),
         id: message.id,
         alert_limit: message.alert_limit,
+        edges: message.edges.into_iter().map(edge_record).collect::<Result<_, _>>()?,
     })
 }

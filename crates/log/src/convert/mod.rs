@@ -6,6 +6,7 @@ mod frame;
 mod header;
 mod inputs;
 mod inspection;
+mod line;
 mod navigation;
 mod result;
 mod totals;

@@ -1,6 +1,9 @@
 //! What came of the attempts of a frame: results, candidates, evaluations, times.
 
-use super::fields::{Malformed, flat, matrix, matrix_if_any};
+use super::{
+    fields::{Malformed, flat, matrix, matrix_if_any},
+    line::{edge_pair_messages, edge_pair_records},
+};
 use crate::{
     proto,
     record::{
@@ -45,6 +48,7 @@ pub(crate) fn result_message(frame: &FrameRecord, index: usize) -> proto::Refere
             covariance: best.covariance.as_ref().map(flat).unwrap_or_default(),
             pairs: pair_messages(&best.pairs),
         }),
+        edges: edge_pair_messages(&target.edges),
     }
 }
 
@@ -104,6 +108,7 @@ pub(crate) fn result_record(
         covariance: matrix_if_any("covariance", &message.covariance)?,
         candidates: candidates.lists.into_iter().map(|list| list.cloud).collect(),
         pairs: pair_records(&message.pairs),
+        edges: edge_pair_records(&message.edges),
         used: message.used,
         alternatives: message.alternatives.into_iter().map(alternative).collect::<Result<_, _>>()?,
         optimal: message.optimal,

@@ -26,6 +26,8 @@ pub struct Frame {
     /// Where the trial navigates between fixes.
     #[prost(message, optional, tag = "9")]
     pub navigation: ::core::option::Option<Navigation>,
+    #[prost(message, repeated, tag = "10")]
+    pub lines: ::prost::alloc::vec::Vec<Line>,
 }
 /// One triangulated point, frame of the left camera.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -277,6 +279,8 @@ pub struct Target {
     /// A pose with m2 beyond this (m) is wrong.
     #[prost(double, tag = "4")]
     pub alert_limit: f64,
+    #[prost(message, repeated, tag = "5")]
+    pub edges: ::prost::alloc::vec::Vec<ModelEdge>,
 }
 /// One feature point of a target, object frame.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -504,6 +508,12 @@ pub struct Evaluation {
     /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable.
     #[prost(double, optional, tag = "18")]
     pub alert_limit: ::core::option::Option<f64>,
+    #[prost(uint32, optional, tag = "19")]
+    pub edges_visible: ::core::option::Option<u32>,
+    #[prost(uint32, optional, tag = "20")]
+    pub edges_identified: ::core::option::Option<u32>,
+    #[prost(uint32, optional, tag = "21")]
+    pub correct_edges: ::core::option::Option<u32>,
 }
 /// What all frames of a trial add up to, logged or not. Topic /metrics/totals, once, after the last frame.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -732,6 +742,8 @@ pub struct ReferencingResult {
     /// The best pose of an answer that is no fix; absent if there is none.
     #[prost(message, optional, tag = "23")]
     pub best: ::core::option::Option<BestPose>,
+    #[prost(message, repeated, tag = "24")]
+    pub edges: ::prost::alloc::vec::Vec<EdgePair>,
 }
 /// What supports a fix beyond its covariance.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -859,4 +871,47 @@ impl Outcome {
             _ => None,
         }
     }
+}
+
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Line {
+    #[prost(double, repeated, tag = "1")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+    #[prost(bool, tag = "3")]
+    pub depth: bool,
+    #[prost(message, repeated, tag = "4")]
+    pub offsets: ::prost::alloc::vec::Vec<Offset>,
+}
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct Offset {
+    #[prost(double, tag = "1")]
+    pub u: f64,
+    #[prost(double, tag = "2")]
+    pub v: f64,
+    #[prost(double, tag = "3")]
+    pub normal_u: f64,
+    #[prost(double, tag = "4")]
+    pub normal_v: f64,
+    #[prost(double, tag = "5")]
+    pub sigma: f64,
+    #[prost(double, tag = "6")]
+    pub texture: f64,
+    #[prost(double, tag = "7")]
+    pub common: f64,
+}
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct EdgePair {
+    #[prost(uint32, tag = "1")]
+    pub model: u32,
+    #[prost(uint32, tag = "2")]
+    pub line: u32,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ModelEdge {
+    #[prost(string, tag = "1")]
+    pub id: ::prost::alloc::string::String,
+    #[prost(double, repeated, tag = "2")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
 }

@@ -4,6 +4,7 @@ use super::{
     header::{TargetModel, TrialHeader},
     inputs::Inputs,
     inspection::PointOfInterest,
+    line::Line,
     matrix::{Matrix3, Matrix4},
     navigation::NavigationRecord,
     target::TargetRecord,
@@ -22,6 +23,8 @@ pub struct FrameRecord {
     pub key_points: Vec<[f64; 2]>,
     /// The triangulated points.
     pub cloud: Vec<CloudPoint>,
+    /// The measured straight edges; empty for a trial without edges.
+    pub lines: Vec<Line>,
     /// The rough pose a method may use.
     pub prior: Option<PriorRecord>,
     /// What really was, where it is known.

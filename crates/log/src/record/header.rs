@@ -1,6 +1,9 @@
 //! What is the same for every frame of a trial.
 
-use super::matrix::{Matrix3, Matrix4};
+use super::{
+    line::ModelEdge,
+    matrix::{Matrix3, Matrix4},
+};
 
 /// What a trial is: its question, its configuration, its cameras and what it looks for.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,6 +113,8 @@ pub struct TargetModel {
     pub points: Vec<ModelPoint>,
     /// A pose with m2 beyond this (m) is wrong.
     pub alert_limit: f64,
+    /// Its straight edges.
+    pub edges: Vec<ModelEdge>,
 }
 
 /// One feature point of a target.

@@ -4,6 +4,7 @@ mod frame;
 mod header;
 mod inputs;
 mod inspection;
+mod line;
 mod matrix;
 mod mirror;
 mod navigation;
@@ -17,6 +18,7 @@ pub use frame::{
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
 pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use inspection::PointOfInterest;
+pub use line::{EdgePair, Line, ModelEdge, Offset};
 pub use matrix::{Matrix3, Matrix4, Matrix6};
 pub use navigation::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use region::Region;

@@ -3,6 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use super::{
+    line::EdgePair,
     matrix::{Matrix4, Matrix6},
     mirror::mirror,
 };
@@ -32,6 +33,8 @@ pub struct TargetRecord {
     pub candidates: Vec<Vec<u32>>,
     /// The identified points.
     pub pairs: Vec<Pair>,
+    /// The identified edges.
+    pub edges: Vec<EdgePair>,
     /// Indices into `pairs` of the points that the solver used.
     pub used: Vec<u32>,
     /// Other poses that explain the data.
@@ -75,6 +78,7 @@ impl TargetRecord {
             covariance: None,
             candidates: Vec::new(),
             pairs: Vec::new(),
+            edges: Vec::new(),
             used: Vec::new(),
             alternatives: Vec::new(),
             optimal: None,
@@ -238,6 +242,13 @@ mirror! {
         /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
         /// that are older than it, whose header has those of the targets.
         pub alert_limit: Option<f64>,
+        /// The number of edges of the target that face the camera and lie in both images; `None` for a target without
+        /// edges.
+        pub edges_visible: Option<u32>,
+        /// The number of identified edges; `None` for a target without edges.
+        pub edges_identified: Option<u32>,
+        /// The number of identified edges whose line lies within 2 px of the true one at both ends, in both images.
+        pub correct_edges: Option<u32>,
     }
 }
 

@@ -1,5 +1,5 @@
-//! Marks in the images: key points white, candidates blue, identified points ringed in the colour of
-//! their target and named.
+//! Marks in the images: key points and measured lines white, candidates blue, identified points ringed and identified
+//! edges drawn in the colour of their target, both named.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::{
         CircleAnnotation, Color, ImageAnnotations, KeyValuePair, Point2, PointsAnnotation, TextAnnotation,
         points_annotation,
     },
-    record::{FrameRecord, TrialHeader},
+    record::{FrameRecord, Line, TrialHeader},
 };
 
 use super::values::{colour, colour_message, timestamp};
@@ -63,19 +63,42 @@ pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize
             });
         }
     }
-    let points = |points, colour: [u8; 3], thickness| PointsAnnotation {
+    use points_annotation::Type;
+    let drawn = |kind: Type, points, colour: [u8; 3], thickness| PointsAnnotation {
         timestamp: Some(timestamp(frame.stamp_ns)),
-        r#type: points_annotation::Type::Points.into(),
+        r#type: kind.into(),
         points,
         outline_color: Some(colour_message(colour)),
         thickness,
         ..PointsAnnotation::default()
     };
-    ImageAnnotations {
-        timestamp: Some(timestamp(frame.stamp_ns)),
-        circles,
-        points: vec![points(key_points, [255; 3], 2.0), points(candidates, [86, 180, 233], 4.0)],
-        texts,
-        metadata: Vec::new(),
+    let segment = |line: &Line| line.segments.map(|segments| segments[side].map(|offset| mark(offset.at)));
+    let mut points =
+        vec![drawn(Type::Points, key_points, [255; 3], 2.0), drawn(Type::Points, candidates, [86, 180, 233], 4.0)];
+    let lines: Vec<Point2> = frame.lines.iter().filter_map(segment).flatten().collect();
+    if !lines.is_empty() {
+        points.push(drawn(Type::LineList, lines, [255; 3], 1.0));
     }
+    for target in frame.targets.iter().filter(|target| !target.edges.is_empty()) {
+        let Some(index) = header.targets.iter().position(|model| model.id == target.object) else { continue };
+        let identified = target.edges.iter().filter_map(|pair| {
+            let ends = segment(frame.lines.get(pair.line as usize)?)?;
+            Some((header.targets[index].edges.get(pair.model as usize)?, ends))
+        });
+        let identified: Vec<_> = identified.collect();
+        for (edge, [from, to]) in &identified {
+            texts.push(TextAnnotation {
+                timestamp: Some(timestamp(frame.stamp_ns)),
+                position: Some(Point2 { x: (from.x + to.x) / 2.0, y: (from.y + to.y) / 2.0 }),
+                text: edge.id.clone(),
+                font_size: 10.0,
+                text_color: Some(colour_message(colour(index))),
+                background_color: Some(Color { r: 0.0, g: 0.0, b: 0.0, a: 0.5 }),
+                metadata: Vec::new(),
+            });
+        }
+        let ends = identified.into_iter().flat_map(|(_, ends)| ends).collect();
+        points.push(drawn(Type::LineList, ends, colour(index), 3.0));
+    }
+    ImageAnnotations { timestamp: Some(timestamp(frame.stamp_ns)), circles, points, texts, metadata: Vec::new() }
 }

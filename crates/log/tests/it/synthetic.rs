@@ -33,6 +33,7 @@ pub(crate) fn header() -> TrialHeader {
             .map(|i| ModelPoint { id: format!("{id}{i}"), at: [noise(i), noise(i + 9), noise(i + 20)], sigma: 0.001 })
             .collect(),
         alert_limit: 0.05,
+        edges: vec![ModelEdge { id: format!("{id}-side"), ends: [[x, 0.5, 0.0], [x, 1.5, 0.25]] }],
     };
     TrialHeader {
         run: "example".to_owned(),
@@ -84,6 +85,17 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
                 .then(|| PixelPair { left: [5.0 * i as f64, value(i) + 20.0], right: [i as f64, 20.0] }),
         })
         .collect();
+    let lines = (0..3)
+        .map(|i| Line {
+            ends: [[value(i), 0.5, 3.0], [value(i), 1.5, 3.25]],
+            covariance: [[1e-6, 2e-7, 0.0, 0.0], [2e-7, 1e-6, 0.0, 0.0], [0.0, 0.0, 1e-6, 0.0], [0.0, 0.0, 0.0, 1e-5]],
+            depth: i > 0,
+            segments: (i < 2).then(|| {
+                let offset = |at| Offset { at, normal: [0.6, 0.8], sigma: 0.125, texture: 0.0625, common: value(i) };
+                [[offset([5.0, 6.0]), offset([9.0, 3.0])], [offset([4.0, 6.0]), offset([8.0, 3.0])]]
+            }),
+        })
+        .collect();
     let mut fixed = TargetRecord::refused("A", "maximum-clique", "kabsch", "");
     fixed.outcome = Outcome::Fix;
     fixed.object_from_camera = Some(at(value(1), value(2), -3.0));
@@ -91,6 +103,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
     (0..6).for_each(|i| covariance[i][i] = 1e-5 * (i + 1) as f64);
     fixed.covariance = Some(covariance);
     fixed.candidates = vec![vec![0, 1], vec![], vec![2, 5, 6], vec![3], vec![4, 11]];
+    fixed.edges = vec![EdgePair { model: 0, line: 1 }];
     fixed.pairs = vec![Pair { model: 0, cloud: 1 }, Pair { model: 2, cloud: 5 }, Pair { model: 4, cloud: 11 }];
     fixed.used = vec![0, 2];
     fixed.alternatives =
@@ -127,6 +140,9 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         tre_crlb: Some(0.005),
         position_crlb: None,
         alert_limit: Some(0.05),
+        edges_visible: Some(6),
+        edges_identified: Some(4),
+        correct_edges: Some(4),
     };
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
@@ -145,6 +161,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         images: (!odd).then(|| [image(number), image(number + 1)]),
         key_points: (0..30).map(|i| [32.0 + 60.0 * value(i + 200), 24.0 + 40.0 * value(i + 300)]).collect(),
         cloud,
+        lines,
         prior: odd.then(|| PriorRecord { world_from_camera: at(10.0, 20.0, 27.0) }),
         truth: (number % 3 != 2).then(|| TruthRecord {
             world_from_camera: at(10.0, 20.0, 27.0),
@@ -225,6 +242,7 @@ fn inputs(number: u64) -> Inputs {
                 site_from_object: None,
                 points: vec![ModelPoint { id: "1".to_owned(), at: [x, 1.0 / 3.0, 0.25], sigma: 1e-3 }],
                 alert_limit: 0.05,
+                edges: Vec::new(),
             },
             delta: 0.04,
             prior: (number > 0).then_some((pose, 0.5)),

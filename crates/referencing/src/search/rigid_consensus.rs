@@ -114,7 +114,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -203,18 +203,20 @@ impl Search for RigidConsensus {
         };
         // The pattern is that of points.
         let by_points = swept.modes.first().is_some_and(|best| best.members.len() >= NEEDED);
-        let pattern = if strong(&swept) && by_points { Pattern::of(problem.model) } else { None };
+        let pattern = if strong(&swept) && by_points { Pattern::of(problem.model, problem.edges.model) } else { None };
         if let (Some(pattern), Some(best)) = (&pattern, swept.modes.first()) {
             let compared = Cell::new(0);
             let (model, taken) = (problem.model, &none);
             let (terms, prior_terms, graph) = (&terms, &prior_terms, &graph);
-            let shifts = pattern.shifts(problem, &Climb { model, terms, prior_terms, graph, taken, compared }, best);
+            let climb = Climb { model, terms, prior_terms, graph, taken, compared };
+            let shifts = pattern.shifts(problem, &climb, edge_terms.as_ref(), best);
             swept.insert(shifts);
         }
         swept.modes.truncate(MAX_COMPARED);
         weighted(&mut swept);
         largest_evidence_first(&mut swept.modes);
-        let pattern_alone = pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, &mut swept.modes));
+        let pattern_alone =
+            pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
         let ended = |best: usize, pair_tests| Rejected::Budget { budget: self.budget, best, bound, pair_tests };
         let Some(best) = swept.modes.first() else {
             return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, pair_tests)) };

@@ -81,6 +81,7 @@ pub(crate) fn header(index: usize, distance: f64, solver: &str) -> TrialHeader {
                 })
                 .collect(),
             alert_limit: 0.05,
+            edges: Vec::new(),
         }],
         prior_position_sigma: Some(0.1),
         prior_attitude_sigma: Some(0.5_f64.to_radians()),

@@ -21,6 +21,7 @@ pub(crate) mod local_maxima;
 mod lower_bound;
 pub(crate) mod mirror;
 pub(crate) mod motion;
+mod pattern_edges;
 mod pattern_shifts;
 mod places;
 mod posterior_volume;

@@ -5,8 +5,8 @@ use std::collections::{BTreeSet, VecDeque};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
-    gaussian::HALF_LN_2PI, likelihood::Mode, local_maxima::Climb, motion::Motion, prior_terms::PriorTerms,
-    repeated_pattern::Pattern,
+    edge_terms::EdgeTerms, gaussian::HALF_LN_2PI, joined::Joined, likelihood::Mode, local_maxima::Climb,
+    motion::Motion, prior_terms::PriorTerms, repeated_pattern::Pattern,
 };
 use crate::{parts::Parts, problem::Problem};
 
@@ -22,9 +22,20 @@ impl Pattern {
     /// shift is a hypothesis with the prior density of its own pose and the likelihood of its own seen and unseen
     /// points. The pruned search may miss shifts, since their triples are among the most numerous; here they are
     /// reached from the mode, step by step, as long as a neighbour is comparable.
-    pub(in crate::search) fn shifts(&self, problem: &Problem<'_>, climb: &Climb<'_>, mode: &Mode) -> Vec<Mode> {
+    pub(in crate::search) fn shifts(
+        &self,
+        problem: &Problem<'_>,
+        climb: &Climb<'_>,
+        edges: Option<&EdgeTerms<'_>>,
+        mode: &Mode,
+    ) -> Vec<Mode> {
         let parts = (climb.terms, climb.prior_terms, climb.graph);
-        let of = |mode: &Mode| self.continued(problem, parts, mode, &self.beyond);
+        let of = |mode: &Mode| self.continued(problem, parts, edges, mode, &self.beyond);
+        let none = BTreeSet::new();
+        let near = |start: &Motion| match edges {
+            Some(edges) => Joined { climb, edges, taken: &none }.near(start, None, f64::NEG_INFINITY),
+            None => climb.near(start),
+        };
         let (first, half) = (of(mode), mode.members.len() / 2);
         let evidence = mode.ln_evidence.max(first.around);
         let comparable = |shifted: &Mode| {
@@ -44,7 +55,7 @@ impl Pattern {
                 }
                 let by = self.basis.iter().zip(to).map(|(step, times)| step * f64::from(times)).sum::<Vector3<f64>>();
                 let start = Motion { translation: mode.motion.apply(&by), ..mode.motion };
-                let Some(shifted) = climb.near(&start).filter(&comparable) else { continue };
+                let Some(shifted) = near(&start).filter(&comparable) else { continue };
                 // A weak shift slides back to the place of a neighbour.
                 if found.iter().chain([mode]).all(|other: &Mode| other.members != shifted.members) {
                     found.push(shifted);

@@ -3,16 +3,18 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::{
+    edge_terms::EdgeTerms,
     fractions::ln_fraction,
     graph::ConsistencyGraph,
     likelihood::{Mode, Terms, ln_measured},
+    pattern_edges::{EdgeEvidence, repeated_edges},
     pattern_shifts::{ln_phase, ln_shifted},
     prior_terms::PriorTerms,
 };
 use crate::{
     problem::Problem,
     search::posterior::LN_RESEMBLES,
-    site::{model::ModelPoint, target::diameter},
+    site::{edge::ModelEdge, model::ModelPoint, target::diameter},
 };
 
 /// Maximum number of model points for the detection of a pattern, which takes cubic time.
@@ -28,6 +30,9 @@ const MIN_STEP: f64 = 3.0;
 const TELLING: usize = 3;
 /// Maximum number of shifts whose places are compared.
 const MAX_REGION: usize = 64;
+/// Evidence (nats) that a pattern ends at the object, above which a complete identification decides between its shifts;
+/// the margin of the search.
+const ENDS: f64 = 10.0;
 /// Sine of the angle between two steps below which they are one direction.
 const SAME: f64 = 0.3;
 
@@ -37,6 +42,8 @@ const SAME: f64 = 0.3;
 pub(in crate::search) struct Pattern {
     /// Whether a model point belongs to the pattern.
     repeats: Vec<bool>,
+    /// Whether a model edge does.
+    edges_repeat: Vec<bool>,
     /// The points of the pattern (object frame).
     at: Vec<Vector3<f64>>,
     /// The next places beyond the model (object frame).
@@ -54,13 +61,13 @@ pub(in crate::search) struct Continued {
     pub(in crate::search) alone: f64,
     /// The pattern around the object.
     pub(in crate::search) around: f64,
-    /// The evidence without the numbers of seen and unseen points of the pattern.
+    /// The evidence without the edges and the numbers of seen and unseen points of the pattern.
     in_blocks: f64,
-    /// The prior density of the pose.
+    /// The prior density of the pose, and the evidence of the edges outside the pattern.
     ln_prior: f64,
     /// Whether the pose identifies a point outside the pattern.
     identifies: bool,
-    /// Whether a point of the cloud continues the pattern.
+    /// Whether the cloud shows the pattern beyond the object, and no complete identification shows that it ends there.
     pub(super) continues: bool,
 }
 
@@ -75,8 +82,8 @@ impl Continued {
 }
 
 impl Pattern {
-    /// The pattern of a model; `None` without one.
-    pub(in crate::search) fn of(model: &[ModelPoint]) -> Option<Self> {
+    /// The pattern of a model and its edges; `None` without one.
+    pub(in crate::search) fn of(model: &[ModelPoint], edges: &[ModelEdge]) -> Option<Self> {
         let n = model.len();
         let min = ((MIN_FRACTION * n as f64).ceil() as usize).max(MIN_ROWS);
         if !(MIN_ROWS + 2..=MAX_POINTS).contains(&n) {
@@ -107,7 +114,9 @@ impl Pattern {
         if basis.is_empty() {
             return None;
         }
-        let mut pattern = Self { repeats: vec![false; n], at: Vec::new(), beyond: Vec::new(), off, basis };
+        let edges_repeat = repeated_edges(edges, model, &basis, off);
+        let mut pattern =
+            Self { repeats: vec![false; n], edges_repeat, at: Vec::new(), beyond: Vec::new(), off, basis };
         let basis = pattern.basis.clone();
         let next = |i: usize| basis.iter().flat_map(|step| [*step, -step]).map(move |step| (i, step));
         for (i, step) in (0..n).flat_map(next) {
@@ -145,21 +154,24 @@ impl Pattern {
     ///
     /// Detectors and matchers lose a pattern in blocks, such as a row. If the pattern continues beyond the object,
     /// unseen points therefore do not distinguish the shifts within it: a shift has at least the evidence of the best
-    /// mode, changed by the prior, by the residuals and by the points outside the pattern alone. Poses that identify no
-    /// such point are compared by the prior alone: a few corners with larger errors than stated decide their residuals.
+    /// mode, changed by the prior, by the residuals and by the points and edges outside the pattern alone. Poses that
+    /// identify no such point are compared by the prior and these edges: a few corners with larger errors than stated
+    /// decide their residuals. A complete identification with few of the places beyond it seen shows that the pattern
+    /// ends there, and evidence decides.
     ///
     /// Returns the evidence of the pattern without the object at the best mode; `None` without modes.
     pub(in crate::search) fn weigh(
         &self,
         problem: &Problem<'_>,
         parts: (&Terms, &PriorTerms, &ConsistencyGraph),
+        edges: Option<&EdgeTerms<'_>>,
         modes: &mut Vec<Mode>,
     ) -> Option<f64> {
         let shifts = self.shifts_from_first(modes);
         let add = |(at, mut mode): (usize, Mode)| {
             let others = shifts[at].iter().flat_map(|own| shifts.iter().flatten().map(move |other| other - own));
             let beyond = self.beyond_all(others);
-            let continued = self.continued(problem, parts, &mode, &beyond);
+            let continued = self.continued(problem, parts, edges, &mode, &beyond);
             let around = continued.around;
             let (less, more) =
                 if around < mode.ln_evidence { (around, mode.ln_evidence) } else { (mode.ln_evidence, around) };
@@ -233,12 +245,18 @@ impl Pattern {
         &self,
         problem: &Problem<'_>,
         (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        edges: Option<&EdgeTerms<'_>>,
         mode: &Mode,
         beyond: &[Vector3<f64>],
     ) -> Continued {
+        let by_edges =
+            edges.map_or_else(EdgeEvidence::default, |edges| EdgeEvidence::of(edges, &self.edges_repeat, mode));
         let repeats = |v: &&usize| self.repeats[graph.vertices[**v].model];
         let of_pattern: Vec<usize> = mode.members.iter().filter(repeats).copied().collect();
-        let own: f64 = mode.members.iter().filter(|v| !repeats(v)).map(|&v| terms.residual_gain(v, &mode.motion)).sum();
+        let points: f64 =
+            mode.members.iter().filter(|v| !repeats(v)).map(|&v| terms.residual_gain(v, &mode.motion)).sum();
+        // What the pattern alone does not show.
+        let own = points + by_edges.all - by_edges.repeated;
         let (n, all) = (self.repeats.len(), self.repeats.iter().filter(|&&repeats| repeats).count());
         let (k, seen) = (mode.members.len(), of_pattern.len());
         let ln_clutter = of_pattern.iter().map(|&v| terms.ln_density_about(v, graph.vertices[v].model)).sum::<f64>()
@@ -266,9 +284,13 @@ impl Pattern {
         let own_pattern = if incomplete { likely.max(around - own) } else { likely };
         let another = likely + LN_RESEMBLES + ln_phase(&self.basis, prior_terms, &mode.motion);
         let alone = another.max(own_pattern + ln_shifted(&self.basis, prior_terms, &mode.motion));
-        let in_blocks = mode.ln_evidence - ln_fraction(k, n) + ln_fraction(k - seen, n - all) + gains;
+        let of_points = mode.ln_evidence - by_edges.all;
+        let in_blocks = of_points - ln_fraction(k, n) + ln_fraction(k - seen, n - all) + gains + by_edges.distinctive;
         let ln_prior = prior_terms.known.as_ref().map_or(0.0, |_| prior_terms.ln_density(&mode.motion));
-        Continued { alone, around, in_blocks, ln_prior, identifies: k > seen, continues: further > 0 }
+        let ln_prior = ln_prior + by_edges.distinctive;
+        let ln_ends = ln_fraction(seen, all) + ln_fraction(further, beyond) - ln_fraction(seen + further, all + beyond);
+        let continues = further > 0 && !(seen == all && ln_ends >= ENDS);
+        Continued { alone, around, in_blocks, ln_prior, identifies: k > seen, continues }
     }
 }
 
@@ -345,7 +367,7 @@ mod tests {
 
     fn pattern(places: impl IntoIterator<Item = [f64; 3]>) -> Option<(usize, usize)> {
         let model: Vec<ModelPoint> = places.into_iter().map(|at| ModelPoint::exact("", Point::from(at))).collect();
-        let pattern = Pattern::of(&model)?;
+        let pattern = Pattern::of(&model, &[])?;
         Some((pattern.repeats.iter().filter(|&&repeats| repeats).count(), pattern.beyond.len()))
     }
 
@@ -374,7 +396,7 @@ mod tests {
         };
         let distinctive = |off: f64| {
             let model: Vec<ModelPoint> = all(off).map(|at| ModelPoint::exact("", Point::from(at))).collect();
-            let distinctive = Pattern::of(&model).expect("rows and columns").distinctive();
+            let distinctive = Pattern::of(&model, &[]).expect("rows and columns").distinctive();
             distinctive.map(|distinctive| distinctive.iter().filter(|&&distinctive| distinctive).count())
         };
         assert_eq!(distinctive(0.0), None);

@@ -27,10 +27,15 @@ fn prior(sigma: f64) -> Prior {
 /// The probabilities for a lattice of five columns 2 m ahead of which the cloud shows these columns; the prior has this
 /// standard deviation of the position (m). Also the shifts (columns) of the explanations.
 fn shown(columns: std::ops::Range<i8>, sigma: f64) -> (PosteriorProbabilities, Vec<i32>) {
+    seen(lattice(columns).collect(), sigma)
+}
+
+/// The same for any places of the lattice.
+fn seen(places: Vec<Vector3<f64>>, sigma: f64) -> (PosteriorProbabilities, Vec<i32>) {
     let model: Vec<ModelPoint> = lattice(0..COLUMNS).map(|at| ModelPoint::exact("", Point::from(at))).collect();
     let measured = |at: Vector3<f64>| UncertainPoint::isotropic((at + Vector3::new(0.0, 0.0, 2.0)).into(), 0.003);
     let cloud: Vec<MeasuredPoint> =
-        lattice(columns).map(|at| MeasuredPoint { position: measured(at), pixels: None }).collect();
+        places.into_iter().map(|at| MeasuredPoint { position: measured(at), pixels: None }).collect();
     let (tolerance, prior) = (Tolerance::Sigmas(3.0), prior(sigma));
     let candidates = crate::candidates::candidates(&model, &cloud, Some(&prior), &Gate::default(), None);
     let problem = Problem {
@@ -67,6 +72,19 @@ fn the_prior_decides_between_the_shifts() {
 fn a_complete_identification_decides() {
     let (complete, _) = shown(0..COLUMNS, 3.0 * STEP);
     assert!(complete.map_estimate > 0.999, "{complete:?}");
+}
+
+/// Two points that lie on the lattice beyond a complete identification are not its continuation; with a corner unseen
+/// they may be, since detectors lose a pattern in blocks.
+#[test]
+fn few_points_beyond_a_complete_identification_do_not_continue_it() {
+    let with_corners = |unseen: usize| {
+        let corners = [[-1.0, -1.0, 0.0], [5.0, 4.0, 0.0]].map(|at| STEP * Vector3::from(at));
+        seen(lattice(0..COLUMNS).skip(unseen).chain(corners).collect(), 3.0 * STEP).0
+    };
+    let (complete, incomplete) = (with_corners(0), with_corners(1));
+    assert!(complete.map_estimate > 0.999, "{complete:?}");
+    assert!(incomplete.map_estimate < 0.9, "{incomplete:?}");
 }
 
 /// A row of step s: ln N(x; 0, σ²) of its own direction against 1/s.
