@@ -401,6 +401,12 @@ pub struct Problem {
     pub putative: ::prost::alloc::vec::Vec<Match>,
     #[prost(message, optional, tag = "7")]
     pub model: ::core::option::Option<Target>,
+    #[prost(message, repeated, tag = "8")]
+    pub edges: ::prost::alloc::vec::Vec<ProblemEdge>,
+    #[prost(bool, tag = "9")]
+    pub is_putative_edges: bool,
+    #[prost(message, repeated, tag = "10")]
+    pub putative_edges: ::prost::alloc::vec::Vec<EdgePair>,
 }
 /// A model point and a cloud point.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
@@ -914,4 +920,14 @@ pub struct ModelEdge {
     pub id: ::prost::alloc::string::String,
     #[prost(double, repeated, tag = "2")]
     pub ends: ::prost::alloc::vec::Vec<f64>,
+}
+
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ProblemEdge {
+    #[prost(double, repeated, tag = "1")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
+    #[prost(uint32, optional, tag = "2")]
+    pub from_point: ::core::option::Option<u32>,
+    #[prost(uint32, optional, tag = "3")]
+    pub to_point: ::core::option::Option<u32>,
 }

@@ -247,6 +247,8 @@ fn inputs(number: u64) -> Inputs {
             delta: 0.04,
             prior: (number > 0).then_some((pose, 0.5)),
             putative: (number > 1).then(|| vec![[0, 3], [1, 4]]),
+            edges: vec![ProblemEdge { ends: [[x, 0.0, 0.25], [x, 0.5, 0.25]], points: [Some(0), None] }],
+            putative_edges: (number > 1).then(|| vec![EdgePair { model: 0, line: 2 }]),
         }),
         truth: Some(TrueState {
             world_from_camera: pose,
