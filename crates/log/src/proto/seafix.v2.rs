@@ -520,6 +520,10 @@ pub struct Evaluation {
     pub edges_identified: ::core::option::Option<u32>,
     #[prost(uint32, optional, tag = "21")]
     pub correct_edges: ::core::option::Option<u32>,
+    #[prost(double, optional, tag = "22")]
+    pub mssd: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "23")]
+    pub mspd: ::core::option::Option<f64>,
 }
 /// What all frames of a trial add up to, logged or not. Topic /metrics/totals, once, after the last frame.
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -143,6 +143,8 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         edges_visible: Some(6),
         edges_identified: Some(4),
         correct_edges: Some(4),
+        mssd: Some(0.012),
+        mspd: None,
     };
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
