@@ -28,9 +28,7 @@ pub fn mspd(
     symmetries: &[Transform<Object, Object>],
     camera: &Pinhole,
 ) -> Option<f64> {
-    min_of_max(estimate, truth, model, symmetries, |a, b| {
-        Some(camera.project(&a.coords)?.distance(&camera.project(&b.coords)?))
-    })
+    min_of_max(estimate, truth, model, symmetries, |a, b| Some(camera.project(a)?.distance(&camera.project(b)?)))
 }
 
 fn min_of_max(
