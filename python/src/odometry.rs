@@ -79,7 +79,7 @@ impl Odometry {
     fn new(py: Python<'_>, rig: &Rig, odometry: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let choice = odometry.map_or_else(|| Ok(Choice::named("stereo")), |given| choice(given, "odometry"))?;
         let built = ODOMETRIES.build(&choice).map_err(|error| stated(py, "odometry", &error.to_string()))?;
-        if built.listens() {
+        if built.needs_readings() {
             let what = format!("the odometry `{}` needs readings of other sensors", choice.name);
             return Err(invalid(py, "odometry", what, "use `stereo` or `icp`, or run an experiment with a recording"));
         }

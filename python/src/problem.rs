@@ -88,6 +88,7 @@ impl Problem {
             delta,
             prior: prior.map(of_problem).transpose()?,
             putative: putative.map(|given| index_pairs(given, "putative")).transpose()?,
+            edges: Default::default(),
         };
         let inner = detached(py, || parts.checked())?.map_err(|fault| {
             let error = pyo3::exceptions::PyValueError::new_err(fault.to_string());

@@ -10,11 +10,14 @@ use seafix_geometry::{
     Transform, UncertainPixels, UncertainPoint, World,
 };
 use seafix_log::{
-    AnswerRecord, CloudPoint, ExactPose, Inputs, Line, Offset, ProblemRecord, SensorReading, SitePoint, TargetModel,
-    TrueState,
+    AnswerRecord, CloudPoint, EdgePair, ExactPose, Inputs, Line, Offset, ProblemEdge, ProblemRecord, SensorReading,
+    SitePoint, TargetModel, TrueState,
 };
 use seafix_navigation::{Device, Reading};
-use seafix_referencing::{ModelEdge, ModelPoint, Prior, PriorBound, Site, Target, problem_file::CoherenceProblem};
+use seafix_referencing::{
+    End, ModelEdge, ModelPoint, Prior, PriorBound, Site, Target,
+    problem_file::{CoherenceProblem, ProblemEdges},
+};
 use seafix_vision::Image;
 
 use crate::sequence::{TrueAnswer, Truth};
@@ -115,6 +118,39 @@ fn problem_record(object: &Target, problem: &CoherenceProblem) -> ProblemRecord 
             PriorBound::Gaussian(_) => None,
         }),
         putative: problem.putative.as_deref().map(matches),
+        edges: problem.edges.model.iter().map(|edge| edge_of_problem(edge, &problem.model)).collect(),
+        putative_edges: problem.edges.putative.as_deref().map(|pairs| {
+            pairs.iter().map(|&(model, line)| EdgePair { model: model as u32, line: line as u32 }).collect()
+        }),
+    }
+}
+
+fn edge_of_problem(edge: &ModelEdge, model: &[ModelPoint]) -> ProblemEdge {
+    ProblemEdge {
+        ends: edge.places(model).map(|end| end.coords.into()),
+        points: edge.ends.map(|end| match end {
+            End::Point(index) => Some(index as u32),
+            End::At(_) => None,
+        }),
+    }
+}
+
+/// The edges of a problem in a log's record; the lines are those of the frame.
+fn edges_of_problem(problem: &ProblemRecord, lines: &[MeasuredLine]) -> ProblemEdges {
+    let edge = |(index, edge): (usize, &ProblemEdge)| ModelEdge {
+        id: index.to_string(),
+        ends: std::array::from_fn(|end| match edge.points[end] {
+            Some(point) => End::Point(point as usize),
+            None => End::At(Point::from(edge.ends[end])),
+        }),
+        sigma: 0.0,
+        faces: Vec::new(),
+    };
+    let pairs = |pairs: &Vec<EdgePair>| pairs.iter().map(|pair| (pair.model as usize, pair.line as usize)).collect();
+    ProblemEdges {
+        model: problem.edges.iter().enumerate().map(edge).collect(),
+        lines: lines.to_vec(),
+        putative: problem.putative_edges.as_ref().map(pairs),
     }
 }
 
@@ -197,7 +233,7 @@ pub fn line(record: &Line) -> MeasuredLine {
 }
 
 /// The hints in a log's record.
-pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint]) -> Hints {
+pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint], lines: &[MeasuredLine]) -> Hints {
     if let Some(names) = &inputs.names {
         return Hints::Names(indices(names));
     }
@@ -215,6 +251,7 @@ pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint]) -> Hints {
         delta: problem.delta,
         prior: problem.prior.as_ref().map(prior),
         putative: problem.putative.as_deref().map(index_pairs),
+        edges: edges_of_problem(problem, lines),
     }))
 }
 

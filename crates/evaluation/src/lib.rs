@@ -27,6 +27,7 @@ mod fix;
 mod solved;
 mod statistics;
 mod surface;
+mod symmetric;
 pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
@@ -37,3 +38,4 @@ pub use statistics::{
     signed_rank,
 };
 pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance};
+pub use symmetric::{mspd, mssd};

@@ -435,7 +435,7 @@ fn built(trial: Experiment, index: usize, cell: &Cell, folder: &Path) -> Result<
     }
     let navigation_stack = trial.navigation.as_ref().map(Navigation::build).transpose();
     let navigation_stack = navigation_stack.map_err(InvalidSetting::navigation)?;
-    if navigation_stack.as_ref().is_some_and(NavigationStack::listens) && !source.may_have_readings() {
+    if navigation_stack.as_ref().is_some_and(NavigationStack::needs_readings) && !source.may_have_readings() {
         let source = &trial.source.name;
         let what = format!(
             "needs a Doppler log and a gyro, which source `{source}` does not have; use `stereo`, or the source `dive`"

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use seafix_evaluation::{
-    alert_limit, attitude_error, nees, position_error, residual_rms, transfer_bound, transfer_rms,
+    alert_limit, attitude_error, mspd, mssd, nees, position_error, residual_rms, transfer_bound, transfer_rms,
 };
 use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform, World};
 use seafix_log::{Evaluation, FrameRecord, NavigationErrors, TruthRecord, VisiblePoint};
@@ -208,6 +208,12 @@ fn evaluate(
     row.fit_rms = residual_rms(estimate, &of(&|_| true));
     row.fit_rms_unused = residual_rms(estimate, &of(&|index| !fix.used.contains(&index)));
     row.tre_rms = transfer_rms(estimate, &true_pose, &model);
+    // Each problem has a model of its own, whose self-symmetries take longer than its search.
+    if truth.answer.is_none() {
+        let symmetries = symmetries(known.target);
+        row.mssd = mssd(estimate, &true_pose, &model, &symmetries);
+        row.mspd = mspd(estimate, &true_pose, &model, &symmetries, rig.left());
+    }
     row.position_error = Some(position_error(estimate, &true_pose));
     row.attitude_error = Some(attitude_error(estimate, &true_pose));
     row.nees = nees(estimate, &true_pose, &fix.covariance, &centroid);
@@ -215,6 +221,16 @@ fn evaluate(
         Some(answer) => Some(!answer.rule.holds(estimate, &true_pose, &model)),
         None => row.tre_rms.map(|tre| !(tre <= alert_limit(known.target.diameter()))),
     };
+}
+
+/// The motions that map every point of a target onto one, and its normal onto that point's.
+fn symmetries(target: &Target) -> Vec<Transform<Object, Object>> {
+    let agree = |motion: &Transform<Object, Object>, (from, to): &(usize, usize)| {
+        let normals = target.points[*from].normal.zip(target.points[*to].normal);
+        normals.is_none_or(|(a, b)| (motion.rotation() * a).dot(&b) > 0.0)
+    };
+    let complete = target.congruences().iter().filter(|it| it.broken_by.is_empty());
+    complete.filter(|it| it.pairs.iter().all(|pair| agree(&it.motion, pair))).map(|it| it.motion).collect()
 }
 
 /// Whether the cloud point of `pair` is at its model point's true projections in both images.

@@ -84,8 +84,8 @@ pub use record::{
     Alternative, AnswerRecord, Axis, BestPose, CameraRecord, CloudPoint, Component, ELSEWHERE, EdgePair, Evaluation,
     ExactPose, FrameRecord, FrameTimes, GreyImage, Inputs, Integrity, Line, Matrix3, Matrix4, Matrix6, ModelEdge,
     ModelPoint, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Offset, Outcome, Pair, PixelPair,
-    PointOfInterest, PriorRecord, ProblemRecord, Region, RigRecord, SensorReading, SharedStages, SitePoint,
-    TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
+    PointOfInterest, PriorRecord, ProblemEdge, ProblemRecord, Region, RigRecord, SensorReading, SharedStages,
+    SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
 };
 pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};

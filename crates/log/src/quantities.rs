@@ -156,6 +156,8 @@ quantities! {
     TRE_RMS: Target Real "tre_rms" "m" "/metrics/evaluation" "The target registration error: the RMS error of all model points that the pose transfers." = |r: &TargetRecord| r.evaluation.tre_rms;
     POSITION_ERROR: Target Real "position_error" "m" "/metrics/evaluation" "The error of the left camera's position in the object frame." = |r: &TargetRecord| r.evaluation.position_error;
     ATTITUDE_ERROR: Target Real "attitude_error" "rad" "/metrics/evaluation" "The rotation angle of the pose error." = |r: &TargetRecord| r.evaluation.attitude_error;
+    MSSD: Target Real "mssd" "m" "/metrics/evaluation" "The maximum symmetry-aware surface distance of the BOP benchmark: the largest error of a model point, after the motion that maps the model onto itself and makes it smallest." = |r: &TargetRecord| r.evaluation.mssd;
+    MSPD: Target Real "mspd" "px" "/metrics/evaluation" "The maximum symmetry-aware projection distance of the BOP benchmark: the same between projections into the left image." = |r: &TargetRecord| r.evaluation.mspd;
     NEES: Target Real "nees" "" "/metrics/evaluation" "The normalised estimation error squared, six degrees of freedom." = |r: &TargetRecord| r.evaluation.nees;
     TRE_CRLB: Target Real "tre_crlb" "m" "/metrics/evaluation" "The Cramér–Rao bound of the TRE." = |r: &TargetRecord| r.evaluation.tre_crlb;
     POSITION_CRLB: Target Real "position_crlb" "m" "/metrics/evaluation" "The Cramér–Rao bound of the position error." = |r: &TargetRecord| r.evaluation.position_crlb;

@@ -41,7 +41,7 @@ pub enum Event {
     /// The fix was accepted.
     Taken,
     /// The fix is of another object and too inaccurate; the pose stays relative to the previous object.
-    Left,
+    LessAccurate,
     /// The fix contradicts the navigated pose; it waits for further fixes that agree with it.
     Doubted(Contradiction),
     /// Several fixes agree with each other, but not with the known pose relative to their object; they replace it.
@@ -281,7 +281,7 @@ impl<'a> Navigator<'a> {
                     self.agree(object, known.object);
                     if !self.fusion.passes(&known.object_pose, &pose) {
                         self.doubts[object] = None;
-                        return Event::Left;
+                        return Event::LessAccurate;
                     }
                 }
                 self.doubts[object] = None;

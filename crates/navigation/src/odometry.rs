@@ -72,12 +72,12 @@ impl Stamps {
 /// use seafix_navigation::ODOMETRIES;
 ///
 /// let odometry = ODOMETRIES.build(&Choice::named("stereo").with("window", 4)).unwrap();
-/// assert!(!odometry.listens(), "stereo odometry needs images only");
-/// assert!(ODOMETRIES.build(&Choice::named("dvl-gyro")).unwrap().listens());
+/// assert!(!odometry.needs_readings(), "stereo odometry needs images only");
+/// assert!(ODOMETRIES.build(&Choice::named("dvl-gyro")).unwrap().needs_readings());
 /// ```
 pub trait Odometry: Send + Sync + std::fmt::Debug {
     /// Whether the odometry needs sensor readings ([`OdometrySession::sense`]).
-    fn listens(&self) -> bool {
+    fn needs_readings(&self) -> bool {
         false
     }
 

@@ -23,7 +23,7 @@ pub enum NavigationEvent {
         object: String,
     },
     /// A fix that is less accurate than the navigated pose, which stays.
-    FixLeft {
+    FixLessAccurate {
         /// The object's name.
         object: String,
     },
@@ -95,7 +95,7 @@ impl fmt::Display for NavigationEvent {
                 write!(f, "fix at {object} not used, its sensitivity to model errors is undetermined: {why}")
             }
             Self::FixTaken { object } => write!(f, "fix at {object} accepted"),
-            Self::FixLeft { object } => {
+            Self::FixLessAccurate { object } => {
                 write!(f, "fix at {object} not used: the previous fix, moved here by odometry, is more accurate")
             }
             Self::FixDoubted { object, why } => write!(f, "fix at {object} held back: {why}"),

@@ -88,8 +88,8 @@ pub struct NavigationStack {
 
 impl NavigationStack {
     /// Whether the odometry requires readings of the vehicle's Doppler log and gyro.
-    pub fn listens(&self) -> bool {
-        self.odometry.listens()
+    pub fn needs_readings(&self) -> bool {
+        self.odometry.needs_readings()
     }
 
     /// The odometry at its start.

@@ -358,12 +358,12 @@ impl<'a> NavigationSession<'a> {
             let event = self.navigator.fix(&fix);
             // A key frame added at an object that may have been moved would be placed wrongly.
             let sure = !self.navigator.is_disputed(attempt.target);
-            if sure && matches!(event, Event::Taken | Event::Left | Event::Relocated) {
+            if sure && matches!(event, Event::Taken | Event::LessAccurate | Event::Relocated) {
                 taken.push(fix.clone());
             }
             match event {
                 Event::Taken => events.push(NavigationEvent::FixTaken { object }),
-                Event::Left => events.push(NavigationEvent::FixLeft { object }),
+                Event::LessAccurate => events.push(NavigationEvent::FixLessAccurate { object }),
                 Event::Doubted(why) => events.push(NavigationEvent::FixDoubted { object, why: why.to_string() }),
                 Event::Relocated => events.push(NavigationEvent::FixesOverrule { object }),
                 Event::Disputed { objects, metres } => {

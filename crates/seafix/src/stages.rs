@@ -340,9 +340,10 @@ impl PipelineStages {
             Ok(candidates) => (candidates, None),
             Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
         };
-        let posed = posed(target, problem, &candidates);
+        let edges = problem.edges.candidates(&target.points, problem.prior.as_ref());
+        let posed = posed(target, problem, &candidates, &edges);
         let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
-        Sought { candidates, edges: Vec::new(), found, spent: [stage1, stage2] }
+        Sought { candidates, edges, found, spent: [stage1, stage2] }
     }
 
     /// The attempt on one target; `None` if it is out of view. `sought` is an earlier result of Stages 1 and 2.
@@ -438,8 +439,8 @@ impl PipelineStages {
 
     /// The answer to a problem with candidates, tolerance and prior pose of its own.
     fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> TargetAttempt {
-        let Sought { candidates, found, spent: [stage1, stage2], .. } = sought;
-        let posed = posed(target, problem, &candidates);
+        let Sought { candidates, edges, found, spent: [stage1, stage2] } = sought;
+        let posed = posed(target, problem, &candidates, &edges);
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
         let times = [stage1, stage2, solution];
         TargetAttempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
@@ -455,9 +456,15 @@ fn edges_of<'a>(target: &'a Target, lines: &'a [MeasuredLine], candidates: &'a [
 }
 
 /// The input of the search for a problem with tolerance and prior pose of its own.
-fn posed<'a>(target: &'a Target, problem: &'a CoherenceProblem, candidates: &'a Candidates) -> Problem<'a> {
+fn posed<'a>(
+    target: &'a Target,
+    problem: &'a CoherenceProblem,
+    candidates: &'a Candidates,
+    edges: &'a [Vec<usize>],
+) -> Problem<'a> {
     let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
-    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior, edges: Default::default() }
+    let edges = edges_of(target, &problem.edges.lines, edges);
+    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior, edges }
 }
 
 /// The pairs that the labels of the cloud points state, in the order of the model. A target of one object takes the

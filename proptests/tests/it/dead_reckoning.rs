@@ -21,7 +21,7 @@ const START: u64 = 100 * SECOND;
 /// The odometries by readings.
 fn listening() -> Vec<(&'static str, Box<dyn Odometry>)> {
     let built = |name| (name, ODOMETRIES.build(&Choice::named(name)).unwrap());
-    ODOMETRIES.names().map(built).filter(|(_, odometry)| odometry.listens()).collect()
+    ODOMETRIES.names().map(built).filter(|(_, odometry)| odometry.needs_readings()).collect()
 }
 
 fn rig() -> StereoRig {

@@ -118,7 +118,7 @@ fn message(stamp_ns: u64) -> [Reading; 2] {
 /// The odometries by images.
 fn by_images() -> impl Iterator<Item = (&'static str, Box<dyn Odometry>)> {
     let built = |name| (name, ODOMETRIES.build(&Choice::named(name)).unwrap());
-    ODOMETRIES.names().map(built).filter(|(_, odometry)| !odometry.listens())
+    ODOMETRIES.names().map(built).filter(|(_, odometry)| !odometry.needs_readings())
 }
 
 fn paths(trajectory: &OdometryTrajectory) -> Vec<Vector3<f64>> {

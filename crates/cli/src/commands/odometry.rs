@@ -78,7 +78,7 @@ impl Odometer {
             Dataset::open_pairs(&self.dataset, self.sort_stamps).map_err(|faults| Failure::faults(INPUT, &faults))?;
         let odd = dataset.odd_times();
         dataset.warnings.iter().chain(&odd).for_each(|warning| notify(&format!("warning: {warning}")));
-        if odometry.listens() && !dataset.has_readings() {
+        if odometry.needs_readings() && !dataset.has_readings() {
             let what = format!("no readings for odometry `{}`", self.odometry);
             let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
             let remedy =
@@ -96,7 +96,7 @@ impl Odometer {
             return Err(Failure::new(INPUT, fault));
         }
         let right_camera_rotation =
-            if self.keep_rig || odometry.listens() { None } else { right_camera_rotation(&dataset) };
+            if self.keep_rig || odometry.needs_readings() { None } else { right_camera_rotation(&dataset) };
         if let Some(found) = &right_camera_rotation {
             dataset.rig = found.rig;
         }

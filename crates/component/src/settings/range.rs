@@ -77,10 +77,14 @@ pub(super) fn range(probe: &Probe<'_>, form: &Form, siblings: &[Field]) -> Range
             let words = if each.words.starts_with("the ") { &each.words } else { &format!("each {}", each.words) };
             Range { words: format!("{count}, {words}"), ..each }
         }
-        Form::Component { kind, .. } => Range { words: format!("a {kind}"), ..Range::default() },
+        Form::Component { kind, .. } => {
+            let article = if kind.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+            Range { words: format!("{article} {kind}"), ..Range::default() }
+        }
         Form::OneOf(forms) => {
             let all: Vec<Range> = forms.iter().map(|form| range(probe, form, siblings)).collect();
-            let words: Vec<String> = all.iter().map(|range| range.words.clone()).collect();
+            let mut words: Vec<String> = all.iter().map(|range| range.words.clone()).collect();
+            words.dedup();
             let own = all.into_iter().zip(forms).find(|(_, form)| matches!(form, Form::Number)).map(|(range, _)| range);
             match own {
                 // The message of a number with words beside it names both.

@@ -195,7 +195,8 @@ impl Sequence for Logged {
                 .ok_or_else(|| broken("a point without covariance of its pixels".to_owned()))?,
             None => self.old_cloud(&frame),
         };
-        let hints = log_conversion::hints(inputs, &cloud);
+        let lines: Vec<_> = frame.lines.iter().map(log_conversion::line).collect();
+        let hints = log_conversion::hints(inputs, &cloud, &lines);
         let readings = log_conversion::readings(inputs).map_err(broken)?;
         let prior = match frame.inputs {
             Some(_) => log_conversion::prior(inputs),
@@ -207,8 +208,8 @@ impl Sequence for Logged {
                 return Err(fault.remedy("replay the clouds, or run again with full images in the log"));
             }
             Some([left, right]) => FrameData::Stereo(image(left).map_err(broken)?, image(right).map_err(broken)?),
-            None if frame.lines.is_empty() => FrameData::Points(cloud),
-            None => FrameData::Features(cloud, frame.lines.iter().map(log_conversion::line).collect()),
+            None if lines.is_empty() => FrameData::Points(cloud),
+            None => FrameData::Features(cloud, lines),
         };
         Ok(SensorFrame { stamp_ns: frame.stamp_ns, frame_data, prior, hints, readings })
     }

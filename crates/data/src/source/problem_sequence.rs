@@ -48,10 +48,18 @@ pub(super) fn site_of(problem: &CoherenceProblem) -> Site {
         survey_sigma: 0.0,
         world_from_object: None,
         points: problem.model.clone(),
-        edges: Vec::new(),
+        edges: problem.edges.model.clone(),
         interest: Vec::new(),
     };
     Site { objects: vec![object], ..no_site() }
+}
+
+/// The measurements of a problem.
+fn features(problem: &CoherenceProblem) -> FrameData {
+    match problem.edges.lines.is_empty() {
+        true => FrameData::Points(problem.cloud.clone()),
+        false => FrameData::Features(problem.cloud.clone(), problem.edges.lines.clone()),
+    }
 }
 
 impl ProblemSequence {
@@ -105,7 +113,7 @@ impl Sequence for ProblemSequence {
         let problem = (self.posing)(index).problem;
         Ok(SensorFrame {
             stamp_ns: index as u64 * STEP_NS,
-            frame_data: FrameData::Points(problem.cloud.clone()),
+            frame_data: features(&problem),
             prior: None,
             hints: Hints::Problem(problem),
             readings: Vec::new(),

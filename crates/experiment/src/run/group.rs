@@ -153,7 +153,7 @@ fn unnavigable(sequence: &dyn Sequence, navigation_stack: &NavigationStack, targ
     if !sequence.images() {
         return fault("needs images, but this source has points", "remove [navigation]");
     }
-    if navigation_stack.listens() && !sequence.has_readings() {
+    if navigation_stack.needs_readings() && !sequence.has_readings() {
         let remedy = "use odometry = \"stereo\", or a dive or a data set with `doppler` and `gyro`";
         return fault("needs readings of a Doppler log and a gyro, which this source does not have", remedy);
     }

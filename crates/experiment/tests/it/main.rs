@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may stop at once, and prints its measurements")]
 
 mod costs;
+mod edges;
 mod foreign;
 mod located;
 mod logging_cost;

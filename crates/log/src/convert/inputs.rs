@@ -3,10 +3,13 @@
 use super::{
     fields::{Malformed, flat, matrix, required},
     header::{target_message, target_record},
+    line::{edge_pair_messages, edge_pair_records},
 };
 use crate::{
     proto,
-    record::{AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState},
+    record::{
+        AnswerRecord, ExactPose, FrameRecord, Inputs, ProblemEdge, ProblemRecord, SensorReading, SitePoint, TrueState,
+    },
 };
 
 /// The message that holds the inputs of `frame`.
@@ -100,6 +103,9 @@ fn problem_message(problem: &ProblemRecord) -> proto::Problem {
         gate_half: problem.prior.map_or(0.0, |(_, half)| half),
         is_putative: problem.putative.is_some(),
         putative: matches_message(problem.putative.as_deref().unwrap_or_default()),
+        edges: problem.edges.iter().map(edge_message).collect(),
+        is_putative_edges: problem.putative_edges.is_some(),
+        putative_edges: edge_pair_messages(problem.putative_edges.as_deref().unwrap_or_default()),
     }
 }
 
@@ -110,7 +116,19 @@ fn problem_record(message: proto::Problem) -> Result<ProblemRecord, Malformed> {
         delta: message.delta,
         prior: message.object_from_camera.map(|pose| Ok((pose_record(pose)?, half))).transpose()?,
         putative: message.is_putative.then(|| matches_record(&message.putative)),
+        edges: message.edges.iter().map(edge_record).collect::<Result<_, _>>()?,
+        putative_edges: message.is_putative_edges.then(|| edge_pair_records(&message.putative_edges)),
     })
+}
+
+fn edge_message(edge: &ProblemEdge) -> proto::ProblemEdge {
+    let [from_point, to_point] = edge.points;
+    proto::ProblemEdge { ends: edge.ends.as_flattened().to_vec(), from_point, to_point }
+}
+
+fn edge_record(message: &proto::ProblemEdge) -> Result<ProblemEdge, Malformed> {
+    let points = [message.from_point, message.to_point];
+    Ok(ProblemEdge { ends: matrix("problem.edges.ends", &message.ends)?, points })
 }
 
 fn truth_message(truth: &TrueState) -> proto::TrueState {

@@ -401,6 +401,12 @@ pub struct Problem {
     pub putative: ::prost::alloc::vec::Vec<Match>,
     #[prost(message, optional, tag = "7")]
     pub model: ::core::option::Option<Target>,
+    #[prost(message, repeated, tag = "8")]
+    pub edges: ::prost::alloc::vec::Vec<ProblemEdge>,
+    #[prost(bool, tag = "9")]
+    pub is_putative_edges: bool,
+    #[prost(message, repeated, tag = "10")]
+    pub putative_edges: ::prost::alloc::vec::Vec<EdgePair>,
 }
 /// A model point and a cloud point.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
@@ -514,6 +520,10 @@ pub struct Evaluation {
     pub edges_identified: ::core::option::Option<u32>,
     #[prost(uint32, optional, tag = "21")]
     pub correct_edges: ::core::option::Option<u32>,
+    #[prost(double, optional, tag = "22")]
+    pub mssd: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "23")]
+    pub mspd: ::core::option::Option<f64>,
 }
 /// What all frames of a trial add up to, logged or not. Topic /metrics/totals, once, after the last frame.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -914,4 +924,14 @@ pub struct ModelEdge {
     pub id: ::prost::alloc::string::String,
     #[prost(double, repeated, tag = "2")]
     pub ends: ::prost::alloc::vec::Vec<f64>,
+}
+
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ProblemEdge {
+    #[prost(double, repeated, tag = "1")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
+    #[prost(uint32, optional, tag = "2")]
+    pub from_point: ::core::option::Option<u32>,
+    #[prost(uint32, optional, tag = "3")]
+    pub to_point: ::core::option::Option<u32>,
 }

@@ -2,6 +2,7 @@
 
 use super::{
     header::TargetModel,
+    line::EdgePair,
     matrix::{Matrix3, Matrix4, Matrix6},
 };
 
@@ -67,6 +68,19 @@ pub struct ProblemRecord {
     pub prior: Option<(ExactPose, f64)>,
     /// The only pairs (model, cloud) to consider.
     pub putative: Option<Vec<[u32; 2]>>,
+    /// The straight edges; the measured lines are those of the frame.
+    pub edges: Vec<ProblemEdge>,
+    /// The only pairs (edge, line) to consider.
+    pub putative_edges: Option<Vec<EdgePair>>,
+}
+
+/// A straight edge of a problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProblemEdge {
+    /// Its ends, object frame (m).
+    pub ends: [[f64; 3]; 2],
+    /// The model points at its ends; `None` for a place of its own.
+    pub points: [Option<u32>; 2],
 }
 
 /// What the judge knew.

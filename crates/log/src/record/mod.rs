@@ -16,7 +16,7 @@ pub use frame::{
     CloudPoint, FrameRecord, FrameTimes, GreyImage, PixelPair, PriorRecord, SharedStages, TruthRecord, VisiblePoint,
 };
 pub use header::{Axis, CameraRecord, Component, ModelPoint, RigRecord, TargetModel, TrialHeader};
-pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemRecord, SensorReading, SitePoint, TrueState};
+pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemEdge, ProblemRecord, SensorReading, SitePoint, TrueState};
 pub use inspection::PointOfInterest;
 pub use line::{EdgePair, Line, ModelEdge, Offset};
 pub use matrix::{Matrix3, Matrix4, Matrix6};

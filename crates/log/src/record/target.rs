@@ -249,6 +249,10 @@ mirror! {
         pub edges_identified: Option<u32>,
         /// The number of identified edges whose line lies within 2 px of the true one at both ends, in both images.
         pub correct_edges: Option<u32>,
+        /// The maximum symmetry-aware surface distance of BOP (m).
+        pub mssd: Option<f64>,
+        /// The maximum symmetry-aware projection distance of BOP in the left image (px).
+        pub mspd: Option<f64>,
     }
 }
 

@@ -143,6 +143,8 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         edges_visible: Some(6),
         edges_identified: Some(4),
         correct_edges: Some(4),
+        mssd: Some(0.012),
+        mspd: None,
     };
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
@@ -247,6 +249,8 @@ fn inputs(number: u64) -> Inputs {
             delta: 0.04,
             prior: (number > 0).then_some((pose, 0.5)),
             putative: (number > 1).then(|| vec![[0, 3], [1, 4]]),
+            edges: vec![ProblemEdge { ends: [[x, 0.0, 0.25], [x, 0.5, 0.25]], points: [Some(0), None] }],
+            putative_edges: (number > 1).then(|| vec![EdgePair { model: 0, line: 2 }]),
         }),
         truth: Some(TrueState {
             world_from_camera: pose,

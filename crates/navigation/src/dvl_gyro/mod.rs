@@ -14,7 +14,7 @@ use crate::odometry::{Odometry, OdometrySession};
 use dead_reckoning::DeadReckoning;
 
 impl Odometry for DvlGyro {
-    fn listens(&self) -> bool {
+    fn needs_readings(&self) -> bool {
         true
     }
 

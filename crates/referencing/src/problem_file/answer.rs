@@ -148,6 +148,9 @@ pub struct Answer {
     pub covariance: Option<[[f64; 6]; 6]>,
     /// The identified pairs (model, cloud) of a fix.
     pub pairs: Option<Vec<[usize; 2]>>,
+    /// The identified edges (edge, line) of a fix, if there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub edges: Vec<[usize; 2]>,
     /// The scale of the model relative to the cloud.
     ///
     /// Present for a fix whose solver estimates a similarity.
@@ -246,6 +249,7 @@ pub fn printed(
         t_cam_obj: fix.map(|fix| rows(&fix.object_from_camera)),
         covariance: fix.map(|fix| rows6(&fix.covariance)),
         pairs: fix.map(|fix| indices(&fix.pairs)),
+        edges: fix.map_or_else(Vec::new, |fix| indices(&fix.edges)),
         scale: fix.and_then(|fix| solver.scale(&Observations::of(&fix.pairs, &problem.model, &problem.cloud, None))),
         behind: fix.map_or_else(Vec::new, |fix| {
             let clouds = fix.pairs.iter().map(|pair| pair.cloud);

@@ -8,6 +8,7 @@ use seafix_component::{Fault, read_text};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
 use super::{
+    edges::{EdgeParts, ProblemEdges},
     json::{FORMAT, RawPrior, Source},
     method::Method,
     parts::{Noise, Parts},
@@ -15,7 +16,7 @@ use super::{
 use crate::{
     accept::{acceptance::Acceptance, compute_fix, expanding_gates::search_with_expanding_gates, outcome::Attempt},
     candidates::{Candidates, Gate, candidates},
-    problem::{Prior, PriorBound, Problem, Tolerance},
+    problem::{Edges, Prior, PriorBound, Problem, Tolerance},
     search::identification::{Rejected, Search},
     site::model::ModelPoint,
     solve::solver::Solver,
@@ -46,6 +47,8 @@ pub struct CoherenceProblem {
     ///
     /// A point that the file lists more than once takes part as its first.
     pub putative: Option<Vec<(usize, usize)>>,
+    /// The straight edges of the model and the measured lines; empty for points alone.
+    pub edges: ProblemEdges,
 }
 
 impl CoherenceProblem {
@@ -71,6 +74,7 @@ impl CoherenceProblem {
             delta: Some(raw.delta),
             prior: None,
             putative: raw.putative,
+            edges: EdgeParts { edges: raw.edges, lines: raw.lines, putative: raw.putative_edges },
         };
         let problem = parts.checked().map_err(|invalid| {
             let path: Vec<&str> = invalid.path.iter().map(String::as_str).collect();
@@ -160,13 +164,14 @@ impl CoherenceProblem {
             Ok(candidates) => candidates,
             Err(refused) => return Attempt::without(refused),
         };
+        let of_edges = self.edges.candidates(&self.model, prior);
         let problem = Problem {
             model: &self.model,
             cloud: &self.cloud,
             candidates: &candidates,
             tolerance,
             prior,
-            edges: Default::default(),
+            edges: Edges { model: &self.edges.model, lines: &self.edges.lines, candidates: &of_edges },
         };
         compute_fix(&problem, search, solver, acceptance, None, rng)
     }

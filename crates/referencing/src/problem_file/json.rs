@@ -10,8 +10,12 @@ use serde::{
 use serde_json::value::RawValue;
 use serde_path_to_error::Segment;
 
-/// The format that this reader supports.
+use super::edges::{RawEnd, RawLine};
+
+/// The format of a problem of points.
 pub const FORMAT: &str = "coherence-problem/1";
+/// The format of a problem with straight edges; a problem of points may state it as well.
+pub const FORMAT_WITH_EDGES: &str = "coherence-problem/1.1";
 
 /// The keys of a problem before validation.
 #[derive(Deserialize)]
@@ -36,6 +40,12 @@ pub(super) struct Raw {
     pub(super) prior: Option<InBraces<RawPrior>>,
     #[serde(default)]
     pub(super) putative: Option<Vec<[usize; 2]>>,
+    #[serde(default)]
+    pub(super) edges: Vec<[RawEnd; 2]>,
+    #[serde(default)]
+    pub(super) lines: Vec<RawLine>,
+    #[serde(default)]
+    pub(super) putative_edges: Option<Vec<[usize; 2]>>,
 }
 
 /// The keys of a prior before validation.
@@ -94,12 +104,21 @@ impl<'a> Source<'a> {
             // Another format has other keys.
             let format =
                 value_at(self.text, &["format"]).and_then(|format| serde_json::from_str::<String>(format).ok());
-            match format.filter(|format| format != FORMAT) {
+            match format.filter(|format| ![FORMAT, FORMAT_WITH_EDGES].contains(&format.as_str())) {
                 Some(other) => self.unknown_format(&other),
                 None => self.wrong(&path, &error),
             }
         })?;
-        if raw.format == FORMAT { Ok(raw) } else { Err(self.unknown_format(&raw.format)) }
+        let plain = raw.edges.is_empty() && raw.lines.is_empty() && raw.putative_edges.is_none();
+        match raw.format.as_str() {
+            FORMAT_WITH_EDGES => Ok(raw),
+            FORMAT if plain => Ok(raw),
+            FORMAT => {
+                let fault = self.fault("edges in a problem of another format", &["format"]);
+                Err(fault.remedy(format!("give `{FORMAT_WITH_EDGES}`")))
+            }
+            other => Err(self.unknown_format(other)),
+        }
     }
 
     /// Reads the problem again, tracking the path to the error.
@@ -128,7 +147,7 @@ impl<'a> Source<'a> {
 
     fn unknown_format(self, format: &str) -> Fault {
         let fault = self.fault("unknown format", &["format"]).value(format!("`{format}`"));
-        fault.remedy(format!("this reader supports `{FORMAT}`"))
+        fault.remedy(format!("this reader supports `{FORMAT}` and `{FORMAT_WITH_EDGES}`"))
     }
 
     /// The line and column of a part of the text.

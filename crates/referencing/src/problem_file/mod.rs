@@ -1,8 +1,9 @@
-//! `coherence-problem/1`: one identification problem as a file, and the answer to it.
+//! `coherence-problem/1`: one identification problem as a file, and the answer to it. `/1.1` adds straight edges.
 
 mod answer;
 mod diagnosis;
 mod duplicates;
+mod edges;
 mod input;
 mod json;
 mod method;
@@ -12,7 +13,8 @@ mod tests;
 mod warnings;
 
 pub use answer::{Answer, Best, Estimate, Levels, Line, OtherPose, Support, answer, printed, solve_file};
+pub use edges::{EdgeParts, ProblemEdges, RawEnd, RawLine};
 pub use input::{CoherenceProblem, read};
-pub use json::FORMAT;
+pub use json::{FORMAT, FORMAT_WITH_EDGES};
 pub use method::Method;
 pub use parts::{InvalidPart, Noise, Parts};

@@ -8,6 +8,7 @@ use seafix_geometry::{Camera, MeasuredPoint, Point, UncertainPoint};
 
 use super::{
     duplicates::{firsts, merged},
+    edges::EdgeParts,
     input::CoherenceProblem,
 };
 use crate::{
@@ -23,11 +24,11 @@ use crate::{
 /// The largest cloud; it limits a problem to 500 MB of memory.
 const MAX_POINTS: usize = 500_000;
 /// The largest standard deviation (m); the cube of its variance is still finite.
-const MAX_SIGMA: f64 = 1e15;
+pub(super) const MAX_SIGMA: f64 = 1e15;
 /// The largest model coordinate (m); a double resolves no micrometres beyond. A cloud may have outliers farther away.
-const FARTHEST: f64 = 1e9;
+pub(super) const FARTHEST: f64 = 1e9;
 /// The largest rounding error of a covariance, as a fraction of its largest entry.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 
 /// The noise of the measured points.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +56,8 @@ pub struct Parts {
     pub prior: Option<Prior>,
     /// The putative pairs (model, cloud), if no other pairs are to be considered.
     pub putative: Option<Vec<[usize; 2]>>,
+    /// The straight edges and the measured lines, if there are any.
+    pub edges: EdgeParts,
 }
 
 /// An invalid value of [`Parts`].
@@ -83,13 +86,18 @@ impl fmt::Display for InvalidPart {
 
 impl std::error::Error for InvalidPart {}
 
-fn invalid(what: impl Into<String>, part: &str, index: Option<usize>, remedy: impl Into<String>) -> InvalidPart {
+pub(super) fn invalid(
+    what: impl Into<String>,
+    part: &str,
+    index: Option<usize>,
+    remedy: impl Into<String>,
+) -> InvalidPart {
     let path = std::iter::once(part.to_owned()).chain(index.map(|index| index.to_string())).collect();
     InvalidPart { what: what.into(), path, value: None, remedy: remedy.into() }
 }
 
 impl InvalidPart {
-    fn value(self, value: impl Into<String>) -> Self {
+    pub(super) fn value(self, value: impl Into<String>) -> Self {
         Self { value: Some(value.into()), ..self }
     }
 }
@@ -136,6 +144,7 @@ impl Parts {
             delta_fits(delta, &model)?;
         }
         let putative = self.merged_pairs(&model)?;
+        let edges = self.edges.checked(&model)?;
         let covariances: Vec<Matrix3<f64>> = match self.noise {
             Noise::Covariances(all) => all,
             Noise::Sigma(_, Some(rows)) => rows.into_iter().map(of_sigmas).collect(),
@@ -152,6 +161,7 @@ impl Parts {
             delta: self.delta.unwrap_or_default(),
             prior: self.prior,
             putative,
+            edges,
         };
         let delta = self.delta.unwrap_or_else(|| 3.0 * 2f64.sqrt() * problem.typical_sigma());
         Ok(CoherenceProblem { delta, ..problem })
@@ -245,7 +255,16 @@ mod tests {
         let model = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let cloud = model.iter().map(|[x, y, z]| [*x, *y, z + 3.0]).collect();
         let noise = Noise::Sigma(0.01, None);
-        Parts { id: String::new(), model, cloud, noise, delta: None, prior: None, putative: None }
+        Parts {
+            id: String::new(),
+            model,
+            cloud,
+            noise,
+            delta: None,
+            prior: None,
+            putative: None,
+            edges: EdgeParts::default(),
+        }
     }
 
     /// Fails if a value that no file can hold, a NaN or an infinity, passes.

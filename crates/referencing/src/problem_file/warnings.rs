@@ -68,7 +68,8 @@ impl CoherenceProblem {
     }
 
     fn of_the_model(&self, reported: &mut Hints<'_>) {
-        if self.model.len() < NEEDED {
+        let by_points = self.edges.model.is_empty();
+        if by_points && self.model.len() < NEEDED {
             let value = counted(self.model.len(), "point");
             reported.warn("the model has too few points", value, "a pose needs at least three");
         }
@@ -104,6 +105,7 @@ impl CoherenceProblem {
 
     fn of_the_cloud(&self, reported: &mut Hints<'_>) {
         match self.cloud.len() {
+            few if few < NEEDED && !self.edges.lines.is_empty() => return,
             0 => return reported.warn("the cloud has no points", "0 points", "add measured points"),
             few if few < NEEDED => {
                 let value = counted(few, "point");

@@ -12,11 +12,11 @@ use super::{
 };
 
 /// The minimum length of an edge (m).
-const MIN_LENGTH: f64 = 0.02;
+pub(crate) const MIN_LENGTH: f64 = 0.02;
 /// The length (m) above which an edge is suspicious: over longer ones a structure bends.
 const LONG: f64 = 5.001;
 /// The maximum number of edges of an object.
-const MAX_EDGES: usize = 500;
+pub(crate) const MAX_EDGES: usize = 500;
 /// The allowed difference of a normal's length from one; files give six digits.
 const UNIT: f64 = 1e-5;
 /// The sine of the largest angle between parallel edges.

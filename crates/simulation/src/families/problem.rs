@@ -81,6 +81,7 @@ impl GeneratedProblem {
             delta: self.delta,
             prior: self.prior.as_ref().map(GeneratedPrior::prior),
             putative: self.putative.as_ref().map(|pairs| pairs.iter().map(|&[i, j]| (i, j)).collect()),
+            edges: Default::default(),
         }
     }
 }

@@ -12,9 +12,44 @@ use seafix_referencing::{
 use super::scene::{SIDES, corner, line, normal3, point, pose, rig, square, within};
 
 /// Three boxes at different places and attitudes: 24 corners, of which some are feature points, and 36 edges.
-struct Model {
-    points: Vec<ModelPoint>,
-    edges: Vec<ModelEdge>,
+pub(super) struct Model {
+    pub(super) points: Vec<ModelPoint>,
+    pub(super) edges: Vec<ModelEdge>,
+}
+
+impl Model {
+    /// The attempt by the default search and solver.
+    pub(super) fn attempt(
+        &self,
+        (cloud, lines): (&[MeasuredPoint], &[MeasuredLine]),
+        prior: &Prior,
+        rng: &mut ChaCha8Rng,
+    ) -> Attempt {
+        let Self { points, edges } = self;
+        let lists = candidates(points, cloud, Some(prior), &Gate::default(), None);
+        let of_edges = edge_candidates(edges, points, lines, Some(prior), &Gate::default(), None);
+        let problem = Problem {
+            model: points,
+            cloud,
+            candidates: &lists,
+            tolerance: Tolerance::Sigmas(3.0),
+            prior: Some(prior),
+            edges: Edges { model: edges, lines, candidates: &of_edges },
+        };
+        let (search, solver, acceptance) =
+            (RigidConsensus::default(), StereoReprojection::default(), Acceptance::default());
+        compute_fix(&problem, &search, &solver, &acceptance, Some(&rig()), rng)
+    }
+}
+
+/// A prior drawn about the true pose; the standard deviations are those of attitude (rad) and position (m).
+pub(super) fn drawn_prior(truth: &Transform<Object, Camera>, sigmas: (f64, f64), rng: &mut ChaCha8Rng) -> Prior {
+    let xi = nalgebra::Vector6::from_fn(|k, _| {
+        let [angle, position] = [normal3(rng, sigmas.0).x, normal3(rng, sigmas.1).x];
+        if k < 3 { angle } else { position }
+    });
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(sigmas.0, sigmas.1));
+    Prior { object_from_camera: truth.perturbed(&xi), bound }
 }
 
 fn places() -> [(Vector3<f64>, f64); 3] {
@@ -56,18 +91,14 @@ struct Frame {
     prior: (f64, f64),
 }
 
-const SIGMA: f64 = 0.08;
+pub(super) const SIGMA: f64 = 0.08;
 
 fn attempt(frame: Frame, rng: &mut ChaCha8Rng) -> (Attempt, Transform<Object, Camera>) {
-    let Model { points, edges } = model();
+    let model = model();
+    let Model { points, edges } = &model;
     let rig = rig();
     let truth = pose(3.5, rng.random_range(0.0..6.0));
-    let xi = nalgebra::Vector6::from_fn(|k, _| {
-        let [angle, position] = [normal3(rng, frame.prior.0).x, normal3(rng, frame.prior.1).x];
-        if k < 3 { angle } else { position }
-    });
-    let bound = PriorBound::Gaussian(Covariance6::isotropic(frame.prior.0, frame.prior.1));
-    let prior = Prior { object_from_camera: truth.perturbed(&xi), bound };
+    let prior = drawn_prior(&truth, frame.prior, rng);
     let into = truth.inverse();
     let mut cloud: Vec<MeasuredPoint> = Vec::new();
     let mut lines: Vec<MeasuredLine> = Vec::new();
@@ -89,7 +120,7 @@ fn attempt(frame: Frame, rng: &mut ChaCha8Rng) -> (Attempt, Transform<Object, Ca
             (Vector3::new(0.4, 0.4, 0.1) + within([1.0, 1.0, 0.2], rng), rng.random_range(0.15..0.6));
         let along = match frame.parallel {
             true => {
-                let [from, to] = edges[rng.random_range(0..edges.len())].places(&points);
+                let [from, to] = edges[rng.random_range(0..edges.len())].places(points);
                 (to - from).normalize()
             }
             false => within([1.0, 1.0, 0.4], rng).normalize(),
@@ -103,19 +134,7 @@ fn attempt(frame: Frame, rng: &mut ChaCha8Rng) -> (Attempt, Transform<Object, Ca
         let at = into * Point::from(Vector3::new(0.4, 0.4, 0.1) + within([1.0, 1.0, 0.2], rng));
         cloud.push(point(&rig, &at, 0.2, rng));
     }
-    let lists = candidates(&points, &cloud, Some(&prior), &Gate::default(), None);
-    let of_edges = edge_candidates(&edges, &points, &lines, Some(&prior), &Gate::default(), None);
-    let problem = Problem {
-        model: &points,
-        cloud: &cloud,
-        candidates: &lists,
-        tolerance: Tolerance::Sigmas(3.0),
-        prior: Some(&prior),
-        edges: Edges { model: &edges, lines: &lines, candidates: &of_edges },
-    };
-    let (search, solver, acceptance) =
-        (RigidConsensus::default(), StereoReprojection::default(), Acceptance::default());
-    (compute_fix(&problem, &search, &solver, &acceptance, Some(&rig), rng), truth)
+    (model.attempt((&cloud, &lines), &prior, rng), truth)
 }
 
 /// The numbers of right, wrong and missing fixes of some frames.
