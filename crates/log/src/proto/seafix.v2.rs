@@ -26,8 +26,47 @@ pub struct Frame {
     /// Where the trial navigates between fixes.
     #[prost(message, optional, tag = "9")]
     pub navigation: ::core::option::Option<Navigation>,
+    /// The measured straight edges; only of trials that use edges.
     #[prost(message, repeated, tag = "10")]
     pub lines: ::prost::alloc::vec::Vec<Line>,
+}
+/// One straight edge measured by both cameras, frame of the left camera.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Line {
+    /// x, y, z of two places on the line, as far apart as it was seen (m).
+    #[prost(double, repeated, tag = "1")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
+    /// 4 x 4 (m2), of the offsets of the first end along two directions across the line, and of the second end.
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+    /// Whether the rig measures its depth; not of lines close to the epipolar planes.
+    #[prost(bool, tag = "3")]
+    pub depth: bool,
+    /// Two normal offsets of the left image, then two of the right; empty if the line comes from no image.
+    #[prost(message, repeated, tag = "4")]
+    pub offsets: ::prost::alloc::vec::Vec<Offset>,
+}
+/// The offset of a straight image edge across it (px).
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct Offset {
+    #[prost(double, tag = "1")]
+    pub u: f64,
+    #[prost(double, tag = "2")]
+    pub v: f64,
+    /// The unit normal.
+    #[prost(double, tag = "3")]
+    pub normal_u: f64,
+    #[prost(double, tag = "4")]
+    pub normal_v: f64,
+    /// Standard deviation, all causes together.
+    #[prost(double, tag = "5")]
+    pub sigma: f64,
+    /// The part of it that the scene adds at this place, in both images.
+    #[prost(double, tag = "6")]
+    pub texture: f64,
+    /// The part that all four offsets have in common.
+    #[prost(double, tag = "7")]
+    pub common: f64,
 }
 /// One triangulated point, frame of the left camera.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -282,6 +321,15 @@ pub struct Target {
     #[prost(message, repeated, tag = "5")]
     pub edges: ::prost::alloc::vec::Vec<ModelEdge>,
 }
+/// One straight edge of a target, object frame.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ModelEdge {
+    #[prost(string, tag = "1")]
+    pub id: ::prost::alloc::string::String,
+    /// x, y, z of both ends (m).
+    #[prost(double, repeated, tag = "2")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
+}
 /// One feature point of a target, object frame.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct ModelPoint {
@@ -312,6 +360,210 @@ pub struct Version {
     pub name: ::prost::alloc::string::String,
     #[prost(string, tag = "2")]
     pub value: ::prost::alloc::string::String,
+}
+/// What came of one attempt to fix one target in one frame. Topic /referencing/result.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ReferencingResult {
+    #[prost(uint64, tag = "1")]
+    pub frame: u64,
+    #[prost(uint64, tag = "2")]
+    pub stamp_ns: u64,
+    /// Place of this result among those of its frame, from 0.
+    #[prost(uint32, tag = "3")]
+    pub index: u32,
+    /// Id of the target; empty where the frame attempted none.
+    #[prost(string, tag = "4")]
+    pub object: ::prost::alloc::string::String,
+    #[prost(string, tag = "5")]
+    pub search: ::prost::alloc::string::String,
+    #[prost(string, tag = "6")]
+    pub solver: ::prost::alloc::string::String,
+    #[prost(enumeration = "Outcome", tag = "7")]
+    pub outcome: i32,
+    /// Why not, in one word; empty when referenced.
+    #[prost(string, tag = "8")]
+    pub reason: ::prost::alloc::string::String,
+    /// Why not, in a sentence; of a fix, why the joint fix did not replace it.
+    #[prost(string, tag = "9")]
+    pub explanation: ::prost::alloc::string::String,
+    /// 4 x 4, p_object = object_from_camera * p_camera; empty unless referenced.
+    #[prost(double, repeated, tag = "10")]
+    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
+    /// 6 x 6, of xi = (phi, rho) in T_true = T_est * Exp(xi), camera frame, rotation first.
+    #[prost(double, repeated, tag = "11")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+    #[prost(message, repeated, tag = "12")]
+    pub pairs: ::prost::alloc::vec::Vec<Pair>,
+    /// Indices into pairs of the points that the solver used.
+    #[prost(uint32, repeated, tag = "13")]
+    pub used: ::prost::alloc::vec::Vec<u32>,
+    #[prost(message, repeated, tag = "14")]
+    pub alternatives: ::prost::alloc::vec::Vec<Alternative>,
+    /// Whether the search proved that no larger set exists.
+    #[prost(bool, optional, tag = "15")]
+    pub optimal: ::core::option::Option<bool>,
+    /// No admissible set has more pairs than this.
+    #[prost(uint64, optional, tag = "16")]
+    pub consensus_bound: ::core::option::Option<u64>,
+    /// Expected number of chance sets at least as large as the one found.
+    #[prost(double, optional, tag = "17")]
+    pub nfa: ::core::option::Option<f64>,
+    /// Pair tests that the search spent.
+    #[prost(uint64, optional, tag = "18")]
+    pub pair_tests: ::core::option::Option<u64>,
+    /// Root mean square of C H - P over the pairs (m).
+    #[prost(double, optional, tag = "19")]
+    pub residual_rms: ::core::option::Option<f64>,
+    /// What supports the fix beyond its covariance; absent unless referenced.
+    #[prost(message, optional, tag = "20")]
+    pub integrity: ::core::option::Option<Integrity>,
+    /// Probability that the object is absent; absent for labelled points.
+    #[prost(double, optional, tag = "21")]
+    pub p_absent: ::core::option::Option<f64>,
+    /// Probability that the pose is not the object's: absence and other poses together.
+    #[prost(double, optional, tag = "22")]
+    pub p_wrong: ::core::option::Option<f64>,
+    /// The best pose of an answer that is no fix; absent if there is none.
+    #[prost(message, optional, tag = "23")]
+    pub best: ::core::option::Option<BestPose>,
+    /// The identified edges: indices of the target's edge and of the frame's line.
+    #[prost(message, repeated, tag = "24")]
+    pub edges: ::prost::alloc::vec::Vec<EdgePair>,
+}
+/// An edge of the target and the line believed to be it, by their indices.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct EdgePair {
+    #[prost(uint32, tag = "1")]
+    pub model: u32,
+    #[prost(uint32, tag = "2")]
+    pub line: u32,
+}
+/// What supports a fix beyond its covariance.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Integrity {
+    /// unmonitored (three points), detectable (four) or excludable (five and more).
+    #[prost(string, tag = "1")]
+    pub redundancy: ::prost::alloc::string::String,
+    /// Of the residuals at the most likely pose.
+    #[prost(double, tag = "2")]
+    pub chi2: f64,
+    #[prost(uint64, tag = "3")]
+    pub dof: u64,
+    /// What chi2 exceeds with one minus the confidence.
+    #[prost(double, tag = "4")]
+    pub chi2_limit: f64,
+    /// How far the position moves at most (m) when one point is left out; absent where one cannot be spared.
+    #[prost(double, optional, tag = "5")]
+    pub solution_separation: ::core::option::Option<f64>,
+    /// The same when two are; absent where two wrong matches are not assumed to happen.
+    #[prost(double, optional, tag = "6")]
+    pub solution_separation_two: ::core::option::Option<f64>,
+    /// Protection levels: radii of the position (m) and of the attitude (rad) that the errors exceed with no more than the
+    /// stated risk; absent where nothing vouches for the fix.
+    #[prost(double, optional, tag = "7")]
+    pub protection_position: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "8")]
+    pub protection_attitude: ::core::option::Option<f64>,
+    /// By how much measured distances are longer than the model's, as a share of them, and its standard deviation; absent with
+    /// fewer than four points.
+    #[prost(double, optional, tag = "9")]
+    pub scale_error: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "10")]
+    pub scale_error_sigma: ::core::option::Option<f64>,
+}
+/// The best pose of an answer that is no fix.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct BestPose {
+    /// 4 x 4, p_object = object_from_camera * p_camera.
+    #[prost(double, repeated, tag = "1")]
+    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
+    /// 6 x 6, as that of a fix; empty if the pairs determine none.
+    #[prost(double, repeated, tag = "2")]
+    pub covariance: ::prost::alloc::vec::Vec<f64>,
+    #[prost(message, repeated, tag = "3")]
+    pub pairs: ::prost::alloc::vec::Vec<Pair>,
+}
+/// A point of the target and the cloud point believed to be it, by their indices.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Pair {
+    #[prost(uint32, tag = "1")]
+    pub model: u32,
+    #[prost(uint32, tag = "2")]
+    pub cloud: u32,
+}
+/// Another pose that explains the data.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Alternative {
+    /// 4 x 4.
+    #[prost(double, repeated, tag = "1")]
+    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
+    #[prost(message, repeated, tag = "2")]
+    pub pairs: ::prost::alloc::vec::Vec<Pair>,
+    /// Larger is better.
+    #[prost(double, tag = "3")]
+    pub score: f64,
+}
+/// Which cloud points might be which points of the target. Topic /referencing/candidates.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Candidates {
+    #[prost(uint64, tag = "1")]
+    pub frame: u64,
+    #[prost(uint64, tag = "2")]
+    pub stamp_ns: u64,
+    /// Place of the result these belong to among those of its frame.
+    #[prost(uint32, tag = "3")]
+    pub index: u32,
+    #[prost(string, tag = "4")]
+    pub object: ::prost::alloc::string::String,
+    /// One list a point of the target, in its order.
+    #[prost(message, repeated, tag = "5")]
+    pub lists: ::prost::alloc::vec::Vec<CandidateList>,
+}
+/// Indices into the cloud.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct CandidateList {
+    #[prost(uint32, repeated, tag = "1")]
+    pub cloud: ::prost::alloc::vec::Vec<u32>,
+}
+/// What came of an attempt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum Outcome {
+    Unspecified = 0,
+    /// A pose that passed every test.
+    Fix = 1,
+    /// Several poses explain the data equally well.
+    Ambiguous = 2,
+    /// No set of points was identified, or the set was not believed.
+    Rejected = 3,
+    /// The identified points determine no pose.
+    Degenerate = 4,
+}
+impl Outcome {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "OUTCOME_UNSPECIFIED",
+            Self::Fix => "OUTCOME_FIX",
+            Self::Ambiguous => "OUTCOME_AMBIGUOUS",
+            Self::Rejected => "OUTCOME_REJECTED",
+            Self::Degenerate => "OUTCOME_DEGENERATE",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "OUTCOME_UNSPECIFIED" => Some(Self::Unspecified),
+            "OUTCOME_FIX" => Some(Self::Fix),
+            "OUTCOME_AMBIGUOUS" => Some(Self::Ambiguous),
+            "OUTCOME_REJECTED" => Some(Self::Rejected),
+            "OUTCOME_DEGENERATE" => Some(Self::Degenerate),
+            _ => None,
+        }
+    }
 }
 /// What a frame's method was given and its judge knew, to the last bit, beyond what Frame holds: enough to run another
 /// method on the same. Topic /referencing/inputs; absent from older logs.
@@ -401,12 +653,26 @@ pub struct Problem {
     pub putative: ::prost::alloc::vec::Vec<Match>,
     #[prost(message, optional, tag = "7")]
     pub model: ::core::option::Option<Target>,
+    /// Its straight edges; the measured lines are those of the frame.
     #[prost(message, repeated, tag = "8")]
     pub edges: ::prost::alloc::vec::Vec<ProblemEdge>,
+    /// Whether only some pairs of edges are to be considered, and which: edge, line.
     #[prost(bool, tag = "9")]
     pub is_putative_edges: bool,
     #[prost(message, repeated, tag = "10")]
     pub putative_edges: ::prost::alloc::vec::Vec<EdgePair>,
+}
+/// A straight edge of a problem, object frame.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct ProblemEdge {
+    /// x, y, z of both ends (m).
+    #[prost(double, repeated, tag = "1")]
+    pub ends: ::prost::alloc::vec::Vec<f64>,
+    /// Which points of the model its ends are; absent where an end is a place of its own.
+    #[prost(uint32, optional, tag = "2")]
+    pub from_point: ::core::option::Option<u32>,
+    #[prost(uint32, optional, tag = "3")]
+    pub to_point: ::core::option::Option<u32>,
 }
 /// A model point and a cloud point.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
@@ -514,12 +780,15 @@ pub struct Evaluation {
     /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable.
     #[prost(double, optional, tag = "18")]
     pub alert_limit: ::core::option::Option<f64>,
+    /// Straight edges of the target that truly face the camera and lie in both images.
     #[prost(uint32, optional, tag = "19")]
     pub edges_visible: ::core::option::Option<u32>,
     #[prost(uint32, optional, tag = "20")]
     pub edges_identified: ::core::option::Option<u32>,
+    /// Identified edges whose line lies on the true one in both images.
     #[prost(uint32, optional, tag = "21")]
     pub correct_edges: ::core::option::Option<u32>,
+    /// Maximum symmetry-aware surface distance (m) and projection distance (px, left image) of BOP.
     #[prost(double, optional, tag = "22")]
     pub mssd: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "23")]
@@ -686,252 +955,4 @@ pub struct PointOfInterest {
     /// Normalised estimation error squared, three degrees of freedom.
     #[prost(double, optional, tag = "6")]
     pub nees: ::core::option::Option<f64>,
-}
-/// What came of one attempt to fix one target in one frame. Topic /referencing/result.
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct ReferencingResult {
-    #[prost(uint64, tag = "1")]
-    pub frame: u64,
-    #[prost(uint64, tag = "2")]
-    pub stamp_ns: u64,
-    /// Place of this result among those of its frame, from 0.
-    #[prost(uint32, tag = "3")]
-    pub index: u32,
-    /// Id of the target; empty where the frame attempted none.
-    #[prost(string, tag = "4")]
-    pub object: ::prost::alloc::string::String,
-    #[prost(string, tag = "5")]
-    pub search: ::prost::alloc::string::String,
-    #[prost(string, tag = "6")]
-    pub solver: ::prost::alloc::string::String,
-    #[prost(enumeration = "Outcome", tag = "7")]
-    pub outcome: i32,
-    /// Why not, in one word; empty when referenced.
-    #[prost(string, tag = "8")]
-    pub reason: ::prost::alloc::string::String,
-    /// Why not, in a sentence; of a fix, why the joint fix did not replace it.
-    #[prost(string, tag = "9")]
-    pub explanation: ::prost::alloc::string::String,
-    /// 4 x 4, p_object = object_from_camera * p_camera; empty unless referenced.
-    #[prost(double, repeated, tag = "10")]
-    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
-    /// 6 x 6, of xi = (phi, rho) in T_true = T_est * Exp(xi), camera frame, rotation first.
-    #[prost(double, repeated, tag = "11")]
-    pub covariance: ::prost::alloc::vec::Vec<f64>,
-    #[prost(message, repeated, tag = "12")]
-    pub pairs: ::prost::alloc::vec::Vec<Pair>,
-    /// Indices into pairs of the points that the solver used.
-    #[prost(uint32, repeated, tag = "13")]
-    pub used: ::prost::alloc::vec::Vec<u32>,
-    #[prost(message, repeated, tag = "14")]
-    pub alternatives: ::prost::alloc::vec::Vec<Alternative>,
-    /// Whether the search proved that no larger set exists.
-    #[prost(bool, optional, tag = "15")]
-    pub optimal: ::core::option::Option<bool>,
-    /// No admissible set has more pairs than this.
-    #[prost(uint64, optional, tag = "16")]
-    pub consensus_bound: ::core::option::Option<u64>,
-    /// Expected number of chance sets at least as large as the one found.
-    #[prost(double, optional, tag = "17")]
-    pub nfa: ::core::option::Option<f64>,
-    /// Pair tests that the search spent.
-    #[prost(uint64, optional, tag = "18")]
-    pub pair_tests: ::core::option::Option<u64>,
-    /// Root mean square of C H - P over the pairs (m).
-    #[prost(double, optional, tag = "19")]
-    pub residual_rms: ::core::option::Option<f64>,
-    /// What supports the fix beyond its covariance; absent unless referenced.
-    #[prost(message, optional, tag = "20")]
-    pub integrity: ::core::option::Option<Integrity>,
-    /// Probability that the object is absent; absent for labelled points.
-    #[prost(double, optional, tag = "21")]
-    pub p_absent: ::core::option::Option<f64>,
-    /// Probability that the pose is not the object's: absence and other poses together.
-    #[prost(double, optional, tag = "22")]
-    pub p_wrong: ::core::option::Option<f64>,
-    /// The best pose of an answer that is no fix; absent if there is none.
-    #[prost(message, optional, tag = "23")]
-    pub best: ::core::option::Option<BestPose>,
-    #[prost(message, repeated, tag = "24")]
-    pub edges: ::prost::alloc::vec::Vec<EdgePair>,
-}
-/// What supports a fix beyond its covariance.
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct Integrity {
-    /// unmonitored (three points), detectable (four) or excludable (five and more).
-    #[prost(string, tag = "1")]
-    pub redundancy: ::prost::alloc::string::String,
-    /// Of the residuals at the most likely pose.
-    #[prost(double, tag = "2")]
-    pub chi2: f64,
-    #[prost(uint64, tag = "3")]
-    pub dof: u64,
-    /// What chi2 exceeds with one minus the confidence.
-    #[prost(double, tag = "4")]
-    pub chi2_limit: f64,
-    /// How far the position moves at most (m) when one point is left out; absent where one cannot be spared.
-    #[prost(double, optional, tag = "5")]
-    pub solution_separation: ::core::option::Option<f64>,
-    /// The same when two are; absent where two wrong matches are not assumed to happen.
-    #[prost(double, optional, tag = "6")]
-    pub solution_separation_two: ::core::option::Option<f64>,
-    /// Protection levels: radii of the position (m) and of the attitude (rad) that the errors exceed with no more than the
-    /// stated risk; absent where nothing vouches for the fix.
-    #[prost(double, optional, tag = "7")]
-    pub protection_position: ::core::option::Option<f64>,
-    #[prost(double, optional, tag = "8")]
-    pub protection_attitude: ::core::option::Option<f64>,
-    /// By how much measured distances are longer than the model's, as a share of them, and its standard deviation; absent with
-    /// fewer than four points.
-    #[prost(double, optional, tag = "9")]
-    pub scale_error: ::core::option::Option<f64>,
-    #[prost(double, optional, tag = "10")]
-    pub scale_error_sigma: ::core::option::Option<f64>,
-}
-/// The best pose of an answer that is no fix.
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct BestPose {
-    /// 4 x 4, p_object = object_from_camera * p_camera.
-    #[prost(double, repeated, tag = "1")]
-    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
-    /// 6 x 6, as that of a fix; empty if the pairs determine none.
-    #[prost(double, repeated, tag = "2")]
-    pub covariance: ::prost::alloc::vec::Vec<f64>,
-    #[prost(message, repeated, tag = "3")]
-    pub pairs: ::prost::alloc::vec::Vec<Pair>,
-}
-/// A point of the target and the cloud point believed to be it, by their indices.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
-pub struct Pair {
-    #[prost(uint32, tag = "1")]
-    pub model: u32,
-    #[prost(uint32, tag = "2")]
-    pub cloud: u32,
-}
-/// Another pose that explains the data.
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct Alternative {
-    /// 4 x 4.
-    #[prost(double, repeated, tag = "1")]
-    pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
-    #[prost(message, repeated, tag = "2")]
-    pub pairs: ::prost::alloc::vec::Vec<Pair>,
-    /// Larger is better.
-    #[prost(double, tag = "3")]
-    pub score: f64,
-}
-/// Which cloud points might be which points of the target. Topic /referencing/candidates.
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct Candidates {
-    #[prost(uint64, tag = "1")]
-    pub frame: u64,
-    #[prost(uint64, tag = "2")]
-    pub stamp_ns: u64,
-    /// Place of the result these belong to among those of its frame.
-    #[prost(uint32, tag = "3")]
-    pub index: u32,
-    #[prost(string, tag = "4")]
-    pub object: ::prost::alloc::string::String,
-    /// One list a point of the target, in its order.
-    #[prost(message, repeated, tag = "5")]
-    pub lists: ::prost::alloc::vec::Vec<CandidateList>,
-}
-/// Indices into the cloud.
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
-pub struct CandidateList {
-    #[prost(uint32, repeated, tag = "1")]
-    pub cloud: ::prost::alloc::vec::Vec<u32>,
-}
-/// What came of an attempt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
-#[repr(i32)]
-pub enum Outcome {
-    Unspecified = 0,
-    /// A pose that passed every test.
-    Fix = 1,
-    /// Several poses explain the data equally well.
-    Ambiguous = 2,
-    /// No set of points was identified, or the set was not believed.
-    Rejected = 3,
-    /// The identified points determine no pose.
-    Degenerate = 4,
-}
-impl Outcome {
-    /// String value of the enum field names used in the ProtoBuf definition.
-    ///
-    /// The values are not transformed in any way and thus are considered stable
-    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
-    pub fn as_str_name(&self) -> &'static str {
-        match self {
-            Self::Unspecified => "OUTCOME_UNSPECIFIED",
-            Self::Fix => "OUTCOME_FIX",
-            Self::Ambiguous => "OUTCOME_AMBIGUOUS",
-            Self::Rejected => "OUTCOME_REJECTED",
-            Self::Degenerate => "OUTCOME_DEGENERATE",
-        }
-    }
-    /// Creates an enum from field names used in the ProtoBuf definition.
-    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
-        match value {
-            "OUTCOME_UNSPECIFIED" => Some(Self::Unspecified),
-            "OUTCOME_FIX" => Some(Self::Fix),
-            "OUTCOME_AMBIGUOUS" => Some(Self::Ambiguous),
-            "OUTCOME_REJECTED" => Some(Self::Rejected),
-            "OUTCOME_DEGENERATE" => Some(Self::Degenerate),
-            _ => None,
-        }
-    }
-}
-
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct Line {
-    #[prost(double, repeated, tag = "1")]
-    pub ends: ::prost::alloc::vec::Vec<f64>,
-    #[prost(double, repeated, tag = "2")]
-    pub covariance: ::prost::alloc::vec::Vec<f64>,
-    #[prost(bool, tag = "3")]
-    pub depth: bool,
-    #[prost(message, repeated, tag = "4")]
-    pub offsets: ::prost::alloc::vec::Vec<Offset>,
-}
-#[derive(Clone, Copy, PartialEq, ::prost::Message)]
-pub struct Offset {
-    #[prost(double, tag = "1")]
-    pub u: f64,
-    #[prost(double, tag = "2")]
-    pub v: f64,
-    #[prost(double, tag = "3")]
-    pub normal_u: f64,
-    #[prost(double, tag = "4")]
-    pub normal_v: f64,
-    #[prost(double, tag = "5")]
-    pub sigma: f64,
-    #[prost(double, tag = "6")]
-    pub texture: f64,
-    #[prost(double, tag = "7")]
-    pub common: f64,
-}
-#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
-pub struct EdgePair {
-    #[prost(uint32, tag = "1")]
-    pub model: u32,
-    #[prost(uint32, tag = "2")]
-    pub line: u32,
-}
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct ModelEdge {
-    #[prost(string, tag = "1")]
-    pub id: ::prost::alloc::string::String,
-    #[prost(double, repeated, tag = "2")]
-    pub ends: ::prost::alloc::vec::Vec<f64>,
-}
-
-#[derive(Clone, PartialEq, ::prost::Message)]
-pub struct ProblemEdge {
-    #[prost(double, repeated, tag = "1")]
-    pub ends: ::prost::alloc::vec::Vec<f64>,
-    #[prost(uint32, optional, tag = "2")]
-    pub from_point: ::core::option::Option<u32>,
-    #[prost(uint32, optional, tag = "3")]
-    pub to_point: ::core::option::Option<u32>,
 }
