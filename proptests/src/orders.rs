@@ -177,7 +177,7 @@ pub enum Did {
 pub enum Must {
     /// [`Event::Taken`].
     Taken,
-    /// [`Event::Left`].
+    /// [`Event::LessAccurate`].
     Left,
     /// [`Event::Doubted`].
     Doubted,
@@ -200,7 +200,7 @@ impl Must {
         let shift = Vector3::from(SHIFT).norm();
         match (self, did) {
             (Self::Taken, Did::Fix(Event::Taken))
-            | (Self::Left, Did::Fix(Event::Left))
+            | (Self::Left, Did::Fix(Event::LessAccurate))
             | (Self::Relocated, Did::Fix(Event::Relocated))
             | (Self::Went, Did::Went) => true,
             (Self::Doubted, Did::Fix(Event::Doubted(why))) => why.nis > why.limit,

@@ -5,7 +5,7 @@
 
 pub(crate) mod bounding_box;
 pub(crate) mod check;
-mod check_edges;
+pub(crate) mod check_edges;
 pub(crate) mod congruence;
 pub(crate) mod edge;
 mod file;
