@@ -2,7 +2,8 @@
 //!
 //! - One fix: [`residual_rms`], [`transfer_rms`], [`position_error`], [`attitude_error`], [`nees`]; its lower bound by
 //!   [`cramer_rao`].
-//! - Object pose benchmarks: ADD, ADI and MSSD by [`mean_distance`], [`mean_nearest_distance`], [`symmetric_distance`].
+//! - Object pose benchmarks: ADD, ADI, MSSD and MSPD by [`mean_distance`], [`mean_nearest_distance`],
+//!   [`symmetric_distance`], [`symmetric_projection_distance`].
 //! - Trajectories: APE, RPE and drift in [`trajectory`].
 //! - Statistics: quantiles, confidence intervals ([`Bootstrap`], [`clopper_pearson`]) and tests ([`signed_rank`],
 //!   [`mcnemar`]).
@@ -27,7 +28,6 @@ mod fix;
 mod solved;
 mod statistics;
 mod surface;
-mod symmetric;
 pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
@@ -37,5 +37,4 @@ pub use statistics::{
     Bootstrap, SignedRank, clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile, recall_area,
     signed_rank,
 };
-pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance};
-pub use symmetric::{mspd, mssd};
+pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance, symmetric_projection_distance};

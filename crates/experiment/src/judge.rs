@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use seafix_evaluation::{
-    alert_limit, attitude_error, mspd, mssd, nees, position_error, residual_rms, transfer_bound, transfer_rms,
+    alert_limit, attitude_error, nees, position_error, residual_rms, symmetric_distance, symmetric_projection_distance,
+    transfer_bound, transfer_rms,
 };
 use seafix_geometry::{Camera, Object, Point, StereoPixels, StereoRig, Transform, World};
 use seafix_log::{Evaluation, FrameRecord, NavigationErrors, TruthRecord, VisiblePoint};
@@ -211,8 +212,8 @@ fn evaluate(
     // Each problem has a model of its own, whose self-symmetries take longer than its search.
     if truth.answer.is_none() {
         let symmetries = symmetries(known.target);
-        row.mssd = mssd(estimate, &true_pose, &model, &symmetries);
-        row.mspd = mspd(estimate, &true_pose, &model, &symmetries, rig.left());
+        row.mssd = symmetric_distance(estimate, &true_pose, &model, &symmetries);
+        row.mspd = symmetric_projection_distance(estimate, &true_pose, &model, &symmetries, rig.left());
     }
     row.position_error = Some(position_error(estimate, &true_pose));
     row.attitude_error = Some(attitude_error(estimate, &true_pose));

@@ -235,7 +235,7 @@ fn a_poor_observation_moves_no_pose() {
     let before = navigator.pose().unwrap().clone();
     let good = sailing.fix(1);
     let poor = ObjectPose::new(good.object_pose.object_from_camera, Covariance6::isotropic(0.1, 0.5));
-    assert_eq!(navigator.fix(&Navigated { object_pose: poor, object: good.object }), Event::Left);
+    assert_eq!(navigator.fix(&Navigated { object_pose: poor, object: good.object }), Event::LessAccurate);
     assert_eq!(navigator.pose(), Some(&before));
     assert_eq!(navigator.fix(&good), Event::Taken);
     assert_eq!(navigator.pose().unwrap().object, 1);

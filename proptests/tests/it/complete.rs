@@ -211,7 +211,7 @@ impl Orders<'_> {
         self.remembers(navigator, past, happening, &did, trail);
 
         // An event without information moves nothing and gains no information.
-        let reported = matches!(did, Did::Fix(Event::Doubted(_) | Event::Left) | Did::Said(_)) && !better;
+        let reported = matches!(did, Did::Fix(Event::Doubted(_) | Event::LessAccurate) | Did::Said(_)) && !better;
         if reported {
             assert!(navigator.pose() == before.as_ref() && navigator.places() == places, "{trail:?}");
         } else {
@@ -295,7 +295,7 @@ impl Orders<'_> {
     ) {
         let kinds = |event: &Event| match event {
             Event::Taken => 0,
-            Event::Left => 1,
+            Event::LessAccurate => 1,
             Event::Doubted(_) => 2,
             Event::Relocated => 3,
             Event::Disputed { .. } => 4,
@@ -308,7 +308,7 @@ impl Orders<'_> {
         match did {
             Did::Fix(event) => {
                 self.seen[kinds(event)] += 1;
-                if !matches!(event, Event::Doubted(_) | Event::Left) {
+                if !matches!(event, Event::Doubted(_) | Event::LessAccurate) {
                     *past = Past { taken: true, now: true, sought: false, ..*past };
                 }
             }
