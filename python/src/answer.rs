@@ -1,6 +1,6 @@
 //! The answer to a problem.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{borrow::Cow, path::PathBuf, sync::Arc};
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
@@ -175,7 +175,7 @@ impl Answer {
 
     /// str or None: what helps against a missing fix.
     #[getter]
-    fn remedy(&self) -> Option<&'static str> {
+    fn remedy(&self) -> Option<Cow<'static, str>> {
         self.attempt.outcome.remedy()
     }
 

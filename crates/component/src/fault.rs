@@ -84,8 +84,10 @@ impl Fault {
     }
 }
 
-/// Maximum length of a printed value (characters).
-const LONGEST_VALUE: usize = 120;
+/// Maximum length of a printed value (characters): a page of a terminal, 24 lines of 80.
+///
+/// A message itself is never shortened; a value may be a line of a damaged file of any length.
+const LONGEST_VALUE: usize = 24 * 80;
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -219,7 +221,7 @@ mod tests {
     fn control_characters_do_not_reach_the_terminal() {
         let fault = Fault::new("bad name", Path::new("f")).value("\u{1b}[2J\nx");
         assert_eq!(fault.to_string(), "bad name in f:  [2J x");
-        let long = Fault::new("bad name", Path::new("f")).value("é".repeat(121)).to_string();
-        assert_eq!(long, format!("bad name in f: {}…", "é".repeat(120)));
+        let long = Fault::new("bad name", Path::new("f")).value("é".repeat(LONGEST_VALUE + 1)).to_string();
+        assert_eq!(long, format!("bad name in f: {}…", "é".repeat(LONGEST_VALUE)));
     }
 }

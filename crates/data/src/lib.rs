@@ -18,6 +18,7 @@
 
 mod contradictions;
 pub mod dataset;
+pub mod fixes;
 mod formats;
 pub mod log_conversion;
 mod model;

@@ -12,7 +12,7 @@ use seafix_component::{Fault, read_text};
 use seafix_log::unchanged;
 use serde::Deserialize;
 
-use crate::run::manifest;
+use crate::{results::AxisColumn, run::manifest};
 
 /// A value that differs; `None` if it exists in the other run only.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -66,16 +66,17 @@ pub fn diff(first: &Path, second: &Path) -> Result<Difference, Fault> {
         ..Difference::default()
     };
     let (mut one, mut two) = (Table::open(first)?, Table::open(second)?);
+    // The trial's name and the axes are settings, which are compared as configuration.
+    let set = |name: &String| name == "trial" || a.axes.contains(name) || b.axes.contains(name);
     let common: Vec<(usize, usize)> = one
         .columns
         .iter()
         .enumerate()
-        // The trial's name consists of settings, which are compared as configuration.
-        .filter(|(_, name)| *name != "trial" && !name.ends_with("_ms"))
+        .filter(|(_, name)| !set(name) && !name.ends_with("_ms"))
         .filter_map(|(i, name)| Some((i, two.columns.iter().position(|other| other == name)?)))
         .collect();
     for (only, other) in [(&one, &two), (&two, &one)] {
-        for name in only.columns.iter().filter(|name| !other.columns.contains(name)) {
+        for name in only.columns.iter().filter(|name| !set(name) && !other.columns.contains(name)) {
             difference.columns.insert(name.clone(), 0);
         }
     }
@@ -203,6 +204,8 @@ fn changes(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<Ch
 struct RunInputs {
     inputs: BTreeMap<String, String>,
     trials: Vec<OfTrial>,
+    /// The columns of the varied settings.
+    axes: BTreeSet<String>,
 }
 
 /// The inputs of one trial.
@@ -219,6 +222,9 @@ struct Manifest {
     #[serde(default)]
     state: String,
     trials: Vec<Entry>,
+    /// The columns of the varied settings, which are compared as configuration.
+    #[serde(default)]
+    axes: Vec<AxisColumn>,
     inputs: Vec<Input>,
 }
 
@@ -264,7 +270,8 @@ impl RunInputs {
             let source = input.source;
             input.files.into_iter().map(move |(file, sum)| (format!("{source}: {file}"), sum))
         });
-        Ok(Self { inputs: inputs.collect(), trials })
+        let axes = manifest.axes.into_iter().map(|axis| axis.column).collect();
+        Ok(Self { inputs: inputs.collect(), trials, axes })
     }
 }
 

@@ -291,6 +291,7 @@ impl Plan {
         texts: &Texts,
         settings: &[String],
     ) -> Result<Self, Vec<Fault>> {
+        let texts = &texts.below(settings);
         let fault = |path: &[&str], what: &str| texts.fault(path, Part::Value, what);
         let mut faults = sweep::check(&experiment.vary, |path, part, what| texts.fault(path, part, what));
         let invalid = experiment.invalid();

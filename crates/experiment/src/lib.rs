@@ -26,6 +26,7 @@ mod keyframes;
 mod log_decimation;
 mod logging;
 mod navigation;
+mod not_attempted;
 mod odometry_fault;
 mod parse;
 mod pictures;

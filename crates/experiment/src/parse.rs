@@ -14,20 +14,42 @@ use toml::{
 
 use crate::experiment::Experiment;
 
-/// The texts of an experiment: its own, then that of its base.
+/// The texts of an experiment: its own, then that of its base, and the settings of the command line.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Texts {
     files: Vec<(PathBuf, String)>,
+    /// The settings, `key=value`, which override those of the files.
+    settings: Vec<String>,
 }
 
 impl Texts {
     /// The texts of a single file.
     pub(crate) fn of(file: &Path, text: &str) -> Self {
-        Self { files: vec![(file.to_owned(), text.to_owned())] }
+        Self { files: vec![(file.to_owned(), text.to_owned())], settings: Vec::new() }
     }
 
-    /// The fault `what` for this part of the setting at `path`, in the file that contains it.
+    /// The texts below these settings of the command line.
+    pub(crate) fn below(&self, settings: &[String]) -> Self {
+        Self { settings: settings.to_vec(), ..self.clone() }
+    }
+
+    /// The setting of the command line that set the setting at `path`, or the part of it that `what` names.
+    fn set_by(&self, path: &[&str], what: &str) -> Option<&String> {
+        let sets = |setting: &&String| {
+            let key = setting.split_once('=').map_or(setting.as_str(), |(key, _)| key.trim());
+            let steps: Vec<&str> = key.split('.').collect();
+            let part = steps.last().is_some_and(|last| what.contains(last));
+            path.starts_with(&steps) || (part && steps.starts_with(path))
+        };
+        // The last of several has priority.
+        self.settings.iter().rev().find(sets)
+    }
+
+    /// The fault `what` for this part of the setting at `path`, in the file that contains it or on the command line.
     pub(crate) fn fault(&self, path: &[&str], part: Part, what: &str) -> Fault {
+        if let Some(setting) = self.set_by(path, what) {
+            return Fault::new(what, Path::new("--set")).value(setting);
+        }
         let places = self.files.iter().map(|(file, text)| (file, place_of(text, path, part)));
         // If both files contain it, the experiment's own file, which is first, has priority.
         let best = places.reduce(|best, next| match (&best.1, &next.1) {
@@ -330,6 +352,18 @@ mod tests {
         for part in parts {
             assert!(message.iter().any(|line| line.contains(part)), "no {part} in {message:#?}");
         }
+    }
+
+    /// Seen to fail where the place in the file is reported for a value of the command line.
+    #[test]
+    fn a_value_of_the_command_line_is_at_fault_there() {
+        let texts = Texts::of(Path::new("e.toml"), "[pipeline]\nsolver = 'kabsch'\n");
+        let texts = texts.below(&["pipeline.solver=x".to_owned(), "source.frames=-3".to_owned()]);
+        let fault = |path: &[&str], what: &str| texts.fault(path, Part::Value, what).to_string();
+        assert_eq!(fault(&["pipeline", "solver", "name"], "no solver"), "no solver in --set: pipeline.solver=x");
+        assert_eq!(fault(&["source"], "setting `frames`"), "setting `frames` in --set: source.frames=-3");
+        assert!(fault(&["pipeline", "window"], "not a number").contains("e.toml:1"), "a value of the file");
+        assert!(fault(&["source"], "setting `rate`").contains("the experiment"), "another setting");
     }
 
     #[test]

@@ -19,6 +19,7 @@ use seafix_vision::{DESCRIPTORS, DETECTORS, LOCATORS, MATCHERS};
 use crate::{
     experiment::{Experiment, Plan, Trial},
     git::Git,
+    not_attempted::NotAttempted,
     pictures::Pictures,
     sweep::AxisValue,
 };
@@ -88,12 +89,13 @@ pub(crate) fn frame(
     let mut attempts: Vec<TargetRecord> =
         frame_result.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
     if attempts.is_empty() {
-        let reason = match navigation_state {
-            Some(navigation_state) if !navigation_state.due => "not-due",
-            _ if frame_result.cloud.is_empty() => "no-data",
-            _ => "nothing-in-view",
+        let why = match navigation_state {
+            Some(navigation_state) if !navigation_state.due => NotAttempted::NotDue,
+            _ if frame_result.cloud.is_empty() => NotAttempted::NoData,
+            _ => NotAttempted::NothingInView,
         };
-        attempts.push(TargetRecord::not_attempted(search, solver, reason));
+        let without = TargetRecord::not_attempted(search, solver, why.reason());
+        attempts.push(TargetRecord { explanation: why.sentence().to_owned(), ..without });
     }
     FrameRecord {
         frame: number,
@@ -176,8 +178,7 @@ fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) 
         Outcome::Rejected(_) => record.outcome = Logged::Rejected,
         Outcome::Degenerate(_) => record.outcome = Logged::Degenerate,
     }
-    let remedy = answer.outcome.remedy().map(str::to_owned);
-    let details = answer.outcome.explanation().into_iter().chain(remedy).chain(attempt.joint.clone());
+    let details = answer.outcome.sentence().into_iter().chain(attempt.joint.clone());
     record.explanation = details.collect::<Vec<_>>().join("; ");
     record
 }

@@ -103,7 +103,7 @@ impl Replay {
         let replayed = Experiment { source, vary: vary.into_iter().flatten().collect(), ..changed };
         let name = format!("replay-{}", header.trial);
         let folder = folder_of_pose_graph(&replayed, &file);
-        let mut plan = Plan::resolve(replayed, &name, &folder, log, &Texts::of(log, ""), &[])?;
+        let mut plan = Plan::resolve(replayed, &name, &folder, log, &Texts::of(log, ""), &self.settings)?;
         plan.command = self.command(log);
         if let [trial] = &mut plan.trials[..] {
             trial.name.clone_from(&header.trial);

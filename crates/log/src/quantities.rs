@@ -140,7 +140,7 @@ quantities! {
     SOLVER: Target Text "solver" "" "/referencing/result" "The solver." = |r: &TargetRecord| r.solver.clone();
     OUTCOME: Target Text "outcome" "" "/referencing/result" "The outcome: fix, ambiguous, rejected or degenerate." = |r: &TargetRecord| r.outcome.to_string();
     REASON: Target Text "reason" "" "/referencing/result" "The reason of an outcome without a fix, one word." = |r: &TargetRecord| r.reason.clone();
-    EXPLANATION: Target Text "explanation" "" "/referencing/result" "The reason in a sentence with its numbers." = |r: &TargetRecord| r.explanation.clone();
+    EXPLANATION: Target Text "explanation" "" "/referencing/result" "The reason in a sentence with its numbers, and its remedy." = |r: &TargetRecord| r.explanation.clone();
     P_ABSENT: Target Real "p_absent" "" "/referencing/result" "The probability that the object is absent." = |r: &TargetRecord| r.p_absent;
     P_WRONG: Target Real "p_wrong" "" "/referencing/result" "The probability that the pose is not the object's: absence and other poses together." = |r: &TargetRecord| r.p_wrong;
     WRONG: Target Flag "wrong" "" "/metrics/evaluation" "A fix whose TRE exceeds the alert limit." = |r: &TargetRecord| r.evaluation.wrong;

@@ -9,6 +9,7 @@ use crate::{
     error::ReportError,
     format::{self, distinct},
     forms::Forms,
+    origin,
     paired::{self, Comparison},
     print,
     run::{Run, Trial},
@@ -30,6 +31,8 @@ pub struct Compared {
 
 /// Compares runs on the same data: equal source, seeds, cameras, site, targets and alert limits.
 ///
+/// A replay has the data of the run whose log it reads, if this log can be read; it is compared with the trials of the
+/// same data.
 /// `force` compares runs on different data, with a notice. The page is written to `out`, if given. The table has at
 /// most `width` columns, if given.
 ///
@@ -43,10 +46,16 @@ pub fn compare(
     width: Option<usize>,
 ) -> Result<Compared, ReportError> {
     let mut runs: Vec<Run> = folders.iter().map(|folder| Run::read(folder)).collect::<Result<_, _>>()?;
+    let replays: Vec<bool> = runs.iter_mut().map(origin::restore).collect();
     let names = names(folders);
     let mut forced = String::new();
-    for ((run, folder), name) in runs.iter().zip(folders).zip(&names).skip(1) {
-        let differences = differences(&runs[0], run);
+    for (index, (folder, name)) in folders.iter().zip(&names).enumerate().skip(1) {
+        // A replay of one trial has the data of this trial only.
+        let [first, other] = match replays[0] || replays[index] {
+            true => common(&runs[0], &runs[index]),
+            false => [&runs[0], &runs[index]].map(|run| run.trials.iter().collect()),
+        };
+        let differences = differences(&first, &other);
         if differences.is_empty() {
             continue;
         }
@@ -115,8 +124,19 @@ fn joined(trial: &mut Trial, name: &str, keys: &[String]) {
     trial.header.axes = axes;
 }
 
+/// The trials of two runs that have partners on the same data; all trials of both if none has.
+fn common<'a>(first: &'a Run, other: &'a Run) -> [Vec<&'a Trial>; 2] {
+    let data = |run: &Run| run.trials.iter().map(|trial| paired::data(trial, true)).collect::<Vec<_>>();
+    let both = [data(first), data(other)];
+    let partners = |run: &'a Run, theirs: &[String]| -> Vec<&'a Trial> {
+        run.trials.iter().filter(|trial| theirs.contains(&paired::data(trial, true))).collect()
+    };
+    let found = [partners(first, &both[1]), partners(other, &both[0])];
+    if found[0].is_empty() { [first, other].map(|run| run.trials.iter().collect()) } else { found }
+}
+
 /// The differences that make two runs incomparable, one line each.
-fn differences(first: &Run, other: &Run) -> Vec<String> {
+fn differences(first: &[&Trial], other: &[&Trial]) -> Vec<String> {
     let mut found = Vec::new();
     let mut say = |what: &str, own: Vec<String>, its: Vec<String>| {
         let only = |a: &[String], b: &[String]| a.iter().filter(|line| !b.contains(line)).cloned().collect::<Vec<_>>();
@@ -124,11 +144,12 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
         if !left.is_empty() || !right.is_empty() {
             let more = left.len().max(right.len()) - 1;
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            let show = |lines: &[String]| lines.first().map_or_else(|| "–".to_owned(), |line| clipped(line));
+            let show = |lines: &[String]| lines.first().map_or_else(|| "–".to_owned(), String::clone);
             found.push(format!("{what}: {} against {}{more}", show(&left), show(&right)));
         }
     };
-    let of = |run: &Run, lines: fn(&Trial) -> Vec<String>| distinct(run.trials.iter().flat_map(lines));
+    let of =
+        |trials: &[&Trial], lines: fn(&Trial) -> Vec<String>| distinct(trials.iter().flat_map(|trial| lines(trial)));
     let mut both = |what: &str, lines: fn(&Trial) -> Vec<String>| say(what, of(first, lines), of(other, lines));
     both("source", |trial| vec![trial.header.source.clone()]);
     both("settings of the source", |trial| {
@@ -156,12 +177,6 @@ fn differences(first: &Run, other: &Run) -> Vec<String> {
     });
     both("site", |trial| trial.header.site.lines().map(str::to_owned).collect());
     found
-}
-
-/// A line cut to at most 60 characters.
-fn clipped(line: &str) -> String {
-    const MAX: usize = 60;
-    if line.chars().count() <= MAX { line.to_owned() } else { line.chars().take(MAX - 1).chain(['…']).collect() }
 }
 
 /// The notices of runs with bitwise identical results, whose comparison is meaningless.

@@ -38,6 +38,7 @@ fields! {
     Correct = CORRECT_PAIRS;
     Candidates = CANDIDATES;
     Tests = PAIR_TESTS;
+    PWrong = P_WRONG;
     CandidatesTime = CANDIDATES_MS;
     SearchTime = SEARCH_MS;
     SolveTime = SOLVE_MS;

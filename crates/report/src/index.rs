@@ -54,7 +54,7 @@ fn text<'a>(findings: impl IntoIterator<Item = &'a str>) -> String {
     findings.into_iter().fold(head, |text, section| text + section)
 }
 
-/// The section of one run: question, main figure, findings and links to the report in `folder`.
+/// The section of one run: question, main figure, answer, findings and links to the report in `folder`.
 pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String {
     let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let escaped = print::escape_markdown(&name);
@@ -63,7 +63,9 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String 
     if let Some(figure) = MAIN.iter().find(|file| there(file)) {
         text += &format!("[![The main figure of {escaped}]({name}/{figure})]({name}/report.html)\n\n");
     }
-    for finding in content::findings(run, summary) {
+    let (answer, findings) = content::findings(run, summary);
+    text += &format!("**Answer.** {}\n\n", print::markdown(&answer));
+    for finding in findings {
         text += &format!("- {}\n", print::markdown(&finding));
     }
     let links = [("Report", "report.html"), ("PDF", "report.pdf"), ("tables", "tables"), ("summary", "summary.txt")];

@@ -109,7 +109,7 @@ pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
 /// A text that identifies the data of a trial: equal texts, equal frames.
 ///
 /// Joined runs may have different lengths, so the number of frames is ignored; [`same_views`] compares their views.
-fn data(trial: &Trial, joined: bool) -> String {
+pub(crate) fn data(trial: &Trial, joined: bool) -> String {
     let header = &trial.header;
     let mut source = header.configuration.parse::<toml::Table>().ok().and_then(|table| table.get("source").cloned());
     if let Some(toml::Value::Table(source)) = source.as_mut().filter(|_| joined) {

@@ -1,6 +1,6 @@
 //! Confidence intervals of rates.
 
-use seafix_evaluation::{Bootstrap, clopper_pearson, clustered, of_blocks};
+use seafix_evaluation::{Bootstrap, clopper_pearson, clustered, of_blocks, quantile};
 use seafix_log::TrialHeader;
 
 use crate::paired::SEED;
@@ -39,6 +39,19 @@ pub(crate) fn interval_of_counts(trajectory: bool, k: usize, n: usize) -> (f64, 
     of_blocks(k, n, block, 0.95)
 }
 
+/// The 95 % interval of the median: the quantiles at the ends of the interval of one half.
+///
+/// It assumes nothing about the distribution. The result is `None` without values.
+pub(crate) fn median_interval(trajectory: bool, values: &mut [f64]) -> Option<(f64, f64)> {
+    let n = values.len();
+    if n == 0 {
+        return None;
+    }
+    let low = interval_of_counts(trajectory, n / 2, n).0;
+    let high = interval_of_counts(trajectory, n - n / 2, n).1;
+    Some((quantile(values, low), quantile(values, high)))
+}
+
 /// The error bounds of recall, in mm for printing and in m for comparison.
 pub(crate) fn bounds() -> impl Iterator<Item = (f64, f64)> {
     BOUNDS.into_iter().map(|bound| (bound, bound / 1e3))
@@ -71,6 +84,19 @@ pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Seen to fail with the interval of another fraction than one half.
+    #[test]
+    fn a_median_lies_within_its_interval() {
+        // For 100 independent values, Clopper–Pearson of 50 in 100 is [0.398, 0.602].
+        let mut values: Vec<f64> = (0..101_u32).map(f64::from).collect();
+        let (low, high) = median_interval(false, &mut values).expect("there are values");
+        assert!((39.0..41.0).contains(&low) && (60.0..62.0).contains(&high), "{low} {high}");
+        let (wider, _) = median_interval(true, &mut values).expect("there are values");
+        assert!(wider < low, "neighbours on a trajectory say less");
+        assert_eq!(median_interval(false, &mut [3.0]), Some((3.0, 3.0)));
+        assert_eq!(median_interval(false, &mut []), None);
+    }
 
     /// Seen to fail where each bound keeps its own interval: the lower end falls from 63 of 64 errors to 64.
     #[test]

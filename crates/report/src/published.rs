@@ -56,6 +56,6 @@ impl Published {
     /// The sentence on the shaded ranges of a figure of these quantities; empty without any.
     pub(crate) fn caption(published: &[Self], fields: &[Field]) -> &'static str {
         let shown = published.iter().any(|of| fields.contains(&of.field) && of.range[0] > 0.0);
-        if shown { " Shaded: the published ranges that the abstract names." } else { "" }
+        if shown { " Shaded: the published ranges that the conclusion names." } else { "" }
     }
 }

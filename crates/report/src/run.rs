@@ -60,6 +60,8 @@ pub(crate) struct Trial {
     rows: Vec<AttemptRow>,
     poi: Vec<Inspected>,
     words: Vec<String>,
+    /// The sentences of rows without a fix; the first is empty.
+    explanations: Vec<Box<str>>,
 }
 
 /// A frame of a trial.
@@ -113,6 +115,8 @@ pub(crate) struct AttemptRow {
     displacement: f64,
     object: u32,
     reason: u32,
+    /// The index of its sentence.
+    explanation: u32,
     values: [f64; Field::ALL.len()],
 }
 
@@ -178,6 +182,7 @@ impl Trial {
             rows: Vec::new(),
             poi: Vec::new(),
             words: vec![String::new()],
+            explanations: vec![Box::default()],
         };
         let mut digest = Sha256::new();
         let mut places = HashMap::from([(String::new(), 0)]);
@@ -210,6 +215,7 @@ impl Trial {
                 self.named = [target.search.clone(), target.solver.clone()];
             }
             let [object, reason] = [&target.object, &target.reason].map(|word| self.word(word, places));
+            let explanation = self.explain(target);
             self.rows.push(AttemptRow {
                 outcome: target.outcome,
                 wrong: target.evaluation.wrong,
@@ -218,6 +224,7 @@ impl Trial {
                 displacement: lever::displacement(&self.header, frame.truth.as_ref(), target),
                 object,
                 reason,
+                explanation,
                 values: values(target),
             });
         }
@@ -264,6 +271,19 @@ impl Trial {
         });
     }
 
+    /// The index of the sentence of a row without a fix; zero for a fix.
+    ///
+    /// The row of a frame without an attempt often repeats the sentence of the row before it.
+    fn explain(&mut self, target: &TargetRecord) -> u32 {
+        if target.outcome == Outcome::Fix || target.explanation.is_empty() {
+            return 0;
+        }
+        if self.explanations.last().is_none_or(|last| **last != *target.explanation) {
+            self.explanations.push(target.explanation.as_str().into());
+        }
+        (self.explanations.len() - 1) as u32
+    }
+
     /// The index of `word`, which is added if it is new.
     fn word(&mut self, word: &str, places: &mut HashMap<String, u32>) -> u32 {
         if let Some(place) = places.get(word) {
@@ -307,9 +327,14 @@ impl Trial {
         self.frames.iter().filter(move |frame| frame.number.is_multiple_of(every))
     }
 
+    /// The rows of `frame`: its attempts, or one row that states why it has none.
+    pub(crate) fn rows_of(&self, frame: &Frame) -> impl Iterator<Item = &AttemptRow> {
+        self.rows[frame.rows.0 as usize..frame.rows.1 as usize].iter()
+    }
+
     /// The attempts of `frame`.
     pub(crate) fn attempts_of(&self, frame: &Frame) -> impl Iterator<Item = &AttemptRow> {
-        self.rows[frame.rows.0 as usize..frame.rows.1 as usize].iter().filter(|row| row.object != 0)
+        self.rows_of(frame).filter(|row| row.is_attempt())
     }
 
     /// Every attempt of every frame of the sample.
@@ -338,6 +363,11 @@ impl Trial {
             "" => row.outcome.name(),
             word => word,
         }
+    }
+
+    /// The logged sentence of a row without a fix: reason, numbers and remedy; empty for a fix.
+    pub(crate) fn explanation(&self, row: &AttemptRow) -> &str {
+        self.explanations.get(row.explanation as usize).map_or("", |sentence| &**sentence)
     }
 
     /// The names of the trial's search and solver.
@@ -373,6 +403,11 @@ impl AttemptRow {
     /// The value of a quantity; `None` where it is unknown.
     pub(crate) fn get(&self, field: Field) -> Option<f64> {
         Some(self.values[field as usize]).filter(|value| !value.is_nan())
+    }
+
+    /// Whether the row is an attempt at a target.
+    pub(crate) fn is_attempt(&self) -> bool {
+        self.object != 0
     }
 
     /// Whether the attempt is a fix that is not known to be wrong.

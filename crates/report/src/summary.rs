@@ -10,6 +10,7 @@ use crate::{
     field::Field,
     format, paired,
     published::Published,
+    rejections,
     run::{AttemptRow, Run, Trial},
 };
 
@@ -22,6 +23,8 @@ pub struct RunSummary {
     pub question: String,
     /// The sentences on published figures that the experiment states for comparison.
     pub published: Vec<String>,
+    /// The sentence on the most common reason of attempts without a fix; `None` if every attempt has one.
+    pub rejections: Option<String>,
     /// The results of the trials, sorted by trial name.
     pub rows: Vec<Row>,
     /// The sentences on logs that were recovered from incomplete ones.
@@ -57,6 +60,8 @@ pub struct Row {
     pub unjudged: usize,
     /// The number of rejected attempts for each reason.
     pub reasons: BTreeMap<String, usize>,
+    /// The number of logged frames without an attempt for each reason.
+    pub idle: BTreeMap<String, usize>,
     /// The fit RMS (m) of the fixes that are not wrong.
     ///
     /// It is the RMS of C·H − P over the identified points.
@@ -205,11 +210,13 @@ impl RunSummary {
     /// The results of `run`.
     pub(crate) fn of(run: &Run) -> Self {
         let header = run.header();
+        let rows: Vec<Row> = run.trials.par_iter().map(Row::of).collect();
         Self {
             run: header.run.clone(),
             question: header.question.clone(),
             published: Published::of(run).iter().map(Published::sentence).collect(),
-            rows: run.trials.par_iter().map(Row::of).collect(),
+            rejections: rejections::sentence(run, &rows),
+            rows,
             lacking: run.trials.iter().filter_map(Trial::lacking).collect(),
         }
     }
@@ -262,6 +269,7 @@ impl Row {
             wrong: 0,
             unjudged: 0,
             reasons: BTreeMap::new(),
+            idle: BTreeMap::new(),
             fit: None,
             fit_unused: None,
             tre: None,
@@ -284,6 +292,9 @@ impl Row {
         for frame in trial.sample() {
             row.fix_frames += usize::from(trial.attempts_of(frame).any(|row| row.found() || row.wrong()));
             row.wrong_frames += usize::from(trial.attempts_of(frame).any(AttemptRow::wrong));
+            for without in trial.rows_of(frame).filter(|row| !row.is_attempt()) {
+                *row.idle.entry(trial.reason(without).to_owned()).or_default() += 1;
+            }
         }
         let mut found: Vec<&AttemptRow> = Vec::new();
         for (_, attempt) in trial.attempts() {

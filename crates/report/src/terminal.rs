@@ -71,8 +71,8 @@ impl fmt::Display for RunSummary {
             "frames: with a fix/all; n: attempts; medians over the fixes of fit RMS (the paper’s measure), target registration error (TRE), camera position error and attitude error.",
         );
         writeln!(f, "{note}")?;
-        for sentence in &self.published {
-            writeln!(f, "{}", message(sentence))?;
+        for sentence in self.rejections.iter().chain(&self.published) {
+            writeln!(f, "{}", message(&plain(sentence)))?;
         }
 
         if self.rows.iter().any(|row| row.limits.is_some()) {

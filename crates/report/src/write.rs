@@ -10,7 +10,7 @@ use seafix_component::{MARKER, Marker, Ownership, PartialFile, create_real_folde
 
 use crate::{
     content,
-    document::{Document, Figure, Table},
+    document::{Block, Document, Figure, Table},
     error::ReportError,
     forms::Forms,
     index, print,
@@ -33,8 +33,6 @@ pub struct Report {
 
 /// The files of the forms, by order of [`Forms`].
 const PAPERS: [&str; 3] = ["report.html", "report.tex", "report.pdf"];
-/// Maximum number of trials for which the figure of rates is the main figure.
-const FEW: usize = 8;
 
 /// A file: its name in the folder of the report, and its bytes.
 pub(crate) type File = (String, Vec<u8>);
@@ -101,13 +99,12 @@ fn kept(document: &Document, add: &mut impl FnMut(String, Vec<u8>)) {
     }
 }
 
-/// The main figure of a report.
+/// The main figure of a report, that of its first page.
 fn main_figure(document: &Document) -> Option<&Figure> {
-    // The rates of a few trials are readable at a glance; for many trials the errors are the main figure.
-    let few = document.figures().any(|figure| figure.id == "rates" && figure.data.lines.len() <= 2 * FEW);
-    let order = ["error-over-noise", "sawtooth"].into_iter().chain(few.then_some("rates"));
-    let mut order = order.chain(["error-over-condition", "success", "rates", "recall"]);
-    order.find_map(|id| document.figures().find(|figure| figure.id == id))
+    document.front.iter().find_map(|block| match block {
+        Block::Figure(figure) => Some(figure),
+        _ => None,
+    })
 }
 
 /// The files of all figures and tables, each in two formats.

@@ -41,7 +41,7 @@ pub(crate) fn execute(paths: &[PathBuf], limits: ImageLimits) -> Ended {
         let mut text: String = faults.iter().map(|fault| format!("fault: {fault}\n")).collect();
         text += &warnings.iter().map(|warning| format!("warning: {warning}\n")).collect::<String>();
         text += &note;
-        text += &congruences(path);
+        text += &of_site(path);
         if faults.is_empty() {
             text += &format!("{}: in order\n", path.display());
         }
@@ -191,13 +191,23 @@ fn geometry(path: &Path) -> Result<(), Vec<Fault>> {
     SitePlan::read(&path.with_file_name(format!("{stem}.site.toml"))).map(|_| ())
 }
 
-/// Notes on the self-symmetries of a site's targets and on the points that exclude them.
-fn congruences(path: &Path) -> String {
+/// Notes on a site: points without normals, and self-symmetries of its targets with the points that exclude them.
+fn of_site(path: &Path) -> String {
     let site =
         read_text(path).ok().filter(|text| format(text).is_some_and(|format| format.starts_with("seafix-site/")));
-    let targets = site.and_then(|text| Site::parse(&text, path).ok()?.targets(TargetKind::Object).ok());
+    let Some(site) = site.and_then(|text| Site::parse(&text, path).ok()) else { return String::new() };
     let mut notes = String::new();
-    for target in targets.unwrap_or_default() {
+    for object in &site.objects {
+        let bare = object.points.iter().filter(|point| point.normal.is_none()).count();
+        if bare > 0 {
+            let all = object.points.len();
+            notes += &format!(
+                "note: `{}`: {bare} of {all} points have no `normal` and count as visible from every side\n",
+                object.id
+            );
+        }
+    }
+    for target in site.targets(TargetKind::Object).unwrap_or_default() {
         let all = target.congruences();
         for congruence in all.iter().take(MAX_NOTED) {
             let ids: Vec<String> =

@@ -15,6 +15,7 @@ mod diff;
 mod dive;
 mod eval;
 mod export;
+mod fixes;
 mod generate;
 mod limits;
 mod list;
@@ -31,6 +32,7 @@ mod schema;
 mod show;
 mod solve;
 mod sweep;
+mod view;
 
 /// Position and attitude of an underwater vehicle relative to a known structure, from stereo images.
 #[derive(Debug, Parser)]
@@ -90,12 +92,16 @@ pub(crate) enum Command {
     },
     /// Save the intact part of a damaged or truncated log, or of an unfinished run.
     Recover(recover::Recover),
+    /// Write the fixes of a run or a log as a table or as a trajectory.
+    Fixes(fixes::Fixes),
     /// Run a search and a solver on the logged inputs of another run.
     Replay(replay::Replayed),
     /// Make the reports of runs from their logs only, or verify them.
     Report(report::Report),
     /// Run the experiments of a list and write their reports into a folder of the repository.
     Publish(publish::Publish),
+    /// Open a log in Rerun, with images, clouds and the site side by side.
+    View(view::View),
     /// Simulate a dive: stereo pairs with truth, visibility and prior poses, as a data set.
     Dive(dive::Dive),
     /// Write the frames of an experiment's source as a data set.
@@ -126,9 +132,11 @@ impl Command {
             Self::Show { name } => show::execute(name),
             Self::Schema { of } => schema::execute(*of),
             Self::Recover(command) => command.execute(),
+            Self::Fixes(command) => command.execute(),
             Self::Replay(command) => command.execute(),
             Self::Report(command) => command.execute(),
             Self::Publish(command) => command.execute(),
+            Self::View(command) => command.execute(),
             Self::Dive(command) => command.execute(),
             Self::Export(command) => command.execute(),
             Self::Completions(command) => command.execute(Arguments::command()),

@@ -141,6 +141,8 @@ fn people(model: &HandModel) -> String {
     }
     let object = &model.site.objects[0];
     let base = object.base.map(|index| object.points[index].id.clone());
+    text +=
+        "No point has a normal, so each counts as visible from every side; add `normal` to the site where it is not.\n";
     text + &format!("{} points; the object frame is that of {}\n", model.points.len(), base.join(", "))
 }
 

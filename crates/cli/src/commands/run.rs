@@ -1,14 +1,11 @@
 //! `seafix run`.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
 use seafix_experiment::{Existing, Options, Plan, RunEstimate, Shard, estimate, run};
-use seafix_report::{Forms, RunSummary, report};
+use seafix_report::{Forms, report};
 
 use crate::{
     exit::{DONE, Ended, Failure, OUTPUT, USAGE},
@@ -129,29 +126,10 @@ pub(crate) fn report_on(finished: &seafix_experiment::Finished, threads: usize) 
     let written = pool.install(|| report(&finished.folder, &finished.folder.join("report"), Forms::ALL));
     let written = written.map_err(super::report::failure)?;
     print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
-    let line = nothing_found(&written.summary, &finished.folder).or_else(|| scale_error(&finished.folder));
-    if let Some(line) = line {
+    if let Some(line) = scale_error(&finished.folder) {
         notify(&line);
     }
     Ok(())
-}
-
-/// The most common reason of a run without any fix, with its number and its remedy.
-fn nothing_found(summary: &RunSummary, folder: &Path) -> Option<String> {
-    let (found, frames) =
-        summary.rows.iter().fold((0, 0), |(found, frames), row| (found + row.found, frames + row.frames));
-    if found > 0 || frames == 0 {
-        return None;
-    }
-    let mut counts = BTreeMap::<&str, usize>::new();
-    for (reason, count) in summary.rows.iter().flat_map(|row| &row.reasons) {
-        *counts.entry(reason).or_default() += count;
-    }
-    let all: usize = counts.values().sum();
-    let (reason, count) = counts.into_iter().max_by_key(|(_, count)| *count)?;
-    // An explanation ends with the remedy of its own numbers.
-    let why = explanation(folder, reason).unwrap_or_else(|| remedy(reason).to_owned());
-    Some(format!("no fix in {frames} frames: {count} of {all} attempts are `{reason}`: {why}"))
 }
 
 /// A scale error that the fixes of a run agree about: a focal length, a baseline or a survey that is off.
@@ -181,19 +159,6 @@ fn scale_error(folder: &Path) -> Option<String> {
     })
 }
 
-/// The explanation of the first attempt that was rejected for `reason`.
-fn explanation(folder: &Path, reason: &str) -> Option<String> {
-    let text = std::fs::read_to_string(folder.join("results.csv")).ok()?;
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next()?.split(',').collect();
-    let column = |name: &str| header.iter().position(|column| *column == name);
-    let (reasons, explanations) = (column("reason")?, column("explanation")?);
-    lines.map(cells).find(|cells| cells.get(reasons).is_some_and(|cell| cell == reason)).and_then(|mut cells| {
-        let text = if explanations < cells.len() { cells.swap_remove(explanations) } else { String::new() };
-        (!text.is_empty()).then_some(text)
-    })
-}
-
 /// The cells of a line of `results.csv`, some of them in quotes.
 fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
@@ -206,23 +171,4 @@ fn cells(line: &str) -> Vec<String> {
     }
     cells.push(cell);
     cells
-}
-
-/// What helps if most attempts are rejected for `reason`.
-fn remedy(reason: &str) -> &'static str {
-    match reason {
-        "nothing-in-view" => {
-            "by the prior no object is in view: `seafix check` compares poses, site and images; check that priors are \
-             world_from_camera in metres"
-        }
-        "no-data" => {
-            "no point was triangulated: check that both images show one scene and belong to the rig (`seafix check`)"
-        }
-        "too-few" => "bring more of the object into view or widen the prior",
-        "absent" => "narrow the prior, or check rig and survey: a scale error of a few per cent hides every object",
-        "gate" => "check baseline, focal length, survey and prior",
-        "imprecise" => "identify more points or move closer",
-        "inconsistent" => "survey the object again, or model the displaced part as an object of its own",
-        _ => "see the section of failures in the report",
-    }
 }

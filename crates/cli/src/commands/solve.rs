@@ -165,7 +165,7 @@ fn people(answer: &Answer) -> String {
         );
     }
     if let Some(why) = &answer.explanation {
-        text += &format!(": {why}; {}", answer.remedy.unwrap_or_default());
+        text += &format!(": {why}; {}", answer.remedy.as_deref().unwrap_or_default());
     }
     if let Some(cause) = &answer.diagnosis {
         text += &format!("; {cause}");

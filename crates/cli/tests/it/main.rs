@@ -9,6 +9,7 @@ mod circles;
 mod cloud;
 mod documentation;
 mod eval;
+mod fixes;
 mod foreign_files;
 mod generate;
 #[cfg(unix)]

@@ -53,6 +53,15 @@ impl SettingsTable {
         all
     }
 
+    /// The sentence and the unit of the setting with this dotted key; `None` if the table has no such setting.
+    ///
+    /// It tries no values, so that a unit that only the range states is unknown.
+    pub fn sentence(&self, key: &str) -> Option<(&'static str, Option<&'static str>)> {
+        let steps: Vec<&str> = key.split('.').collect();
+        let field = below(&self.form, &steps)?;
+        Some((field.doc, unit(&field.form, field.doc, "")))
+    }
+
     /// The settings without a valid default.
     pub fn required(&self) -> Vec<String> {
         self.base().keys().cloned().collect()
@@ -128,6 +137,20 @@ impl SettingsTable {
         let key = dotted(path);
         all.push(Setting { key, doc: field.doc, unit, range, form: field.form.clone(), default: default.cloned() });
         self.visit(base, &field.form, path, default, all);
+    }
+}
+
+/// The setting at the end of `steps` in a value of this form.
+fn below<'a>(form: &'a Form, steps: &[&str]) -> Option<&'a Field> {
+    match form {
+        Form::Table(fields) => {
+            let (first, rest) = steps.split_first()?;
+            let field = fields.iter().find(|field| field.key == *first)?;
+            if rest.is_empty() { Some(field) } else { below(&field.form, rest) }
+        }
+        Form::List { of, .. } => below(of, steps),
+        Form::OneOf(forms) => forms.iter().find_map(|form| below(form, steps)),
+        _ => None,
     }
 }
 

@@ -13,7 +13,8 @@ use seafix_component::{Choice, Fault, nearest};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Pixel, Point, StereoRig, Transform, triad};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 use seafix_vision::{
-    Descriptors, FrontEnd, Image, Keypoint, MATCHERS, Pair, Refinement, UncertainPixel, Unrefined, View,
+    Descriptors, FrontEnd, Image, Keypoint, LOCATORS, Locator, MATCHERS, Pair, Refinement, UncertainPixel, Unrefined,
+    View,
 };
 
 pub use marks::Mark;
@@ -102,7 +103,10 @@ impl ModelByHand<'_> {
                     .remedy("mark every corner once"));
             }
         }
-        let warnings = seen.iter().filter_map(|seen| self.doubt(seen, file)).collect();
+        let doubted = seen.iter().filter_map(|seen| self.doubt(seen, file));
+        let missed = seen.iter().filter(|seen| !seen.corner);
+        let warnings = doubted.chain(missed.map(|seen| self.missed(&seen.mark, images[0], &keypoints[0], file)));
+        let warnings = warnings.collect();
         let base = self.base(&seen, file)?;
         let corner = base.map(|index| seen[index].measured.position.at);
         let camera_from_object: Transform<Camera, Object> = triad(&corner[0], &corner[1], &corner[2])
@@ -186,12 +190,38 @@ impl ModelByHand<'_> {
         Some(fault.remedy("check the mark; an empty right mark is matched"))
     }
 
+    /// The warning for a left mark without a corner, with the locators that find one there.
+    fn missed(&self, mark: &Mark, image: &Image, keypoints: &[Keypoint], file: &Path) -> Fault {
+        let finds = |name: &&str| {
+            let locator = LOCATORS.build(&Choice::named(name)).ok();
+            locator.is_some_and(|locator| self.corner_by(&*locator, image, keypoints, mark.left).is_some())
+        };
+        let others: Vec<String> =
+            LOCATORS.names().filter(finds).map(|name| format!("`--set locator.name={name}`")).collect();
+        let remedy = match others.is_empty() {
+            true => "no other locator finds one; correct the mark, or raise --reach".to_owned(),
+            false => format!("find one with {}", others.join(" or ")),
+        };
+        let what = format!("no corner within {} px of the left mark, which is used as it is", self.reach);
+        Fault::new(what, file).on_line(mark.line).value(format!("`{}`", mark.id)).remedy(remedy)
+    }
+
     /// The corner nearest to a mark, within the mark's error.
     fn corner(&self, image: &Image, keypoints: &[Keypoint], mark: Pixel) -> Option<UncertainPixel> {
+        self.corner_by(&*self.front_end.locator, image, keypoints, mark)
+    }
+
+    fn corner_by(
+        &self,
+        locator: &dyn Locator,
+        image: &Image,
+        keypoints: &[Keypoint],
+        mark: Pixel,
+    ) -> Option<UncertainPixel> {
         let by_hand = Keypoint { at: mark, response: 0.0, scale: keypoints.first().map_or(1.0, |one| one.scale) };
         let near = keypoints.iter().filter(|keypoint| keypoint.at.distance(&mark) <= self.reach);
         let starts: Vec<Keypoint> = near.copied().chain([by_hand]).collect();
-        let places = self.front_end.locator.locate(image, &starts).into_iter().flatten();
+        let places = locator.locate(image, &starts).into_iter().flatten();
         let off = |place: &UncertainPixel| place.at.distance(&mark);
         places.filter(|place| off(place) <= self.reach).min_by(|a, b| off(a).total_cmp(&off(b)))
     }

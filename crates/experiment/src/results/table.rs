@@ -3,17 +3,27 @@
 use std::{fs::File, path::Path, sync::Arc};
 
 use parquet::{
-    basic::{Compression, ZstdLevel},
+    basic::{Compression, LogicalType, Repetition, Type as Physical, ZstdLevel},
     column::{reader::ColumnReader, writer::ColumnWriter},
     data_type::ByteArray,
     errors::ParquetError,
-    file::{metadata::KeyValue, properties::WriterProperties, reader::RowGroupReader, writer::SerializedFileWriter},
-    schema::parser::parse_message_type,
+    file::{
+        metadata::KeyValue,
+        properties::WriterProperties,
+        reader::RowGroupReader,
+        writer::{SerializedFileWriter, SerializedRowGroupWriter},
+    },
+    schema::types::{Type, TypePtr},
 };
 
 use seafix_log::{
     FrameRecord, TargetRecord,
     quantities::{Kind, QUANTITIES, Value},
+};
+
+use super::{
+    axes::Axes,
+    cell::{quote, write_cell},
 };
 
 /// The number of rows of a full row group of the Parquet table.
@@ -25,6 +35,8 @@ pub(crate) struct Table {
     pub(crate) rows: usize,
     pub(crate) text: String,
     columns: Vec<Values>,
+    /// The columns of the varied settings, which only a joined table has.
+    axes: Vec<Values>,
 }
 
 /// The values of one column. A column with unknown values has the known ones, and for every row whether it has one.
@@ -38,21 +50,26 @@ enum Values {
 
 impl Default for Table {
     fn default() -> Self {
-        let empty = |kind| match kind {
-            Kind::Text => Values::Text(Vec::new()),
-            Kind::Integer => Values::Integer(Vec::new(), Vec::new()),
-            Kind::Real => Values::Real(Vec::new(), Vec::new()),
-            Kind::Flag => Values::Flag(Vec::new(), Vec::new()),
-        };
-        let columns = QUANTITIES.iter().map(|column| empty(column.kind)).collect();
-        Self { rows: 0, text: String::new(), columns }
+        Self::with(&Axes::default())
     }
 }
 
 impl Table {
+    /// An empty table that also has the columns of `axes`.
+    pub(super) fn with(axes: &Axes) -> Self {
+        let columns = QUANTITIES.iter().map(|column| Values::empty(column.kind)).collect();
+        let axes = axes.columns.iter().map(|(_, kind)| Values::empty(*kind)).collect();
+        Self { rows: 0, text: String::new(), columns, axes }
+    }
+
     /// The header of the table as CSV.
-    pub(super) fn head() -> String {
-        QUANTITIES.iter().map(|column| column.name).collect::<Vec<_>>().join(",") + "\n"
+    pub(crate) fn head(axes: &Axes) -> String {
+        let mut text = QUANTITIES.iter().map(|column| column.name).collect::<Vec<_>>().join(",");
+        for (column, _) in &axes.columns {
+            text.push(',');
+            quote(&mut text, &column.column);
+        }
+        text + "\n"
     }
 
     /// Adds the rows of a frame, one for each attempt.
@@ -73,12 +90,15 @@ impl Table {
         self.text.push('\n');
     }
 
-    /// Adds the rows of a row group to the columns, but not to the text.
-    pub(super) fn read(&mut self, group: &dyn RowGroupReader) -> Result<(), ParquetError> {
+    /// Adds the rows of a row group to the columns, but not to the text; `cells` are those of its trial on the axes.
+    pub(super) fn read(&mut self, group: &dyn RowGroupReader, cells: &[Value]) -> Result<(), ParquetError> {
         let rows = group.metadata().num_rows() as usize;
         self.rows += rows;
         for (place, values) in self.columns.iter_mut().enumerate() {
             values.read(group.get_column_reader(place)?, rows)?;
+        }
+        for (values, cell) in self.axes.iter_mut().zip(cells) {
+            (0..rows).for_each(|_| values.push(cell.clone()));
         }
         Ok(())
     }
@@ -90,7 +110,7 @@ impl Table {
         while self.rows >= ROW_GROUP || (end && self.rows > 0) {
             let rows = self.rows.min(ROW_GROUP);
             let mut group = file.next_row_group()?;
-            for values in &mut self.columns {
+            for values in self.columns.iter_mut().chain(&mut self.axes) {
                 let mut writer = group.next_column()?.expect("the schema has this column");
                 values.write(writer.untyped(), rows)?;
                 writer.close()?;
@@ -104,6 +124,22 @@ impl Table {
 }
 
 impl Values {
+    fn empty(kind: Kind) -> Self {
+        match kind {
+            Kind::Text => Self::Text(Vec::new()),
+            Kind::Integer => Self::Integer(Vec::new(), Vec::new()),
+            Kind::Real => Self::Real(Vec::new(), Vec::new()),
+            Kind::Flag => Self::Flag(Vec::new(), Vec::new()),
+        }
+    }
+
+    /// The column of `rows` equal cells.
+    fn constant(kind: Kind, cell: &Value, rows: usize) -> Self {
+        let mut values = Self::empty(kind);
+        (0..rows).for_each(|_| values.push(cell.clone()));
+        values
+    }
+
     fn push(&mut self, cell: Value) {
         fn known<T>((values, levels): (&mut Vec<T>, &mut Vec<i16>), value: Option<T>) {
             levels.push(i16::from(value.is_some()));
@@ -165,59 +201,53 @@ impl Values {
     }
 }
 
+/// Writes the columns of the axes into a row group of one trial, after its other columns.
+pub(super) fn write_axes(
+    group: &mut SerializedRowGroupWriter<'_, File>,
+    axes: &Axes,
+    cells: &[Value],
+    rows: usize,
+) -> Result<(), ParquetError> {
+    for ((_, kind), cell) in axes.columns.iter().zip(cells) {
+        let mut writer = group.next_column()?.expect("the schema has this column");
+        Values::constant(*kind, cell, rows).write(writer.untyped(), rows)?;
+        writer.close()?;
+    }
+    Ok(())
+}
+
+/// A column of the schema. Words are never unknown, but empty.
+fn field(name: &str, kind: Kind) -> Result<TypePtr, ParquetError> {
+    let (physical, repetition, logical) = match kind {
+        Kind::Text => (Physical::BYTE_ARRAY, Repetition::REQUIRED, Some(LogicalType::String)),
+        Kind::Integer => (Physical::INT64, Repetition::OPTIONAL, None),
+        Kind::Real => (Physical::DOUBLE, Repetition::OPTIONAL, None),
+        Kind::Flag => (Physical::BOOLEAN, Repetition::OPTIONAL, None),
+    };
+    let column = Type::primitive_type_builder(name, physical).with_repetition(repetition);
+    column.with_logical_type(logical).build().map(Arc::new)
+}
+
 /// Creates an empty Parquet table with ZSTD compression.
-pub(crate) fn create(path: &Path) -> Result<SerializedFileWriter<File>, ParquetError> {
-    let fields: String = QUANTITIES
+pub(crate) fn create(path: &Path, axes: &Axes) -> Result<SerializedFileWriter<File>, ParquetError> {
+    let own = QUANTITIES.iter().map(|column| (column.name, column.kind, column.unit, column.doc));
+    let varied = axes
+        .columns
         .iter()
-        .map(|column| match column.kind {
-            Kind::Text => format!("REQUIRED BYTE_ARRAY {} (UTF8);", column.name),
-            Kind::Integer => format!("OPTIONAL INT64 {};", column.name),
-            Kind::Real => format!("OPTIONAL DOUBLE {};", column.name),
-            Kind::Flag => format!("OPTIONAL BOOLEAN {};", column.name),
-        })
-        .collect();
-    let schema = Arc::new(parse_message_type(&format!("message results {{ {fields} }}"))?);
+        .map(|(column, kind)| (column.column.as_str(), *kind, column.unit.as_str(), column.description.as_str()));
+    let columns: Vec<(&str, Kind, &str, &str)> = own.chain(varied).collect();
+    let fields = columns.iter().map(|&(name, kind, ..)| field(name, kind)).collect::<Result<_, _>>()?;
+    let schema = Arc::new(Type::group_type_builder("results").with_fields(fields).build()?);
     // What the columns are, for whoever finds the file alone: the table of `docs/quantities.md`.
     let about = |suffix: &str, text: &str, column: &str| KeyValue::new(format!("{column}.{suffix}"), text.to_owned());
-    let described = QUANTITIES
-        .iter()
-        .flat_map(|column| [about("unit", column.unit, column.name), about("description", column.doc, column.name)]);
+    let described =
+        columns.iter().flat_map(|&(name, _, unit, doc)| [about("unit", unit, name), about("description", doc, name)]);
     let properties = WriterProperties::builder()
         .set_key_value_metadata(Some(described.collect()))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_created_by(concat!("seafix ", env!("CARGO_PKG_VERSION")).to_owned())
         .build();
     SerializedFileWriter::new(File::create(path)?, schema, Arc::new(properties))
-}
-
-fn write_cell(text: &mut String, cell: &Value) {
-    use std::fmt::Write;
-    // Writing to a string does not fail.
-    let _ = match cell {
-        Value::Text(word) => {
-            quote(text, word);
-            Ok(())
-        }
-        Value::Integer(Some(number)) => write!(text, "{number}"),
-        // A real number has all its digits; a very small one has an exponent instead of many zeros.
-        Value::Real(Some(x)) if *x != 0.0 && x.abs() < 1e-5 => write!(text, "{x:e}"),
-        Value::Real(Some(x)) => write!(text, "{x}"),
-        Value::Flag(Some(flag)) => write!(text, "{flag}"),
-        _ => Ok(()),
-    };
-}
-
-/// A CSV field, quoted if necessary. A spreadsheet does not read it as a formula.
-fn quote(text: &mut String, word: &str) {
-    let formula = word.starts_with(['=', '+', '-', '@', '\t', '\r']);
-    if formula || word.contains([',', '"', '\n', '\r']) {
-        text.push('"');
-        text.push_str(if formula { "'" } else { "" });
-        text.push_str(&word.replace('"', "\"\""));
-        text.push('"');
-    } else {
-        text.push_str(word);
-    }
 }
 
 #[cfg(test)]
@@ -234,7 +264,7 @@ mod tests {
             table.add("001", &frame);
         }
         let head = "trial,frame,stamp_ns,object,search,solver,outcome,reason,explanation,p_absent,p_wrong";
-        assert!(Table::head().starts_with(head));
+        assert!(Table::head(&Axes::default()).starts_with(head));
         let mut lines = table.text.lines();
         assert!(lines.next().unwrap().starts_with("001,2,7,\"a,b\",maximum-clique,kabsch,rejected,absent,,,,,,4,,"));
         assert!(lines.next().unwrap().contains("\"'=1+1\""));

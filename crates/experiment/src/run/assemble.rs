@@ -10,7 +10,7 @@ use rayon::{ThreadPool, prelude::*};
 use seafix_component::PartialFile;
 
 use crate::{
-    results::{TrialRows, join_csv, join_parquet},
+    results::{Axes, TrialRows, join_csv, join_parquet},
     run::{
         manifest::Manifest,
         observer::Observer,
@@ -29,6 +29,7 @@ pub(super) fn assemble(
     pool: &ThreadPool,
     observer: &dyn Observer,
 ) -> Result<bool, RunError> {
+    let axes = manifest.axis_columns();
     let mut stretches = Vec::new();
     let mut outputs: Vec<Output> = Vec::new();
     for trial in &manifest.trials {
@@ -40,11 +41,12 @@ pub(super) fn assemble(
         if let Some(graph_text) = of_trial.iter().find_map(|(piece, _)| piece.pose_graph(&trial.name)) {
             outputs.push(Output { path: folder.join(pose_graph(&trial.name)), kind: Kind::PoseGraph(graph_text) });
         }
-        stretches.extend(of_trial.into_iter().map(|(_, scale_error)| scale_error));
+        let cells = axes.cells(&trial.values);
+        stretches.extend(of_trial.into_iter().map(|(_, rows)| TrialRows { cells: cells.clone(), ..rows }));
     }
     manifest.rows = stretches.iter().map(|scale_error| scale_error.rows).sum();
-    outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&stretches) });
-    outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&stretches) });
+    outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&stretches, &axes) });
+    outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&stretches, &axes) });
 
     let hashes: Result<Vec<Option<(String, String)>>, RunError> =
         pool.install(|| outputs.par_iter().map(|output| output.write(observer)).collect());
@@ -63,8 +65,8 @@ struct Output<'a> {
 enum Kind<'a> {
     Log(Vec<PathBuf>),
     PoseGraph(PathBuf),
-    Csv(&'a [TrialRows]),
-    Parquet(&'a [TrialRows]),
+    Csv(&'a [TrialRows], &'a Axes),
+    Parquet(&'a [TrialRows], &'a Axes),
 }
 
 impl Output<'_> {
@@ -82,9 +84,11 @@ impl Output<'_> {
             Kind::PoseGraph(graph_text) => {
                 self.complete(|path| fs::copy(graph_text, path).map(drop).map_err(|error| error.to_string()))?
             }
-            Kind::Csv(stretches) => self.complete(|path| join_csv(stretches, path).map_err(|e| e.to_string()))?,
-            Kind::Parquet(stretches) => {
-                self.complete(|path| join_parquet(stretches, path).map_err(|e| e.to_string()))?
+            Kind::Csv(stretches, axes) => {
+                self.complete(|path| join_csv(stretches, axes, path).map_err(|e| e.to_string()))?
+            }
+            Kind::Parquet(stretches, axes) => {
+                self.complete(|path| join_parquet(stretches, axes, path).map_err(|e| e.to_string()))?
             }
         }
         let name = self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());

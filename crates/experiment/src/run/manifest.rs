@@ -14,16 +14,19 @@ use seafix_data::dataset::sha256;
 use crate::{
     experiment::{Plan, Trial},
     git::Git,
+    results::{Axes, AxisColumn, AxisValues},
     run::{
         group::Group,
         identity::{self, Input, Versions},
         options::Options,
         outcome::RunError,
+        setting_sentence::sentence,
     },
+    sweep::AxisValue,
 };
 
 /// The format that this version writes.
-const FORMAT: &str = "seafix-manifest/2";
+const FORMAT: &str = "seafix-manifest/2.1";
 
 /// The manifest of a run: the information to reproduce it and to compare it with another.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -38,6 +41,9 @@ pub(crate) struct Manifest {
     pub(crate) seeds: BTreeMap<String, u64>,
     pub(crate) experiment: String,
     pub(crate) trials: Vec<TrialEntry>,
+    /// The columns of the varied settings in the tables; none in a manifest before 2.1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) axes: Vec<AxisColumn>,
     pub(crate) inputs: Vec<Input>,
     /// The SHA-256 of the output files; empty until the run is finished.
     pub(crate) outputs: BTreeMap<String, String>,
@@ -65,6 +71,25 @@ pub(crate) struct Manifest {
     pub(crate) versions: Versions,
 }
 
+/// The columns of the axes of a plan, with the sentences of their settings.
+fn axis_columns(plan: &Plan) -> Vec<AxisColumn> {
+    let Some(first) = plan.trials.first() else { return Vec::new() };
+    let settings = toml::Table::try_from(&first.resolved).expect("a resolved experiment is a table of plain values");
+    let column = |place: &AxisValue| match sentence(&place.key, &settings) {
+        Some((doc, unit)) => AxisColumn::new(&place.key, unit.unwrap_or_default(), doc.to_owned()),
+        None => AxisColumn::new(&place.key, "", format!("The case of the axis `{}`.", place.key)),
+    };
+    first.cell.iter().map(column).collect()
+}
+
+/// A value of a file in JSON; a number that JSON lacks is a text.
+fn json(value: &toml::Value) -> serde_json::Value {
+    match serde_json::to_value(value) {
+        Ok(value) if !value.is_null() => value,
+        _ => value.to_string().into(),
+    }
+}
+
 fn yes() -> bool {
     true
 }
@@ -75,6 +100,9 @@ pub(crate) struct TrialEntry {
     pub(crate) name: String,
     pub(crate) log: String,
     pub(crate) frames: usize,
+    /// The value on every axis; none in a manifest before 2.1.
+    #[serde(default, skip_serializing_if = "AxisValues::is_empty")]
+    pub(crate) values: AxisValues,
     pub(crate) configuration: String,
 }
 
@@ -109,6 +137,7 @@ impl Manifest {
             name: trial.name.clone(),
             log: format!("{}.mcap", trial.name),
             frames: frames(trial),
+            values: trial.cell.iter().map(|place| (place.key.clone(), json(&place.value))).collect(),
             configuration: trial.resolved.to_toml(),
         };
         Ok(Self {
@@ -121,6 +150,7 @@ impl Manifest {
             seeds: BTreeMap::from([("experiment".to_owned(), plan.experiment.seed)]),
             experiment: plan.experiment.to_toml(),
             trials: plan.trials.iter().map(entry).collect(),
+            axes: axis_columns(plan),
             identity: identity::identity(plan, groups, &inputs, &versions),
             versions,
             inputs,
@@ -167,6 +197,11 @@ impl Manifest {
         let written = open.write_all(text.as_bytes()).and_then(|()| open.sync_all());
         written.map_err(|error| RunError::unwritable(partial.unfinished(), error))?;
         partial.finish().map_err(|error| RunError::unwritable(&file, error))
+    }
+
+    /// The columns of the varied settings, with their types.
+    pub(crate) fn axis_columns(&self) -> Axes {
+        Axes::of(&self.axes, self.trials.iter().map(|trial| &trial.values))
     }
 
     /// The faults of output files that differ from the manifest.

@@ -22,6 +22,7 @@ mod open_inputs;
 mod options;
 mod outcome;
 mod partition;
+mod setting_sentence;
 mod sharing;
 mod store;
 mod worker;

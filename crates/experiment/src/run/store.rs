@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     log_decimation::Thinned,
-    results::{Table, TrialRows, create_parquet},
+    results::{Axes, Table, TrialRows, create_parquet},
     run::outcome::RunError,
 };
 
@@ -85,7 +85,8 @@ impl Sealed {
     pub(super) fn scale_error(&self, trial: &str) -> Option<TrialRows> {
         let part = self.seal.trials.iter().find(|part| part.name == trial)?;
         let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
-        Some(TrialRows { csv, text: part.text, parquet, groups: part.groups, rows: part.rows })
+        let cells = Vec::new();
+        Some(TrialRows { csv, text: part.text, parquet, groups: part.groups, rows: part.rows, cells })
     }
 }
 
@@ -223,7 +224,8 @@ impl Draft {
         let mut files: Vec<String> = vec![CSV.to_owned(), PARQUET.to_owned()];
         let (mut trials, mut length, mut groups) = (Vec::new(), 0, 0);
         let mut csv = File::create(at(CSV)).map_err(|error| RunError::unwritable(&at(CSV), error))?;
-        let mut parquet = create_parquet(&at(PARQUET)).map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
+        let mut parquet = create_parquet(&at(PARQUET), &Axes::default())
+            .map_err(|error| RunError::unwritable(&at(PARQUET), error))?;
         for Output { trial, mut log, thinned, mut table, pose_graph: graph_text } in outputs {
             log.totals(&thinned.totals)?;
             log.finish()?;

@@ -9,3 +9,4 @@ mod join;
 mod recover;
 mod round_trip;
 mod synthetic;
+mod viewers;

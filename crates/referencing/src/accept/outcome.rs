@@ -1,6 +1,6 @@
 //! The result of an attempt at a fix: a fix, alternatives, or a rejection.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
 use nalgebra::{Matrix3, Vector3};
 use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
@@ -117,20 +117,27 @@ impl Outcome {
     }
 
     /// What helps against the missing pose, in one phrase; `None` for a fix.
-    pub fn remedy(&self) -> Option<&'static str> {
+    pub fn remedy(&self) -> Option<Cow<'static, str>> {
         match self {
             Self::Fix(_) => None,
-            Self::Ambiguous(_) => Some("narrow the prior"),
+            Self::Ambiguous(_) => Some(Cow::Borrowed("narrow the prior")),
             Self::Rejected(rejection) => Some(rejection.remedy()),
-            Self::Degenerate(degenerate) => Some(degenerate.remedy()),
+            Self::Degenerate(degenerate) => Some(Cow::Borrowed(degenerate.remedy())),
         }
+    }
+
+    /// The reason for the missing pose with its numbers and its remedy; `None` for a fix.
+    ///
+    /// This is the sentence of terminals, tables, JSON and reports.
+    pub fn sentence(&self) -> Option<String> {
+        Some(format!("{}; {}", self.explanation()?, self.remedy()?))
     }
 }
 
 impl fmt::Display for Outcome {
     /// The outcome in one line: a fix with its precision, or the reason for its absence.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self, self.explanation()) {
+        match (self, self.sentence()) {
             (Self::Fix(fix), _) => {
                 write!(
                     f,
@@ -141,9 +148,7 @@ impl fmt::Display for Outcome {
                     1e3 * fix.position_sigma()
                 )
             }
-            (_, Some(explanation)) => {
-                write!(f, "{}: {explanation}; {}", self.name(), self.remedy().unwrap_or_default())
-            }
+            (_, Some(sentence)) => write!(f, "{}: {sentence}", self.name()),
             (_, None) => f.write_str(self.name()),
         }
     }

@@ -1,7 +1,12 @@
 //! The reasons for which an answer is rejected.
 
+use std::borrow::Cow;
+
 use super::{integrity::consistency::Consistency, max_p_wrong::MaxPWrong};
-use crate::{search::identification::Rejected, solve::likelihood::scale_error::ScaleError};
+use crate::{
+    search::identification::{MORE_POINTS, Rejected},
+    solve::likelihood::scale_error::ScaleError,
+};
 
 /// The reason for which a set or its pose is rejected.
 ///
@@ -149,23 +154,46 @@ impl RejectionReason {
         }
     }
 
-    /// The remedy in one phrase.
-    pub fn remedy(&self) -> &'static str {
-        match self {
+    /// The remedy in one phrase, with the settings that help and, where one follows from the numbers, its value.
+    pub fn remedy(&self) -> Cow<'static, str> {
+        Cow::Borrowed(match self {
             Self::Search(why) => why.remedy(),
-            Self::TooFew { .. } => "bring more of the object into view or widen the prior",
+            Self::TooFew { .. } => MORE_POINTS,
             Self::Absent { p_wrong, .. } if p_wrong.is_nan() => "check the point covariances",
-            Self::Absent { .. } => "narrow the prior or bring more of the object into view",
+            Self::Absent { p_wrong, .. } => return improbable(*p_wrong),
             Self::Residuals { .. } => "check calibration, object model and point covariances",
-            Self::Imprecise { .. } => "identify more points or move closer",
-            Self::Hinge { .. } => "identify more points",
+            Self::Imprecise { .. } => "identify more points (`detector.features`) or move closer",
+            Self::Hinge { .. } => "identify more points (`detector.features`)",
             Self::Attitude { .. } => "identify points farther from a common line",
             Self::Behind { .. } => "check the normals of the object model",
             Self::Stretched { .. } => "check baseline, focal length and survey",
             Self::Inconsistent { .. } => "survey the object again, or model the displaced part as an object of its own",
             Self::Prior { .. } => "check the prior's pose and covariance",
-        }
+        })
     }
+}
+
+/// The remedy for [`RejectionReason::Absent`].
+///
+/// A larger limit is advised up to the preset for studies: no use of fixes tolerates more.
+fn improbable(p_wrong: f64) -> Cow<'static, str> {
+    match larger_limit(p_wrong) {
+        Some(limit) => Cow::Owned(format!(
+            "try more features (`detector.features`), edges in the site, a narrower prior, or `max-p-wrong = {limit}`"
+        )),
+        None => Cow::Borrowed("try more features (`detector.features`), edges in the site, or a narrower prior"),
+    }
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is at least twice `p_wrong`.
+///
+/// A limit at the probability itself would accept no attempt but this one. The result is `None` above
+/// [`MaxPWrong::Permissive`].
+fn larger_limit(p_wrong: f64) -> Option<String> {
+    let limits = (0..=9).rev().flat_map(|decade| [1, 2, 5].map(|step| format!("{step}e-{decade}")));
+    let value = |limit: &String| limit.parse::<f64>().unwrap_or(f64::INFINITY);
+    let mut larger = limits.filter(|limit| value(limit) >= 2.0 * p_wrong);
+    larger.next().filter(|limit| value(limit) <= MaxPWrong::Permissive.value())
 }
 
 /// The message of [`RejectionReason::Absent`].
@@ -190,4 +218,35 @@ fn hinge(point: &str, rms: &f64, limit: &f64) -> String {
         "pose depends on one point: if model point `{point}` is a wrong match, the model points have an error of \
          {rms:.3} m (RMS, one sigma), twice that exceeds the alert limit of {limit:.3} m"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn absent(p_wrong: f64) -> RejectionReason {
+        RejectionReason::Absent { p_wrong, max: MaxPWrong::Balanced, identified: 4, model: 8 }
+    }
+
+    /// Fails if the sentence lacks its number, its limit, or a setting that would have helped.
+    #[test]
+    fn a_rejection_states_its_number_and_the_settings_that_help() {
+        let rejection = absent(1.8e-3);
+        assert_eq!(
+            rejection.to_string(),
+            "P(wrong) is 1.8e-3, at most 1.0e-3 is allowed (preset balanced); 4 of 8 points identified"
+        );
+        let remedy =
+            "try more features (`detector.features`), edges in the site, a narrower prior, or `max-p-wrong = 5e-3`";
+        assert_eq!(rejection.remedy(), remedy);
+        assert!(!absent(0.4).remedy().contains("max-p-wrong"), "no use tolerates such a limit");
+    }
+
+    #[test]
+    fn an_advised_limit_leaves_room_and_is_a_round_number() {
+        for (p_wrong, limit) in [(1.1e-3, Some("5e-3")), (9e-4, Some("2e-3")), (9.9e-3, Some("2e-2")), (1.1e-2, None)] {
+            assert_eq!(larger_limit(p_wrong).as_deref(), limit, "{p_wrong}");
+        }
+        assert_eq!(larger_limit(f64::NAN), None);
+    }
 }

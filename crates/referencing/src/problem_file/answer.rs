@@ -1,6 +1,6 @@
 //! The printed answer to a problem.
 
-use std::{path::Path, time::Instant};
+use std::{borrow::Cow, path::Path, time::Instant};
 
 use rand::Rng;
 use seafix_geometry::{Camera, Covariance6, Object, Transform};
@@ -137,7 +137,7 @@ pub struct Answer {
     /// The reason for a missing pose as a sentence.
     pub explanation: Option<String>,
     /// What helps against the missing pose, in one phrase.
-    pub remedy: Option<&'static str>,
+    pub remedy: Option<Cow<'static, str>>,
     /// The likely cause of a missing pose with its remedy, if one is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis: Option<String>,

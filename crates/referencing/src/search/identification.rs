@@ -106,6 +106,9 @@ impl Identification {
     }
 }
 
+/// Remedy for too few points of the object in the cloud.
+pub(crate) const MORE_POINTS: &str =
+    "bring more of the object into view, detect more features (`detector.features`), or widen the prior";
 /// Remedy for too many candidates.
 pub(crate) const FEWER: &str = "give a prior pose or smaller gates, or decimate the cloud";
 
@@ -187,11 +190,9 @@ impl Rejected {
     /// The remedy in one phrase.
     pub fn remedy(&self) -> &'static str {
         match self {
-            Self::TooFew { .. } | Self::NoConsensus { .. } | Self::NotFound { .. } => {
-                "bring more of the object into view or widen the prior"
-            }
+            Self::TooFew { .. } | Self::NoConsensus { .. } | Self::NotFound { .. } => MORE_POINTS,
             Self::NoPrior => "give a prior pose or another search",
-            Self::Budget { .. } => "narrow the prior or raise the budget of the search",
+            Self::Budget { .. } => "narrow the prior or raise the budget of the search (`search.budget`)",
             Self::TooLarge { .. } => FEWER,
             Self::Mirrored { .. } => "check the axes of the object model and the order of the images",
         }

@@ -1,8 +1,9 @@
-//! The content of a report, section by section.
+//! The content of a report: the first page, then the appendix, section by section.
 
 mod conditions;
 mod figures;
 mod findings;
+mod front;
 mod phrases;
 mod sections;
 
@@ -15,7 +16,7 @@ use sections::{
 };
 
 use crate::{
-    document::{Document, Section},
+    document::{Document, Section, Text},
     error::ReportError,
     format::sentence_case,
     paired,
@@ -46,7 +47,9 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
         &|| ablation::section(run, summary),
     ];
     let made: Vec<Option<Section>> = made.par_iter().map(|section| section()).collect();
-    let before = [hypotheses::section(run, &comparisons), method];
+    let mut findings = Section::new("Findings");
+    abstract_::section(run, summary, &comparisons).into_iter().for_each(|text| findings.say(text));
+    let before = [findings, hypotheses::section(run, &comparisons), method];
     let after = [
         failures,
         time::section(run, summary),
@@ -54,16 +57,17 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
         reproduce::section(run),
         reproduce::configuration(run),
     ];
+    let mut sections: Vec<Section> = before.into_iter().chain(made.into_iter().flatten()).chain(after).collect();
     Ok(Document {
         title: sentence_case(title),
         run: header.run.clone(),
         question: header.question.clone(),
-        summary: abstract_::section(run, summary, &comparisons),
-        sections: before.into_iter().chain(made.into_iter().flatten()).chain(after).collect(),
+        front: front::blocks(run, summary, &comparisons, &mut sections),
+        sections,
     })
 }
 
-/// The sentences of the abstract.
-pub(crate) fn findings(run: &Run, summary: &RunSummary) -> Vec<crate::document::Text> {
-    abstract_::section(run, summary, &paired::comparisons(run, summary))
+/// The answer to the question of the experiment, then the sentences of the findings.
+pub(crate) fn findings(run: &Run, summary: &RunSummary) -> (Text, Vec<Text>) {
+    (front::answer(run, summary), abstract_::section(run, summary, &paired::comparisons(run, summary)))
 }

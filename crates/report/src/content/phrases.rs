@@ -96,6 +96,37 @@ pub(crate) fn rate(trial: &Trial, what: &str, group: &str, (k, n): (usize, usize
     Number::new((n > 0).then_some(value), decimals, key)
 }
 
+/// The number of attempts of `group` over several trials.
+pub(crate) fn pooled_count(trials: &[&Trial], group: &str, n: usize) -> Number {
+    Number::count(n, over(trials, "/metrics/evaluation", format!("count {group}")))
+}
+
+/// The fraction of `group` among the attempts of several trials (%), and the ends of its 95 % interval.
+pub(crate) fn pooled_rate(trials: &[&Trial], group: &str, (k, n): (usize, usize)) -> [Number; 3] {
+    let trajectory = trials.iter().any(|trial| proportion::is_trajectory(&trial.header));
+    let (low, high) = if !trajectory || trials.iter().any(|trial| trial.every() > 1) {
+        proportion::interval_of_counts(trajectory, k, n)
+    } else {
+        let attempts = trials.iter().flat_map(|trial| trial.attempts());
+        proportion::interval(true, &attempts.map(|(_, row)| is_of(row, group)).collect::<Vec<bool>>())
+    };
+    [("percent", k as f64 / n as f64), ("low", low), ("high", high)].map(|(what, fraction)| {
+        let key = over(trials, "/metrics/evaluation", format!("{what} {group} of attempted"));
+        Number::new((n > 0).then_some(100.0 * fraction), 1, key)
+    })
+}
+
+/// The median of a quantity over the fixes of a trial, and the ends of its 95 % interval.
+pub(crate) fn median(trial: &Trial, field: Field, unit: (Unit, usize)) -> [Number; 3] {
+    let found = trial.attempts().filter(|(_, row)| row.found());
+    let mut values: Vec<f64> = found.filter_map(|(_, row)| row.get(field)).collect();
+    let interval = proportion::median_interval(proportion::is_trajectory(&trial.header), &mut values);
+    let median = interval.map(|_| seafix_evaluation::quantile(&mut values, 0.5));
+    let [low, high] = [interval.map(|(low, _)| low), interval.map(|(_, high)| high)];
+    [("median", median), ("median-low", low), ("median-high", high)]
+        .map(|(name, value)| statistic(trial, name, field, "found", value, unit))
+}
+
 /// The 95 % interval of the fraction of `group` (%).
 ///
 /// It has two decimals from a thousand attempts on: with one decimal it would print as the fraction itself.

@@ -15,8 +15,9 @@ pub(crate) struct Document {
     /// The name of the run.
     pub(crate) run: String,
     pub(crate) question: String,
-    /// The sentences of the abstract.
-    pub(crate) summary: Vec<Text>,
+    /// The blocks of the first page: answer, main figure, small table, conclusion and limits.
+    pub(crate) front: Vec<Block>,
+    /// The sections of the appendix.
     pub(crate) sections: Vec<Section>,
 }
 
@@ -98,7 +99,7 @@ impl Document {
     }
 
     fn blocks(&self) -> impl Iterator<Item = &Block> {
-        self.sections.iter().flat_map(|section| &section.blocks)
+        self.front.iter().chain(self.sections.iter().flat_map(|section| &section.blocks))
     }
 }
 

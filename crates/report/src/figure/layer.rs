@@ -57,9 +57,9 @@ impl Layer {
         self.reach().next().is_some() && !matches!(self, Self::Range { .. })
     }
 
-    /// Whether the layer is drawn below the grid.
+    /// Whether the layer is drawn below the grid. Columns are above it, because no grid crosses them.
     pub(super) fn below(&self) -> bool {
-        matches!(self, Self::Range { .. } | Self::Band { .. } | Self::Columns { .. } | Self::Area { .. })
+        matches!(self, Self::Range { .. } | Self::Band { .. } | Self::Area { .. })
     }
 
     /// The points that the axes must cover.

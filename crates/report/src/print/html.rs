@@ -39,11 +39,12 @@ pub(crate) fn html(document: &Document, forms: Forms) -> String {
                     h1 { (plain(&document.title)) }
                     p.run { "Run " code { (plain(&document.run)) } }
                 }
-                section.abstract {
-                    p.question { (plain(&document.question)) }
-                    @for text in &document.summary { p { (spans(text)) } }
-                }
                 main {
+                    section.front {
+                        p.question { (plain(&document.question)) }
+                        @for block in &document.front { (self::block(block)) }
+                    }
+                    p.appendix { "Appendix" }
                     @for section in &document.sections {
                         h2 { (section.title) }
                         @for block in &section.blocks { (self::block(block)) }

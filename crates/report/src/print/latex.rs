@@ -19,15 +19,15 @@ pub(crate) fn latex(document: &Document) -> String {
     let _ = write!(
         out,
         "\\title{{{}}}\n\\author{{Run \\texttt{{{}}}}}\n\\date{{}}\n\\begin{{document}}\n\\sloppy\n\\maketitle\n\
-         \\begin{{abstract}}\n\\noindent\\textit{{{}}}\n\n",
+         \\begin{{center}}\\textit{{{}}}\\end{{center}}\n\n",
         escape(&document.title),
         breakable(&document.run),
         escape(&document.question),
     );
-    for text in &document.summary {
-        let _ = writeln!(out, "{}\n", spans(text));
+    for block in &document.front {
+        out += &self::block(block);
     }
-    out += "\\end{abstract}\n";
+    out += "\\clearpage\n\\appendix\n";
     for section in &document.sections {
         let _ = write!(out, "\n\\section{{{}}}\n\n", escape(&section.title));
         for block in &section.blocks {

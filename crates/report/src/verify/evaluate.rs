@@ -148,7 +148,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         }
         (name, of) => {
             let (field, group) = of.split_once(" of ")?;
-            let values = match Field::named(field) {
+            let values: Vec<f64> = match Field::named(field) {
                 Some(field) => {
                     let own = rows(log, span).filter(|row| group == "attempted" || found(&row.record));
                     own.filter_map(|row| value(row, field)).collect()
@@ -165,7 +165,13 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
                 }
                 None => log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect(),
             };
-            statistic(name, values)?.map(|value| value * scale)
+            let trajectory = proportion::is_trajectory(&log.header);
+            let value = match name {
+                "median-low" => proportion::median_interval(trajectory, &mut { values }).map(|ends| ends.0),
+                "median-high" => proportion::median_interval(trajectory, &mut { values }).map(|ends| ends.1),
+                _ => statistic(name, values)?,
+            };
+            value.map(|value| value * scale)
         }
     })
 }

@@ -58,6 +58,35 @@ fn runs_of_other_data_are_refused() {
     assert!(forced.contains("a and b have different data: seeds: experiment 1 against experiment 2."), "{forced}");
 }
 
+/// A replay has the data of the log that it reads; without this log its data are unknown.
+///
+/// Seen to fail where the source of the replay itself is compared.
+#[test]
+fn a_replay_is_compared_with_its_original() {
+    let folder = tempfile::tempdir().unwrap();
+    let original = run(folder.path(), "a", "triad", 1);
+    let replay = |name: &str, log: &Path| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(&path).unwrap();
+        let mut header = header(1, 3.0, "kabsch");
+        header.axes.clear();
+        header.source = "log 001 of virtual-images".to_owned();
+        header.configuration += &format!("[source]\nname = 'mcap'\npath = '{}'\nread = 'clouds'\n", log.display());
+        let mut writer = Writer::create(&path.join("001.mcap"), &header).unwrap();
+        (0..36).for_each(|number| writer.frame(&blind(&header, number, 3.0)).unwrap());
+        writer.finish().unwrap();
+        path
+    };
+    let again = replay("b", &original.join("001.mcap"));
+    let table = compare(&[original.clone(), again.clone()], false, None, None).unwrap().table;
+    assert!(table.contains("n 36, p "), "{table}");
+    // A replay of a replay.
+    let twice = replay("c", &again.join("001.mcap"));
+    assert!(compare(&[original.clone(), twice], false, None, None).is_ok());
+    let lost = replay("d", &folder.path().join("no.mcap"));
+    assert!(matches!(compare(&[original, lost], false, None, None), Err(ReportError::Incomparable { .. })));
+}
+
 /// A shorter run is compared over the common frames, with a notice.
 ///
 /// No line is wider than the terminal.

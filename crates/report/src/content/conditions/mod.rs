@@ -2,4 +2,5 @@
 
 pub(crate) mod axes;
 pub(crate) mod columns;
+pub(crate) mod labels;
 pub(crate) mod setup;

@@ -93,7 +93,7 @@ pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
         short(&key),
         Published::caption(&published, &metrics.map(|(field, ..)| field))
     );
-    figure("error-over-condition", caption(&message, run), &chart, data)
+    figure("error-over-condition", caption(&message), &chart, data)
 }
 
 /// Whether a condition is the distance to the objects, or nearly so.
@@ -147,7 +147,9 @@ pub(crate) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let mut data = Table::new("distribution", text!["The data of the figure of distributions."], heads.collect());
     let conditions: Vec<String> = groups.iter().map(|(condition, _)| condition.clone()).collect();
     let mut plotted = Vec::new();
+    let mut any_single = false;
     for &(field, unit, label) in shown {
+        let mut single = Vec::new();
         let mut layers: Vec<Layer> =
             (0..names.len()).map(|series| Layer::Boxes { series, values: Vec::new() }).collect();
         for (place, (condition, members)) in groups.iter().enumerate() {
@@ -157,10 +159,12 @@ pub(crate) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
                 if values.is_empty() {
                     continue;
                 }
-                let quantiles = [0.05, 0.25, 0.5, 0.75, 0.95].map(|p| seafix_evaluation::quantile(&mut values, p));
-                let index = series(&names, name);
                 let width = 0.8 / names.len() as f64;
+                let index = series(&names, name);
                 let x = place as f64 + width * (index as f64 - (names.len() as f64 - 1.0) / 2.0);
+                let scaled: Vec<f64> = values.iter().map(|value| value * unit.scale()).collect();
+                single.extend((values.len() < FEW).then(|| points(index, (x, 0.3 * width), &scaled)));
+                let quantiles = [0.05, 0.25, 0.5, 0.75, 0.95].map(|p| seafix_evaluation::quantile(&mut values, p));
                 if let Layer::Boxes { values, .. } = &mut layers[index] {
                     values.push(([x, 0.36 * width], quantiles.map(|q| q * unit.scale())));
                 }
@@ -173,6 +177,8 @@ pub(crate) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
                 data.line(false, line);
             }
         }
+        any_single |= !single.is_empty();
+        layers.extend(single);
         // A run without durations has no panel of times.
         if layers.iter().any(|layer| matches!(layer, Layer::Boxes { values, .. } if !values.is_empty())) {
             let (x, y) = (Axis::named("", conditions.clone()), Axis::logarithmic(label));
@@ -182,8 +188,22 @@ pub(crate) fn boxes(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let legend = names.iter().enumerate().map(|(index, name)| Entry::line(name.clone(), index)).collect();
     let page = groups.len() * names.len() > 6;
     let chart = Chart { panels: plotted, columns: 1, page, shape: if page { 0.42 } else { 0.72 }, legend };
-    let message = "Distribution over the fixes: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.";
-    figure("distribution", caption(message, run), &chart, data)
+    let mut message = "Distribution over the fixes: boxes from the 25 % to the 75 % quantile with the median, whiskers to the 5 % and 95 % quantiles.".to_owned();
+    if any_single {
+        message += &format!(" Points: the single fixes of trials with fewer than {FEW}.");
+    }
+    figure("distribution", caption(&message), &chart, data)
+}
+
+/// Number of values below which a box hides how few they are, and each is drawn.
+const FEW: usize = 30;
+
+/// The single values at an abscissa, spread over a half width in their order, so that equal ones remain visible.
+fn points(series: usize, (x, half): (f64, f64), values: &[f64]) -> Layer {
+    let n = values.len() as f64;
+    let at = |place: usize| x + half * (2.0 * (place as f64 + 0.5) / n - 1.0);
+    let points = values.iter().enumerate().map(|(place, value)| [at(place), *value]).collect();
+    Layer::Marks { series, points, radius: 1.1 }
 }
 
 /// The number of fixes in the sample.

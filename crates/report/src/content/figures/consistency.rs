@@ -69,7 +69,7 @@ pub(crate) fn histogram(run: &Run) -> Option<Figure> {
     let message = format!(
         "NEES (normalised estimation error squared) of the {n} fixes of all trials that are not wrong. The curve is the density for a consistent covariance. The last column holds all larger values."
     );
-    figure("nees", caption(&message, run), &chart, data)
+    figure("nees", caption(&message), &chart, data)
 }
 
 /// The confidence levels (%) at which coverage is counted.
@@ -155,7 +155,7 @@ pub(crate) fn coverage(run: &Run) -> Option<Figure> {
             format!("; the table has {called}")
         }
     );
-    figure("coverage", caption(&message, run), &chart, data)
+    figure("coverage", caption(&message), &chart, data)
 }
 
 /// The quantile of χ² with six degrees of freedom, whose distribution function is 1 − e^(−x/2) (1 + x/2 + x²/8).

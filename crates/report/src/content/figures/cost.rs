@@ -70,7 +70,7 @@ pub(crate) fn search_cost(run: &Run) -> Option<Figure> {
         "Search cost over the number of candidates: pair tests{}. Points are medians over half octaves with at least {MIN} attempts, bars run from the 5 % to the 95 % quantile. Searches that do not count pair tests have no line.",
         if both { " and time" } else { "" }
     );
-    figure("search-cost", caption(&message, run), &chart, data)
+    figure("search-cost", caption(&message), &chart, data)
 }
 
 /// The costs of all attempts, grouped by half octaves of the number of candidates.

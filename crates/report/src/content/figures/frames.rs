@@ -78,5 +78,5 @@ pub(crate) fn errors(run: &Run) -> Option<Figure> {
         "Error of every fix over the frames; a frame without a mark has no fix.{}",
         Published::caption(&published, &metrics.map(|(field, _)| field))
     );
-    figure("error-over-frames", caption(&message, run), &chart, data)
+    figure("error-over-frames", caption(&message), &chart, data)
 }

@@ -64,7 +64,7 @@ pub(crate) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
         panels,
         legend: Vec::new(),
     };
-    layout::figure("success", caption("Fix rate (fixes in % of the attempts) over two conditions.", run), &chart, data)
+    layout::figure("success", caption("Fix rate (fixes in % of the attempts) over two conditions."), &chart, data)
 }
 
 /// The two axes along which trials differ; `None` if their number is not two.

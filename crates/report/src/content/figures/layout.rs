@@ -1,7 +1,6 @@
 //! The common parts of figures: captions, panels and series.
 
 use crate::{
-    content::conditions::setup,
     document::{Figure, Table, Text, text},
     figure::{Axis, Chart, Panel},
     paired,
@@ -27,9 +26,9 @@ pub(crate) fn panels(run: &Run, max: usize) -> Vec<(String, Vec<(String, &Trial)
         .collect()
 }
 
-/// A caption that ends with the sentence on source and camera.
-pub(crate) fn caption(message: &str, run: &Run) -> Text {
-    text![format!("{message} {}", setup::sentence(run))]
+/// A caption. Source and camera are those of the section on data.
+pub(crate) fn caption(message: &str) -> Text {
+    text![message]
 }
 
 /// The index of the series with a name.

@@ -9,7 +9,7 @@ pub(crate) mod layout;
 mod rates;
 mod recall;
 pub(crate) mod sawtooth;
-mod tolerance;
+pub(crate) mod tolerance;
 mod trajectory;
 
 use rayon::prelude::*;
@@ -19,6 +19,9 @@ use crate::{
     run::Run,
     summary::RunSummary,
 };
+
+/// The figures of rates alone.
+const RATES: [&str; 2] = ["rates", "success"];
 
 /// The figures of the section with the results.
 pub(crate) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
@@ -37,5 +40,11 @@ pub(crate) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
         &|| consistency::coverage(run),
     ];
     let plotted: Vec<Option<Figure>> = all.par_iter().map(|figure| figure()).collect();
-    plotted.into_iter().flatten().map(Block::Figure).collect()
+    let mut blocks: Vec<Block> = plotted.into_iter().flatten().map(Block::Figure).collect();
+    // A figure whose values are all equal says less than a sentence.
+    if let Some(sentence) = rates::uniform(run, summary) {
+        blocks.retain(|block| !matches!(block, Block::Figure(figure) if RATES.contains(&figure.id.as_str())));
+        blocks.insert(0, Block::Paragraph(sentence));
+    }
+    blocks
 }

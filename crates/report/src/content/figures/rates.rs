@@ -5,15 +5,27 @@ use crate::{
         figures::layout::{self, caption},
         phrases,
     },
-    document::{Figure, Head, Table, text},
+    document::{Figure, Head, Table, Text, text},
     figure::{Axis, Chart, Entry, Layer, Panel},
     proportion,
-    run::Run,
-    summary::RunSummary,
+    run::{Run, Trial},
+    summary::{Row, RunSummary},
 };
 
 /// Maximum number of trials in the figure.
 const MAX: usize = 36;
+
+/// The sentence in place of figures of rates that are 100 % or 0 % in every trial; `None` for other runs.
+pub(crate) fn uniform(run: &Run, summary: &RunSummary) -> Option<Text> {
+    let rows = || summary.rows.iter().filter(|row| row.attempted > 0);
+    let all = |is: fn(&Row) -> bool| rows().next().is_some() && rows().all(is);
+    let trials: Vec<&Trial> = run.trials.iter().collect();
+    let n = phrases::pooled_count(&trials, "attempted", rows().map(|row| row.attempted).sum());
+    if all(|row| row.found == row.attempted) {
+        return Some(text!["All ", n, " attempts have a fix, in every trial, and none is wrong."]);
+    }
+    all(|row| row.refused == row.attempted).then(|| text!["None of ", n, " attempts has a fix, in any trial."])
+}
 
 /// The figure: rates of fixes and wrong fixes among the attempts, with 95 % intervals.
 pub(crate) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
@@ -56,5 +68,5 @@ pub(crate) fn figure(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let intervals = proportion::called(run.trials.iter().map(|trial| &trial.header));
     let message =
         format!("Fixes and wrong fixes in % of the attempts, with {intervals}. The remaining attempts were rejected.");
-    layout::figure("rates", caption(&message, run), &chart, data)
+    layout::figure("rates", caption(&message), &chart, data)
 }

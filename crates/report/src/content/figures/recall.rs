@@ -84,5 +84,5 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
     let message = format!(
         "Recall: the fraction of all attempts whose TRE is below a bound, with {bands}. Rejected attempts and wrong fixes are below no bound."
     );
-    layout::figure("recall", caption(&message, run), &chart, data)
+    layout::figure("recall", caption(&message), &chart, data)
 }

@@ -96,5 +96,5 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         ],
     };
     let message = "Camera position error relative to the object of the last fix, navigated and by odometry only from the first fix. Gaps are times without a pose.";
-    finish("sawtooth", caption(message, run), &chart, data)
+    finish("sawtooth", caption(message), &chart, data)
 }

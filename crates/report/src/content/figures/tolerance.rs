@@ -13,12 +13,40 @@ use crate::{
     figure::{Axis, Chart, Entry, Layer, Panel},
     format::{distinct, headed, short, trimmed},
     number::{Key, Number},
-    run::{AttemptRow, Run},
+    run::{AttemptRow, Run, Trial},
     summary::{Row, RunSummary},
 };
 
 /// Maximum number of methods, and of conditions, in the figure.
 const MAX: usize = 7;
+
+/// The points that the fixes of a trial identified.
+pub(crate) struct Identified {
+    /// The correct pairs among those of fixes.
+    pub(crate) precision: f64,
+    /// The correct pairs of fixes among the visible points of all attempts.
+    pub(crate) recall: f64,
+}
+
+impl Identified {
+    /// The fractions; `None` without a fix, where precision is undefined, or without visible points.
+    pub(crate) fn of(trial: &Trial) -> Option<Self> {
+        // A rejected attempt has no correspondences, but its visible points count.
+        let sum = |field: Field, of: fn(&AttemptRow) -> bool| -> f64 {
+            trial.attempts().filter(|(_, row)| of(row)).filter_map(|(_, row)| row.get(field)).sum()
+        };
+        let fixed = |row: &AttemptRow| row.outcome == Outcome::Fix;
+        let (correct, identified) = (sum(Field::Correct, fixed), sum(Field::Identified, fixed));
+        let visible = sum(Field::Visible, |_| true);
+        let known = visible > 0.0 && identified > 0.0;
+        known.then(|| Self { precision: correct / identified, recall: correct / visible })
+    }
+
+    /// The harmonic mean of precision and recall.
+    pub(crate) fn f1(&self) -> f64 {
+        2.0 * self.recall * self.precision / (self.recall + self.precision).max(f64::MIN_POSITIVE)
+    }
+}
 
 /// The figure of precision over recall of identified points along the tolerance Δ.
 ///
@@ -44,19 +72,8 @@ pub(crate) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
             let mut points: Vec<(f64, [f64; 2])> = Vec::new();
             let rows = summary.rows.iter().zip(&run.trials);
             for (row, trial) in rows.filter(|(row, _)| condition(row) == *title && row.method() == *name) {
-                // A rejected attempt has no correspondences, but its visible points count.
-                let sum = |field: Field, of: fn(&AttemptRow) -> bool| -> f64 {
-                    trial.attempts().filter(|(_, row)| of(row)).filter_map(|(_, row)| row.get(field)).sum()
-                };
-                let fixed = |row: &AttemptRow| row.outcome == Outcome::Fix;
-                let (correct, identified) = (sum(Field::Correct, fixed), sum(Field::Identified, fixed));
-                let visible = sum(Field::Visible, |_| true);
                 let tolerance = axes::on(row, &key)?;
-                // Precision is undefined without a fix.
-                if !(visible > 0.0 && identified > 0.0) {
-                    continue;
-                }
-                let [recall, precision] = [correct / visible, correct / identified];
+                let Some(Identified { precision, recall }) = Identified::of(trial) else { continue };
                 points.push((tolerance, [recall, precision]));
                 let as_number = |over: &str, value| {
                     let what = format!("sum correct_pairs by {over}");
@@ -67,8 +84,7 @@ pub(crate) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
                 data.line(false, [title.clone().into(), name.clone().into(), at].into_iter().chain(ends).collect());
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let f1 =
-                |[recall, precision]: [f64; 2]| 2.0 * recall * precision / (recall + precision).max(f64::MIN_POSITIVE);
+            let f1 = |[recall, precision]: [f64; 2]| Identified { precision, recall }.f1();
             let best = points.iter().copied().max_by(|a, b| f1(a.1).total_cmp(&f1(b.1)));
             let index = series(&names, name);
             let best = best.filter(|(_, at)| f1(*at) > 0.0);
@@ -106,7 +122,7 @@ pub(crate) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
         "Precision of the points that fixes identified, over recall of the visible points of all attempts including rejected ones, along {}. The numbers are its smallest and largest value, at the ends of each line, and its value with the largest F1 score on these frames, marked by a ring.",
         headed(&key)
     );
-    figure("precision-recall", caption(&message, run), &chart, data)
+    figure("precision-recall", caption(&message), &chart, data)
 }
 
 /// Adds a label at a point, or extends the label of a near point that it would overlap.

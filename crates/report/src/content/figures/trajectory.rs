@@ -104,7 +104,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         if every > 1 { format!("One frame in {every} is shown. ") } else { String::new() },
         trial.file()
     );
-    layout::figure("trajectory", caption(&message, run), &chart, data)
+    layout::figure("trajectory", caption(&message), &chart, data)
 }
 
 fn line(trial: &Trial, what: &str, name: &str, (frame, stamp): (u64, u64), at: [f64; 3]) -> Vec<Cell> {

@@ -1,4 +1,4 @@
-//! The abstract: the answer to the experiment's question, in numbers.
+//! The findings in numbers: counts, then every quantity or series.
 
 use crate::{
     content::{findings::answer, phrases},

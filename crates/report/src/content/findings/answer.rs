@@ -2,13 +2,13 @@
 
 use crate::{
     content::{
-        conditions::axes,
+        conditions::labels::{Labels, value},
         phrases::{self, Unit},
         sections::{inspection, navigation, objects, significance},
     },
     document::{Span, Text, text},
     field::Field,
-    format::{self, distinct},
+    format::distinct,
     number::Number,
     paired::Comparison,
     run::{Run, Trial},
@@ -34,84 +34,13 @@ pub(crate) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
     message = match summary.has_limits() {
         true => limits(run, summary),
         false if summary.rows.len() == 1 => errors(run, summary),
-        false if labels.reported_singly(summary) => one_by_one(run, summary, &labels),
+        false if labels.reported_singly(summary, REPORTED) => one_by_one(run, summary, &labels),
         false => by_series(run, summary, &labels),
     };
     message.extend(objects::company(run, &name));
     message.extend(wrong(run, summary, &labels));
     message.extend(significance::sentences(run, comparisons, DIFFERENCES));
     message
-}
-
-/// The names of trials and of series of trials.
-struct Labels {
-    /// The key of the numeric axis along which a series runs.
-    along: Option<String>,
-    /// The keys of the axes that distinguish series.
-    apart: Vec<String>,
-}
-
-impl Labels {
-    fn of(summary: &RunSummary) -> Self {
-        let along = axes::numeric(summary);
-        let axes = summary.rows.first().map(|row| row.axes.clone()).unwrap_or_default();
-        let varies = |key: &String| summary.rows.iter().any(|row| value(row, key) != value(&summary.rows[0], key));
-        let apart = axes.into_iter().map(|axis| axis.key).filter(|key| Some(key) != along.as_ref() && varies(key));
-        let mut apart: Vec<String> = apart.collect();
-        // With several methods on several kinds of problems, every method is one series.
-        if along.is_none() && apart.len() > 1 {
-            let method = |key: &String| matches!(format::short(key), "search" | "solver" | "method");
-            if apart.iter().any(method) {
-                apart.retain(method);
-            }
-        }
-        Self { along, apart }
-    }
-
-    /// The name of the series that holds `row`.
-    fn of_series(&self, row: &Row) -> String {
-        let values: Vec<String> = self.apart.iter().map(|key| value(row, key)).collect();
-        if values.is_empty() { row.method() } else { values.join(", ") }
-    }
-
-    /// The name of a trial among all trials of the run.
-    fn of_trial(&self, row: &Row) -> String {
-        match (&self.along, self.apart.is_empty()) {
-            (Some(key), true) => self.place(row, key),
-            (Some(key), false) => format!("{}, {}", self.of_series(row), self.place(row, key)),
-            (None, _) => {
-                let values: Vec<String> = row.axes.iter().map(|axis| axis.value.clone()).collect();
-                if values.is_empty() { row.method() } else { values.join(", ") }
-            }
-        }
-    }
-
-    fn place(&self, row: &Row, key: &str) -> String {
-        format::placed(key, &value(row, key))
-    }
-
-    /// Whether trials are listed one by one: at most [`REPORTED`], in one series or each its own series.
-    fn reported_singly(&self, summary: &RunSummary) -> bool {
-        let series = self.series(summary).len();
-        summary.rows.len() <= REPORTED && (series == 1 || series == summary.rows.len())
-    }
-
-    /// The series with the indices of their rows, in the order of the run.
-    fn series(&self, summary: &RunSummary) -> Vec<(String, Vec<usize>)> {
-        let mut series: Vec<(String, Vec<usize>)> = Vec::new();
-        for (index, row) in summary.rows.iter().enumerate() {
-            let name = self.of_series(row);
-            match series.iter_mut().find(|(known, _)| *known == name) {
-                Some((_, members)) => members.push(index),
-                None => series.push((name, vec![index])),
-            }
-        }
-        series
-    }
-}
-
-fn value(row: &Row, key: &str) -> String {
-    row.axes.iter().find(|axis| axis.key == key).map_or_else(String::new, |axis| axis.value.clone())
 }
 
 /// A quantity with its name, its key and its distribution in a row.

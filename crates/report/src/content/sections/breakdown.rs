@@ -10,6 +10,9 @@ use crate::{
     summary::{Row, RunSummary},
 };
 
+/// A value of the condition with the results of its trial.
+pub(crate) type Step<'a> = (f64, &'a Row, &'a Trial);
+
 /// The table of break-down points: one line for every series along every axis whose larger values are harder.
 ///
 /// A sentence replaces it where no series reaches [`BORNE`] anywhere; `None` without such an axis.
@@ -33,7 +36,7 @@ pub(crate) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
         let names = distinct(summary.rows.iter().map(|row| axes::name(row, &key)));
         for (place, name) in names.iter().enumerate() {
             let own = summary.rows.iter().zip(&run.trials).filter(|(row, _)| axes::name(row, &key) == *name);
-            let mut steps: Vec<(f64, &Row, &Trial)> =
+            let mut steps: Vec<Step<'_>> =
                 own.filter_map(|(row, trial)| Some((axes::on(row, &key)?, row, trial))).collect();
             steps.sort_by(|a, b| a.0.total_cmp(&b.0));
             if steps.len() < 2 {
@@ -61,32 +64,43 @@ pub(crate) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     })
 }
 
-/// The line of one series, and whether it has a break-down point.
-fn line(name: &str, key: &str, steps: &[(f64, &Row, &Trial)]) -> (Vec<Cell>, bool) {
+/// The rate of fixes at a step (%), or an end of its interval: `percent`, `low`, `high`.
+fn fraction(end: &str, (_, row, trial): &Step<'_>) -> Number {
+    phrases::rate(trial, end, "found", (row.found, row.attempted), 1)
+}
+
+/// The number of decimals of the value of a step.
+fn digits((_, row, _): &Step<'_>, key: &str) -> usize {
+    let axis = row.axes.iter().find(|axis| axis.key == key);
+    axis.and_then(|axis| axis.value.split_once('.')).map_or(0, |(_, decimals)| decimals.len())
+}
+
+/// The break-down point of a series by the rate of fixes (`percent`) or the lower end of its interval (`low`).
+///
+/// The steps are in order of their values. The result has the number of steps up to the point, and the point.
+pub(crate) fn point(steps: &[Step<'_>], key: &str, end: &str) -> (usize, Number) {
     let trials: Vec<&Trial> = steps.iter().map(|step| step.2).collect();
-    let fraction = |end: &str, (_, row, trial): &(f64, &Row, &Trial)| {
-        phrases::rate(trial, end, "found", (row.found, row.attempted), 1)
-    };
-    let digits = |(_, row, _): &(f64, &Row, &Trial)| {
-        let axis = row.axes.iter().find(|axis| axis.key == key);
-        axis.and_then(|axis| axis.value.split_once('.')).map_or(0, |(_, decimals)| decimals.len())
-    };
+    let borne =
+        steps.iter().take_while(|step| fraction(end, step).value.is_some_and(|fraction| fraction >= BORNE)).count();
+    let last = borne.checked_sub(1).map(|last| &steps[last]);
+    let what = if end == "low" { "surely-borne" } else { "borne" };
+    let what = phrases::over(&trials, "/metrics/evaluation", format!("{what} found along {key}"));
+    (borne, Number::new(last.map(|step| step.0), last.map_or(0, |step| digits(step, key)), what))
+}
+
+/// The line of one series, and whether it has a break-down point.
+fn line(name: &str, key: &str, steps: &[Step<'_>]) -> (Vec<Cell>, bool) {
     let borne = |end: &str| {
-        let borne =
-            steps.iter().take_while(|step| fraction(end, step).value.is_some_and(|fraction| fraction >= BORNE)).count();
-        let last = borne.checked_sub(1).map(|last| &steps[last]);
-        let what = if end == "low" { "surely-borne" } else { "borne" };
-        let what = phrases::over(&trials, "/metrics/evaluation", format!("{what} found along {key}"));
-        let number = Number::new(last.map(|step| step.0), last.map_or(0, digits), what);
+        let (borne, number) = point(steps, key, end);
         let open = if borne == steps.len() { "≥ " } else { "" };
         (
             borne,
             if open.is_empty() { Cell::from(number) } else { Cell { text: text![open, number], ..Cell::default() } },
         )
     };
-    let axis = |step: &(f64, &Row, &Trial)| {
-        let Number { value, key, .. } = phrases::axis(step.2, key, Some(step.0));
-        Cell::from(Number::new(value, digits(step), Key::clone(&key)))
+    let axis = |step: &Step<'_>| {
+        let number = phrases::axis(step.2, key, Some(step.0));
+        Cell::from(Number::new(number.value, digits(step, key), Key::clone(&number.key)))
     };
     let ((n, largest), (_, surely)) = (borne("percent"), borne("low"));
     let mut cells = vec![name.to_owned().into(), headed(key).into(), axis(&steps[0]), axis(&steps[steps.len() - 1])];

@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use crate::{
-    content::phrases::{self, Unit},
+    content::{
+        phrases::{self, Unit},
+        sections::missing,
+    },
     document::{Block, Cell, Head, Picture, Section, Table, Text, code, text},
     error::ReportError,
     field::Field,
@@ -46,6 +49,8 @@ pub(crate) fn section(run: &Run, small: bool) -> Result<(Option<Block>, Section)
         return Ok((first, section));
     }
     section.add(Block::Table(table(run, &worst)));
+    section.say(text!["What each of them lacked, by the line of the table:"]);
+    section.add(Block::Items(worst.iter().enumerate().map(|(place, case)| lacked(run, place + 1, case)).collect()));
     let mut shown: Vec<u64> = Vec::new();
     for (place, (index, frame, row)) in worst.iter().enumerate() {
         // Trials of one source share their frames; each frame is shown once.
@@ -146,6 +151,14 @@ fn table(run: &Run, worst: &[Case<'_>]) -> Table {
     table
 }
 
+/// The sentence on what the attempt in a line of the table lacked.
+fn lacked(run: &Run, place: usize, (index, frame, row): &Case<'_>) -> Text {
+    let trial = &run.trials[*index];
+    let mut message = text![format!("Line {place}, {}: ", trial.object(row))];
+    message.extend(missing::sentence(trial, frame, row));
+    message
+}
+
 /// The number and the stamp of a frame.
 fn named(trial: &Trial, frame: &Frame) -> (Number, Number) {
     let key = |what: &str| Key { span: [frame.stamp_ns; 2], ..Key::of(trial, "/referencing/frame", what) };
@@ -207,21 +220,11 @@ fn to_width(marked: &Marked, width: f64) -> f64 {
 
 fn failure(run: &Run, place: usize, (index, frame, row): Case<'_>, marked: &Marked, small: bool) -> Block {
     let trial = &run.trials[index];
-    let mut caption = text![format!("Attempt in line {place} of the table, marks as in Figure 1: ")];
-    let judged = if row.wrong() {
-        "wrong"
-    } else if row.found() {
-        "fix"
-    } else {
-        trial.reason(row)
-    };
+    let mut caption = text![format!("Attempt in line {place} of the table, marks as in the picture of a fix: ")];
+    caption.push(format!("target {}, ", trial.object(row)).into());
+    caption.extend(missing::sentence(trial, frame, row));
     caption.extend(text![
-        format!(
-            "target {}, {judged}, of {}: frame {} of ",
-            trial.object(row),
-            counted(trial.frames.len(), "logged frame", "logged frames"),
-            frame.number
-        ),
+        format!(" Frame {} of {}, ", frame.number, counted(trial.frames.len(), "logged frame", "logged frames")),
         code(trial.file()),
         format!(", stamp {} ns.", frame.stamp_ns)
     ]);

@@ -65,36 +65,52 @@ pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
 ///
 /// `name` gives the name of the trial at an index.
 pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
-    let inspects = |trial: &Trial| trial.header.configuration.contains("kind = \"inspection\"");
     let trials = run.trials.iter().enumerate().filter(|(_, trial)| inspects(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
-        let errors = |point: &str| -> Vec<f64> {
-            let own = trial.views().filter(|seen| trial.point(seen) == point);
-            own.filter_map(|seen| seen.get(PoiQuantity::Error)).collect()
-        };
-        let points = distinct(trial.views().map(|point| trial.point(point).to_owned()));
-        let median = |point: &String| {
-            let mut errors = errors(point);
-            (!errors.is_empty()).then(|| seafix_evaluation::quantile(&mut errors, 0.5))
-        };
-        let mut known: Vec<(f64, &String)> = points.iter().filter_map(|point| Some((median(point)?, point))).collect();
-        known.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
         let as_number = |point: &str| {
-            let of =
-                |statistic| number(trial, point, statistic, PoiQuantity::Error, errors(point), (Unit::Millimetres, 1));
-            let views = number(trial, point, "sampled", PoiQuantity::Error, errors(point), (Unit::Plain, 0));
+            let of = |statistic| error(trial, point, statistic);
+            let views = number(trial, point, "sampled", PoiQuantity::Error, errors(trial, point), (Unit::Plain, 0));
             text![of("median"), " mm (median; ", of("q95"), " mm in 95 % of ", views, " views)"]
         };
-        let [(_, best), .., (_, worst)] = known[..] else { return None };
+        let [best, worst] = extremes(trial)?;
         let mut message =
             text![format!("{}: errors of the points of interest are smallest at {best} with ", name(index))];
-        message.extend(as_number(best));
+        message.extend(as_number(&best));
         message.push(format!(", and largest at {worst} with ").into());
-        message.extend(as_number(worst));
+        message.extend(as_number(&worst));
         message.push(".".into());
         Some(message)
     };
     trials.filter_map(sentence).collect()
+}
+
+/// Whether the vehicle of a trial inspects points of interest.
+pub(crate) fn inspects(trial: &Trial) -> bool {
+    trial.header.configuration.contains("kind = \"inspection\"")
+}
+
+/// The points of interest with the smallest and the largest median error; `None` for fewer than two.
+pub(crate) fn extremes(trial: &Trial) -> Option<[String; 2]> {
+    let points = distinct(trial.views().map(|point| trial.point(point).to_owned()));
+    let median = |point: &String| {
+        let mut errors = errors(trial, point);
+        (!errors.is_empty()).then(|| seafix_evaluation::quantile(&mut errors, 0.5))
+    };
+    let mut known: Vec<(f64, &String)> = points.iter().filter_map(|point| Some((median(point)?, point))).collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
+    let [(_, best), .., (_, worst)] = known[..] else { return None };
+    Some([best.clone(), worst.clone()])
+}
+
+/// A statistic of the error at one point of interest (mm).
+pub(crate) fn error(trial: &Trial, point: &str, statistic: &str) -> Number {
+    number(trial, point, statistic, PoiQuantity::Error, errors(trial, point), (Unit::Millimetres, 1))
+}
+
+/// The errors of all views of one point of interest (m).
+fn errors(trial: &Trial, point: &str) -> Vec<f64> {
+    let own = trial.views().filter(|seen| trial.point(seen) == point);
+    own.filter_map(|seen| seen.get(PoiQuantity::Error)).collect()
 }
 
 /// A statistic of a quantity of one point of interest.

@@ -205,7 +205,6 @@ fn stanford(run: &Run, summary: &RunSummary) -> Option<Figure> {
         _ => format!("Marks: one in {every} fixes with an error within the level, one in {every_beyond} beyond it. "),
     };
     message.extend(text![thinned]);
-    message.extend(layout::caption("", run));
     layout::figure("stanford", message, &chart, data)
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod inspection;
 pub(crate) mod integrity;
 pub(crate) mod limits;
 pub(crate) mod method;
+pub(crate) mod missing;
 pub(crate) mod navigation;
 pub(crate) mod objects;
 pub(crate) mod protocol;

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Whether a trial has a navigator.
-fn sails(trial: &Trial) -> bool {
+pub(crate) fn sails(trial: &Trial) -> bool {
     trial.sample().any(|frame| frame.navigated.is_some())
 }
 
@@ -234,7 +234,17 @@ fn count(trial: &Trial, counted: Counted) -> Number {
     Number::count(n, Key::of(trial, "/referencing/frame", format!("count {}", counted.name())))
 }
 
-fn statistic(trial: &Trial, name: &str, quantity: NavigationQuantity, unit: Unit) -> Number {
+/// The drift between fixes (mm per metre of path); `None` for fewer than two fix intervals.
+pub(crate) fn drift_per_metre(trial: &Trial) -> Option<Number> {
+    let steps = trial.sample().filter_map(|frame| frame.navigated.as_ref()).map(|navigated| navigated.step.as_ref());
+    let intervals = fix_intervals(steps);
+    let drift = drift(&intervals, |interval| interval.path_length).filter(|_| intervals.len() > 1)?;
+    let key = Key::of(trial, "/referencing/frame", "intervals drift-per-metre of navigated in mm");
+    Some(Number::new(Some(drift * Unit::Millimetres.scale()), 2, key))
+}
+
+/// A statistic of a quantity over the frames that have it.
+pub(crate) fn statistic(trial: &Trial, name: &str, quantity: NavigationQuantity, unit: Unit) -> Number {
     let mut values: Vec<f64> = trial.sample().filter_map(|frame| frame.navigated.as_ref()?.get(quantity)).collect();
     let n = values.len() as f64;
     let value = match name {

@@ -18,9 +18,10 @@ use crate::{
 const TOPIC: &str = "/metrics/evaluation";
 
 /// A counted outcome: its name in keys and its test.
-type Group = (&'static str, fn(&AttemptRow) -> bool);
+pub(crate) type Group = (&'static str, fn(&AttemptRow) -> bool);
 
-const GROUPS: [Group; 4] = [
+/// The counted outcomes: attempts, fixes, rejections and wrong fixes.
+pub(crate) const GROUPS: [Group; 4] = [
     ("attempted", |_| true),
     ("found", AttemptRow::found),
     ("refused", |row| !row.found() && !row.wrong()),
@@ -62,8 +63,7 @@ pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
 /// Only experiments that change the objects have them; they show whether a displaced object affects the fixes on
 /// others. `name` gives the name of the trial at an index.
 pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
-    let changes = |trial: &Trial| trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"));
-    let trials = run.trials.iter().enumerate().filter(|(_, trial)| changes(trial) && objects(trial).len() > 1);
+    let trials = run.trials.iter().enumerate().filter(|(_, trial)| moves(trial) && objects(trial).len() > 1);
     let sentence = |(index, trial): (usize, &Trial)| {
         let mut message = text![format!("{}, by object — ", name(index))];
         for (place, object) in objects(trial).iter().enumerate() {
@@ -79,6 +79,11 @@ pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> 
         message
     };
     trials.map(sentence).collect()
+}
+
+/// Whether the experiment of a trial changes objects.
+pub(crate) fn moves(trial: &Trial) -> bool {
+    trial.header.axes.iter().any(|axis| axis.key.starts_with("source.changes"))
 }
 
 /// A sentence on the frames with a fix, by the number of targets in view.
@@ -121,7 +126,7 @@ pub(crate) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
 ///
 /// The result is empty for a decimated log, and for generated problems, whose attempts each have an object of their
 /// own.
-fn objects(trial: &Trial) -> Vec<String> {
+pub(crate) fn objects(trial: &Trial) -> Vec<String> {
     let names: BTreeSet<&str> = trial.attempts().map(|(_, row)| trial.object(row)).collect();
     if trial.every() > 1 || 2 * names.len() > trial.attempts().count() {
         return Vec::new();
@@ -135,12 +140,14 @@ fn own<'a>(trial: &'a Trial, object: &'a str) -> impl Iterator<Item = &'a Attemp
     trial.attempts().map(|(_, row)| row).filter(move |row| trial.object(row) == object)
 }
 
-fn count(trial: &Trial, object: &str, (name, is): Group) -> Number {
+/// The number of attempts of a group on an object.
+pub(crate) fn count(trial: &Trial, object: &str, (name, is): Group) -> Number {
     let key = Key::of(trial, TOPIC, format!("count {name} on the object {object}"));
     Number::count(own(trial, object).filter(|row| is(row)).count(), key)
 }
 
-fn error(trial: &Trial, object: &str, name: &str, field: Field) -> Number {
+/// The median or the 95 % quantile of an error of the fixes on an object (mm).
+pub(crate) fn error(trial: &Trial, object: &str, name: &str, field: Field) -> Number {
     let mut values: Vec<f64> = own(trial, object).filter(|row| row.found()).filter_map(|row| row.get(field)).collect();
     let fraction = if name == "median" { 0.5 } else { 0.95 };
     let value = (!values.is_empty()).then(|| seafix_evaluation::quantile(&mut values, fraction));

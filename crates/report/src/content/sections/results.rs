@@ -31,7 +31,10 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
     section.blocks.extend(breakdown::block(run, summary));
     section.blocks.extend(plotted);
     match refusals(run, summary) {
-        Some(table) => section.add(Block::Table(table)),
+        Some(table) => {
+            section.add(Block::Table(table));
+            summary.rejections.iter().for_each(|sentence| section.say(text![sentence.clone()]));
+        }
         None => section.say(text!["No attempt was rejected."]),
     }
     section

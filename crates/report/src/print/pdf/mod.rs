@@ -23,6 +23,9 @@ const SMALL: f64 = 8.6;
 pub(crate) fn pdf(document: &Document) -> Vec<u8> {
     let mut paper = Paper { sheets: Sheets::new(), sections: 0, tables: 0, figures: 0 };
     paper.title(document);
+    document.front.iter().for_each(|block| paper.block(block));
+    paper.sheets.next();
+    set(&mut paper.sheets, &[bold("Appendix")], plain(14.0, Align::Left));
     for section in &document.sections {
         let below = section.blocks.first().map_or(0.0, |block| paper.beginning(block));
         paper.heading(&section.title, below);
@@ -67,10 +70,6 @@ impl Paper {
         let inner = Style { width: WIDTH - 56.0, left: LEFT + 28.0, ..plain(9.4, Align::Both) };
         set(&mut self.sheets, &[italic(&document.question[..])], Style { align: Align::Centre, ..inner });
         self.sheets.space(5.0);
-        for text in &document.summary {
-            set(&mut self.sheets, text, inner);
-            self.sheets.space(4.0);
-        }
     }
 
     /// The heading of a section, kept on one page with the beginning of its first block.

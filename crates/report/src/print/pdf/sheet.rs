@@ -77,6 +77,11 @@ impl Sheets {
         turns
     }
 
+    /// Begins a new page, unless this one is empty.
+    pub(super) fn next(&mut self) {
+        self.need(f64::INFINITY);
+    }
+
     fn page(&mut self) -> &mut Content {
         self.pages.last_mut().expect("there is always a page")
     }

@@ -1,0 +1,47 @@
+//! The conclusion of the first page and its limits.
+
+use crate::{
+    content::sections::significance,
+    document::{Text, bold, text},
+    format::counted,
+    paired::Comparison,
+    proportion,
+    run::Run,
+    summary::RunSummary,
+};
+
+/// The clearest difference between trials, the published figures of the experiment, and the limits of the result.
+pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
+    let mut conclusion = text![bold("Conclusion. ")];
+    match significance::sentences(run, comparisons, 1).into_iter().next() {
+        Some(sentence) => conclusion.extend(sentence),
+        None => conclusion.push("No two trials share their frames, so no difference is tested.".into()),
+    }
+    conclusion.extend(summary.published.iter().map(|sentence| format!(" {sentence}").into()));
+    vec![conclusion, text![bold("Limits. "), limits(run, summary)]]
+}
+
+/// The conditions beyond which the result says nothing, in two sentences.
+fn limits(run: &Run, summary: &RunSummary) -> String {
+    let headers = || run.trials.iter().map(|trial| &trial.header);
+    let recorded = headers().any(|header| header.configuration.contains("name = \"dataset\""));
+    let truth = run.trials.iter().any(|trial| trial.frames.iter().any(|frame| frame.truth.is_some()));
+    let seeds: std::collections::BTreeSet<_> = headers().map(|header| format!("{:?}", header.seeds)).collect();
+    let data = match (recorded, truth) {
+        (true, true) => "These are recordings with ground truth".to_owned(),
+        (true, false) => "These are recordings without ground truth, so that wrong fixes are not counted".to_owned(),
+        (false, _) => format!("The data are simulated, with {}", counted(seeds.len(), "seed", "seeds")),
+    };
+    let targets = run.header().targets.len();
+    let site = match targets {
+        0 => ", and every frame has another object".to_owned(),
+        targets => format!(", of one site with {}", counted(targets, "target", "targets")),
+    };
+    let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
+    let bound = 100.0 * proportion::interval_of_counts(headers().any(proportion::is_trajectory), 0, min).1;
+    format!(
+        "{data}{site}. The smallest trial has {}, so that its rate of wrong fixes may be up to {bound:.1} % even without any. \
+         The section on threats to validity lists all limits.",
+        counted(min, "attempt", "attempts")
+    )
+}

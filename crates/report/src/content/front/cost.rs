@@ -1,0 +1,67 @@
+//! The answer about the cost of searches: pair tests at the ends of the problem size.
+
+use super::measured::capitalised;
+use crate::{
+    content::{
+        conditions::{axes, labels::Labels},
+        phrases::{self, Unit},
+    },
+    document::{Text, text},
+    field::Field,
+    number::Number,
+    run::{Run, Trial},
+    summary::RunSummary,
+};
+
+/// The cheapest and the dearest search at the largest size, each at both ends of the sizes.
+pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
+    let key = labels.along.as_ref()?;
+    let place = |index: usize| axes::on(&summary.rows[index], key).unwrap_or(f64::INFINITY);
+    let tests = |index: usize| statistic(&run.trials[index], "median", Field::Tests);
+    let mut known: Vec<(String, usize, usize)> = Vec::new();
+    for (name, mut members) in labels.series(summary) {
+        members.retain(|&index| tests(index).value.is_some_and(|tests| tests > 0.0));
+        members.sort_by(|&a, &b| place(a).total_cmp(&place(b)));
+        if let [first, .., last] = members[..] {
+            known.push((name, first, last));
+        }
+    }
+    let largest = known.iter().map(|(_, _, last)| place(*last)).reduce(f64::max)?;
+    known.retain(|(_, _, last)| place(*last) == largest);
+    known.sort_by(|a, b| tests(a.2).value.unwrap_or(0.0).total_cmp(&tests(b.2).value.unwrap_or(0.0)));
+    let dearest = if known.len() > 1 { known.pop() } else { None };
+    let cheapest = known.into_iter().next();
+    let (_, first, last) = cheapest.as_ref()?;
+    let candidates = |index: usize| statistic(&run.trials[index], "median", Field::Candidates);
+    let mut message = text![
+        "from a median of ",
+        candidates(*first),
+        " candidates to one of ",
+        candidates(*last),
+        ", the median number of pair tests grows "
+    ];
+    for (index, (name, first, last)) in cheapest.into_iter().chain(dearest).enumerate() {
+        message.push(format!("{}from ", if index > 0 { ", and " } else { "" }).into());
+        message.extend(text![tests(first), " to ", tests(last)]);
+        message.extend(text![
+            " (5 % to 95 % of the attempts: ",
+            statistic(&run.trials[last], "q5", Field::Tests),
+            " to ",
+            statistic(&run.trials[last], "q95", Field::Tests),
+            format!(") with {name}")
+        ]);
+    }
+    Some(capitalised(message))
+}
+
+/// A statistic of a count over all attempts of a trial.
+fn statistic(trial: &Trial, name: &str, field: Field) -> Number {
+    let mut values: Vec<f64> = trial.attempts().filter_map(|(_, row)| row.get(field)).collect();
+    let p = match name {
+        "median" => 0.5,
+        "q5" => 0.05,
+        _ => 0.95,
+    };
+    let value = (!values.is_empty()).then(|| seafix_evaluation::quantile(&mut values, p));
+    phrases::statistic(trial, name, field, "attempted", value, (Unit::Plain, 0))
+}

@@ -1,0 +1,122 @@
+//! The kind of question that an experiment asks: what varies, what the logs hold, and the words of the question.
+
+use crate::{
+    content::{
+        conditions::axes,
+        sections::{inspection, navigation, objects},
+    },
+    format::short,
+    run::Run,
+    summary::RunSummary,
+};
+
+/// The kind of an experiment, which selects the form of its answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Errors beside their Cramér–Rao bounds.
+    Limits,
+    /// Points of interest of an inspection.
+    Points,
+    /// Objects that were moved.
+    Objects,
+    /// The pose of a vehicle between fixes.
+    Navigation,
+    /// The cost of searches.
+    Cost,
+    /// The tolerance of distances, on the axis of this key.
+    Tolerance(String),
+    /// Robust methods over the fraction of wrong pairs, on the axis of this key.
+    Outliers(String),
+    /// Fixes along the numeric axis of this key.
+    Along(String),
+    /// Fixes in named cases, or in a single trial.
+    Cases,
+}
+
+impl Kind {
+    pub(super) fn of(run: &Run, summary: &RunSummary) -> Self {
+        let numeric = axes::keys(summary);
+        let searches = summary.rows.iter().any(|row| row.search != summary.rows[0].search);
+        let tolerance = numeric.iter().find(|key| key.contains("tolerance"));
+        let outliers = numeric.iter().find(|key| short(key) == "outliers");
+        match (tolerance, outliers, numeric.first()) {
+            _ if summary.has_limits() => Self::Limits,
+            _ if run.trials.iter().any(inspection::inspects) => Self::Points,
+            _ if run.trials.iter().any(objects::moves) => Self::Objects,
+            _ if run.trials.iter().any(navigation::sails) => Self::Navigation,
+            _ if searches && summary.question.to_lowercase().contains("cost of") => Self::Cost,
+            (Some(key), ..) => Self::Tolerance(key.clone()),
+            (_, Some(key), _) => Self::Outliers(key.clone()),
+            (.., Some(key)) => Self::Along(key.clone()),
+            _ => Self::Cases,
+        }
+    }
+
+    /// The names of the figures that show the answer, the best first.
+    pub(super) fn figures(&self, asked: Asked) -> &'static [&'static str] {
+        match self {
+            Self::Limits => &["error-over-noise", "error-over-condition"],
+            Self::Points | Self::Objects | Self::Navigation => &["sawtooth", "rates", "error-over-condition"],
+            Self::Cost => &["search-cost"],
+            Self::Tolerance(_) => &["precision-recall"],
+            Self::Outliers(_) => &["success", "error-over-condition", "recall"],
+            Self::Along(_) | Self::Cases if !asked.accuracy => &["rates", "success", "error-over-condition", "recall"],
+            Self::Along(_) | Self::Cases => {
+                &["error-over-condition", "rates", "success", "distribution", "error-over-frames", "recall"]
+            }
+        }
+    }
+}
+
+/// What the words of a question ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Asked {
+    /// How often fixes succeed.
+    pub(super) rate: bool,
+    /// How large errors are.
+    pub(super) accuracy: bool,
+    /// The condition up to which fixes succeed.
+    pub(super) threshold: bool,
+    /// The growth of the error between fixes.
+    pub(super) drift: bool,
+}
+
+impl Asked {
+    pub(super) fn of(question: &str) -> Self {
+        let question = question.to_lowercase();
+        let words: Vec<&str> = question.split(|c: char| !c.is_alphanumeric()).collect();
+        let word = |known: &[&str]| words.iter().any(|word| known.contains(word));
+        let stem = |known: &[&str]| words.iter().any(|word| known.iter().any(|stem| word.starts_with(stem)));
+        let phrase = |known: &[&str]| known.iter().any(|phrase| question.contains(phrase));
+        let succeeds = ["fixes", "rate", "rates", "solves", "solved", "suits", "suit", "often", "matched"];
+        let rate = word(&succeeds) || stem(&["succeed", "suffic", "tolerat"]) || phrase(&["get a fix", "gets a fix"]);
+        let accuracy = stem(&["accura", "error", "precis"]);
+        Self {
+            // A question about neither asks for both.
+            rate: rate || !accuracy,
+            accuracy: accuracy || !rate,
+            threshold: phrase(&["up to which", "up to what"]),
+            drift: stem(&["drift"]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_words_of_a_question_decide_what_is_answered() {
+        let asked = |question| {
+            let Asked { rate, accuracy, threshold, .. } = Asked::of(question);
+            [rate, accuracy, threshold]
+        };
+        assert_eq!(asked("How accurate is a direct fix of one object from 2 to 5 m?"), [false, true, false]);
+        assert_eq!(asked("Up to which height does an object get a fix?"), [true, false, true]);
+        assert_eq!(
+            asked("Up to which turbidity does a fix succeed, and how much accuracy does it cost?"),
+            [true, true, true]
+        );
+        assert_eq!(asked("What happens at night?"), [true, true, false]);
+    }
+}

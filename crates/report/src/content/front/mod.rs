@@ -1,0 +1,75 @@
+//! The first page: the answer in one sentence, the main figure, a small table, the conclusion and its limits.
+
+mod along;
+mod cases;
+mod conclusion;
+mod cost;
+mod figure;
+mod kind;
+mod limits;
+mod measured;
+mod navigated;
+mod objects;
+mod outliers;
+mod points;
+mod table;
+mod tolerance;
+
+use crate::{
+    content::conditions::labels::Labels,
+    document::{Block, Section, Span, Text, bold},
+    paired::Comparison,
+    run::Run,
+    summary::RunSummary,
+};
+use kind::{Asked, Kind};
+
+/// The blocks of the first page; the main figure is taken from the section that has it.
+pub(crate) fn blocks(
+    run: &Run,
+    summary: &RunSummary,
+    comparisons: &[Comparison],
+    sections: &mut [Section],
+) -> Vec<Block> {
+    let mut blocks = vec![Block::Paragraph(emphasised(answer(run, summary)))];
+    let figures = Kind::of(run, summary).figures(Asked::of(&summary.question));
+    blocks.extend(figure::take(figures, sections));
+    blocks.extend(table::block(run, summary));
+    blocks.extend(conclusion::sentences(run, summary, comparisons).into_iter().map(Block::Paragraph));
+    blocks
+}
+
+/// The answer to the question of the experiment, in one sentence with its numbers and intervals.
+///
+/// Its form follows from what the logs hold and from the words of the question.
+pub(crate) fn answer(run: &Run, summary: &RunSummary) -> Text {
+    let labels = Labels::of(summary);
+    let asked = Asked::of(&summary.question);
+    let special = match Kind::of(run, summary) {
+        Kind::Limits => limits::sentence(run, summary),
+        Kind::Points => points::sentence(run, summary, &labels),
+        Kind::Objects => objects::sentence(run, summary, &labels),
+        Kind::Navigation => navigated::sentence(run, summary, &labels, asked),
+        Kind::Cost => cost::sentence(run, summary, &labels),
+        Kind::Tolerance(key) => tolerance::sentence(run, summary, &key),
+        Kind::Outliers(key) => outliers::sentence(run, summary, &labels, &key),
+        Kind::Along(key) => along::sentence(run, summary, &labels, &key, asked),
+        Kind::Cases => None,
+    };
+    let mut text = special.or_else(|| cases::sentence(run, summary, &labels, asked)).unwrap_or_else(|| {
+        let frames = summary.rows.iter().map(|row| row.frames).sum::<usize>();
+        vec![format!("None of {frames} frames has an attempt at a fix").into()]
+    });
+    text.push(".".into());
+    text
+}
+
+/// The words of a text in bold; numbers keep their keys.
+fn emphasised(text: Text) -> Text {
+    let strong = |span| match span {
+        Span::Plain(text) => bold(text),
+        Span::Number(number) => Span::Best(number),
+        span => span,
+    };
+    text.into_iter().map(strong).collect()
+}

@@ -1,0 +1,32 @@
+//! The answer about the points of interest of an inspection.
+
+use super::measured::capitalised;
+use crate::{
+    content::{conditions::labels::Labels, sections::inspection},
+    document::{Text, text},
+    run::Run,
+    summary::RunSummary,
+};
+
+/// The points with the smallest and the largest median error in every trial.
+pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
+    let mut message = Text::new();
+    for (trial, row) in run.trials.iter().zip(&summary.rows) {
+        let Some(points) = inspection::extremes(trial) else { continue };
+        let begin = if message.is_empty() { "" } else { "; " };
+        message
+            .push(format!("{begin}with {}, points of interest have median errors from ", labels.of_trial(row)).into());
+        for (place, point) in points.iter().enumerate() {
+            let of = |statistic| inspection::error(trial, point, statistic);
+            message.extend(text![
+                if place > 0 { " to " } else { "" },
+                of("median"),
+                format!(" mm ({point}, 95 % of the views below "),
+                of("q95"),
+                " mm)"
+            ]);
+        }
+    }
+    message.retain(|span| !span.plain().is_empty());
+    (!message.is_empty()).then(|| capitalised(message))
+}

@@ -1,0 +1,49 @@
+//! The answer about the tolerance of distances: the one with the largest F1 score at the ends of the other condition.
+
+use super::measured::capitalised;
+use crate::{
+    content::{conditions::axes, figures::tolerance::Identified},
+    document::{Text, text},
+    format::{placed, trimmed},
+    number::{Key, Number},
+    run::Run,
+    summary::RunSummary,
+};
+
+pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Text> {
+    let other = axes::keys(summary).into_iter().find(|other| other != key);
+    let at = |index: usize| other.as_ref().and_then(|other| axes::on(&summary.rows[index], other)).unwrap_or(0.0);
+    let all: Vec<(usize, Identified)> =
+        run.trials.iter().map(Identified::of).enumerate().filter_map(|(index, of)| Some((index, of?))).collect();
+    let mut ends: Vec<f64> = all.iter().map(|(index, _)| at(*index)).collect();
+    ends.sort_by(f64::total_cmp);
+    ends.dedup();
+    if let [first, .., last] = ends[..] {
+        ends = vec![first, last];
+    }
+    let mut message = Text::new();
+    for end in ends {
+        let here = all.iter().filter(|(index, _)| at(*index) == end);
+        let (index, identified) = here.max_by(|a, b| a.1.f1().total_cmp(&b.1.f1()))?;
+        let (row, trial) = (&summary.rows[*index], &run.trials[*index]);
+        let number = |over: &str, value: f64| {
+            let what = format!("sum correct_pairs by {over}");
+            Number::new(Some(value), 3, Key::of(trial, "/metrics/evaluation", what))
+        };
+        let condition =
+            other.as_ref().map_or_else(String::new, |other| format!("at {} ", placed(other, &trimmed(end))));
+        let tolerance = axes::on(row, key)?;
+        message.extend(text![
+            format!(
+                "{}{condition}the best points are those of {} with {}, of precision ",
+                if message.is_empty() { "" } else { "; " },
+                row.search,
+                placed(key, &trimmed(tolerance))
+            ),
+            number("identified of fixes", identified.precision),
+            " and recall ",
+            number("visible", identified.recall)
+        ]);
+    }
+    (!message.is_empty()).then(|| capitalised(message))
+}
