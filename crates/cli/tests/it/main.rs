@@ -15,6 +15,7 @@ mod generate;
 mod hyperqueue;
 mod layers;
 mod model;
+mod model_from_dive;
 mod odometry;
 #[cfg(unix)]
 mod ownership;
