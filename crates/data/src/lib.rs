@@ -29,4 +29,7 @@ mod sequence;
 pub mod source;
 pub mod trajectory;
 
-pub use model::{HandModel, HandPoint, Mark, ModelByHand};
+pub use model::{
+    CalibrationSigma, DiveMark, DiveModel, DivePoint, HandModel, HandPoint, Mark, ModelByHand, ModelFromDive, Picture,
+    Proposal, Proposer,
+};

@@ -4,6 +4,7 @@
 //!   [`cramer_rao`].
 //! - Object pose benchmarks: ADD, ADI, MSSD and MSPD by [`mean_distance`], [`mean_nearest_distance`],
 //!   [`symmetric_distance`], [`symmetric_projection_distance`].
+//! - Object models: aligned differences, scale and χ² by [`compare_models`].
 //! - Trajectories: APE, RPE and drift in [`trajectory`].
 //! - Statistics: quantiles, confidence intervals ([`Bootstrap`], [`clopper_pearson`]) and tests ([`signed_rank`],
 //!   [`mcnemar`]).
@@ -25,6 +26,7 @@
 
 mod bound;
 mod fix;
+mod model;
 mod solved;
 mod statistics;
 mod surface;
@@ -32,6 +34,7 @@ pub mod trajectory;
 
 pub use bound::{Seen, cramer_rao, nonlinearity, transfer_bound};
 pub use fix::{alert_limit, attitude_error, lever_arm_error, nees, position_error, residual_rms, transfer_rms};
+pub use model::{ModelDifference, compare_models};
 pub use solved::Solved;
 pub use statistics::{
     Bootstrap, SignedRank, clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile, recall_area,

@@ -57,7 +57,7 @@ pub(crate) enum Command {
     Cloud(cloud::Cloud),
     /// Convert files of other programs.
     Convert(convert::Convert),
-    /// Build the model of an object from points marked by hand in one stereo pair.
+    /// Build the model of an object from points marked by hand in one stereo pair, or in pairs of a dive.
     Model(model::Model),
     /// Estimate the trajectory of a stereo rig through a data set, relative to the first pose.
     Odometry(odometry::Odometer),
@@ -67,7 +67,7 @@ pub(crate) enum Command {
     Compare(compare::Compare),
     /// List the differences of two runs: configuration, inputs, results.
     Diff(diff::Diff),
-    /// Compute the errors of a trajectory: absolute and relative pose errors, drift (evo's definitions).
+    /// Compute the errors of a trajectory: absolute and relative pose errors, drift (evo's definitions); or of a site.
     Eval(eval::Eval),
     /// List all faults of a data set, site, experiment, problem or log.
     Check {

@@ -16,6 +16,7 @@ mod generate;
 mod hyperqueue;
 mod layers;
 mod model;
+mod model_from_dive;
 mod odometry;
 #[cfg(unix)]
 mod ownership;

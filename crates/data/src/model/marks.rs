@@ -30,32 +30,14 @@ pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<
     for (line, [id, left_u, left_v, right_u, right_v]) in
         rows(text, file, ["id", "left_u", "left_v", "right_u", "right_v"])?
     {
-        let fault = |what: &str| Fault::new(what, file).on_line(line);
-        if id.is_empty() {
-            return Err(fault("a mark without a name").remedy("give every point its id"));
-        }
-        if let Some(first) = known.insert(id.clone(), line) {
-            return Err(fault("a point marked twice")
-                .value(format!("`{id}`"))
+        let mark = mark(line, id, [left_u, left_v, right_u, right_v], sizes, file)?;
+        if let Some(first) = known.insert(mark.id.clone(), line) {
+            return Err(Fault::new("a point marked twice", file)
+                .on_line(line)
+                .value(format!("`{}`", mark.id))
                 .remedy(format!("it is already on line {first}; give each point its own id")));
         }
-        let pixel = |u: &str, v: &str, [width, height]: [u32; 2], side: &str| {
-            let at = Pixel { u: number(u, line, file)?, v: number(v, line, file)? };
-            let [right, bottom] = [width, height].map(|n| f64::from(n) - 0.5);
-            let inside = (-0.5..=right).contains(&at.u) && (-0.5..=bottom).contains(&at.v);
-            if inside {
-                return Ok(at);
-            }
-            Err(fault(&format!("a mark outside the {side} image"))
-                .value(format!("`{id}` at {u}, {v}"))
-                .remedy(format!("the image has {width}×{height} pixels; the first has its centre at 0, 0")))
-        };
-        let right = match [right_u.as_str(), right_v.as_str()] {
-            ["", ""] => None,
-            [u, v] => Some(pixel(u, v, sizes[1], "right")?),
-        };
-        let left = pixel(&left_u, &left_v, sizes[0], "left")?;
-        marks.push(Mark { line, id, left, right });
+        marks.push(mark);
     }
     if marks.len() < 3 {
         return Err(Fault::new("too few marks for a model", file)
@@ -63,6 +45,40 @@ pub(super) fn read(text: &str, file: &Path, sizes: [[u32; 2]; 2]) -> Result<Vec<
             .remedy("mark at least three points that are not on a line"));
     }
     Ok(marks)
+}
+
+/// The mark of one line: its name and the cells `left_u`, `left_v`, `right_u`, `right_v`.
+///
+/// # Errors
+/// A mark without a name, or outside an image.
+pub(super) fn mark(
+    line: usize,
+    id: String,
+    [left_u, left_v, right_u, right_v]: [String; 4],
+    sizes: [[u32; 2]; 2],
+    file: &Path,
+) -> Result<Mark, Fault> {
+    let fault = |what: &str| Fault::new(what, file).on_line(line);
+    if id.is_empty() {
+        return Err(fault("a mark without a name").remedy("give every point its id"));
+    }
+    let pixel = |u: &str, v: &str, [width, height]: [u32; 2], side: &str| {
+        let at = Pixel { u: number(u, line, file)?, v: number(v, line, file)? };
+        let [right, bottom] = [width, height].map(|n| f64::from(n) - 0.5);
+        let inside = (-0.5..=right).contains(&at.u) && (-0.5..=bottom).contains(&at.v);
+        if inside {
+            return Ok(at);
+        }
+        Err(fault(&format!("a mark outside the {side} image"))
+            .value(format!("`{id}` at {u}, {v}"))
+            .remedy(format!("the image has {width}×{height} pixels; the first has its centre at 0, 0")))
+    };
+    let right = match [right_u.as_str(), right_v.as_str()] {
+        ["", ""] => None,
+        [u, v] => Some(pixel(u, v, sizes[1], "right")?),
+    };
+    let left = pixel(&left_u, &left_v, sizes[0], "left")?;
+    Ok(Mark { line, id, left, right })
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 mod matched;
 mod output;
+mod sites;
 
 use matched::Matched;
 
@@ -24,9 +25,10 @@ const MOSTLY: f64 = 0.9;
 
 #[derive(Debug, Args)]
 pub(crate) struct Eval {
-    /// The reference trajectory: TUM, KITTI or EuRoC, or a log (.mcap) for its truth.
+    /// The reference trajectory: TUM, KITTI or EuRoC, or a log (.mcap) for its truth; or a site (.toml), to compare the
+    /// points of another one with it.
     reference: PathBuf,
-    /// The estimated trajectory [default: a trajectory of the log].
+    /// The estimated trajectory [default: a trajectory of the log], or the other site.
     estimate: Option<PathBuf>,
     /// The evaluated trajectory of a log.
     #[arg(long, value_enum, default_value = "odometry")]
@@ -202,6 +204,9 @@ fn times(count: usize) -> String {
 
 impl Eval {
     pub(crate) fn execute(&self) -> Ended {
+        if sites::is_site(&self.reference) {
+            return sites::execute(&self.reference, self.estimate.as_deref(), self.json);
+        }
         let delta = self.delta()?;
         let mut matched = self.matched()?;
         let measures = self.measures(&matched)?;

@@ -1,0 +1,245 @@
+//! A model from the marks in the pairs of a dive.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use seafix_component::{Choice, Fault, read_text};
+use seafix_data::{
+    CalibrationSigma, DiveModel, DivePoint, ModelByHand, ModelFromDive,
+    dataset::{Dataset, right_camera_rotation, swapped_at_first},
+};
+use seafix_navigation::{ODOMETRIES, Odometry};
+use serde_json::{Value, json};
+
+use super::{Model, Printed, page, pair};
+use crate::{
+    atomic_file::AtomicFile,
+    exit::{Ended, Failure, INPUT, OUTPUT, USAGE},
+    terminal::{Progress, notify},
+};
+
+#[derive(Debug, Args)]
+pub(super) struct DiveArguments {
+    /// The odometry between the pairs of a dive; `none`: each pose from the model itself.
+    #[arg(long, default_value = "stereo", value_name = "NAME")]
+    odometry: String,
+    /// Standard deviation of the principal points (px): an error that all pairs of a dive have in common.
+    #[arg(long, default_value_t = CalibrationSigma::default().pixels, value_name = "PX")]
+    principal_sigma: f64,
+    /// Relative standard deviation of the baseline: that of the scale of a model from a dive.
+    #[arg(long, default_value_t = CalibrationSigma::default().baseline, value_name = "FRACTION")]
+    baseline_sigma: f64,
+    /// Do not correct the rotation of the right camera, even if the images of a dive contradict the rig.
+    #[arg(long)]
+    keep_rig: bool,
+    /// Compare the models from every second pair of a dive.
+    #[arg(long)]
+    half: bool,
+    /// Propose so many features instead, with marks in their best pairs; --out is then the table of marks.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(super) propose: Option<u32>,
+    /// Write a page with the best views of each point, or with the proposals, to this file.
+    #[arg(long, value_name = "PAGE.html")]
+    pub(super) page: Option<PathBuf>,
+    /// Number of threads for a dive; the model does not depend on it [default: all cores].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl DiveArguments {
+    /// The uncertainty of the rig.
+    pub(super) fn calibration(&self) -> Result<CalibrationSigma, Failure> {
+        let given = [("principal-sigma", self.principal_sigma, 10.0), ("baseline-sigma", self.baseline_sigma, 0.1)];
+        for (name, value, max) in given {
+            if !(0.0..=max).contains(&value) {
+                return Err(Failure::new(USAGE, format!("invalid --{name} {value}: give a number from 0 to {max}")));
+            }
+        }
+        Ok(CalibrationSigma { pixels: self.principal_sigma, baseline: self.baseline_sigma })
+    }
+
+    /// The odometry by its name; `None` for `none`.
+    pub(super) fn odometry(&self, dataset: &Dataset) -> Result<Option<Box<dyn Odometry>>, Failure> {
+        if self.odometry == "none" {
+            return Ok(None);
+        }
+        let usage = |error| Failure::new(USAGE, error);
+        let mut choice = ODOMETRIES.resolve(&Choice::named(&self.odometry)).map_err(usage)?;
+        // The poses belong to the rig of the model.
+        if let Some(corrects) = choice.settings.get_mut("correct-range-offset") {
+            *corrects = false.into();
+        }
+        let odometry = ODOMETRIES.build(&choice).map_err(usage)?;
+        if odometry.listens() && !dataset.has_readings() {
+            let what = format!("no readings for odometry `{}`", self.odometry);
+            let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
+            let remedy =
+                "name the tables of the Doppler log and the gyro, `doppler = …` and `gyro = …`, or use `stereo`";
+            return Err(Failure::new(INPUT, fault.remedy(remedy)));
+        }
+        Ok(Some(odometry))
+    }
+
+    /// The threads.
+    pub(super) fn pool(&self) -> Result<rayon::ThreadPool, Failure> {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads.map_or(0, usize::from))
+            .build()
+            .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))
+    }
+}
+
+/// The data set of a dive, with its rig as the images show it; warnings are printed.
+pub(super) fn opened(model: &Model) -> Result<Dataset, Failure> {
+    let dataset = Dataset::open_pairs(&model.left, false).map_err(|faults| Failure::faults(INPUT, &faults))?;
+    let mut dataset = dataset.within(model.limits.of_images());
+    let odd = dataset.odd_times();
+    dataset.warnings.iter().chain(&odd).for_each(|warning| notify(&format!("warning: {warning}")));
+    if let Some(fault) = swapped_at_first(&dataset) {
+        return Err(Failure::new(INPUT, fault));
+    }
+    let rotation = if model.dive.keep_rig { None } else { right_camera_rotation(&dataset) };
+    if let Some(found) = rotation {
+        dataset.rig = found.rig;
+        notify(&format!(
+            "warning: the images contradict the rig: matches are {:.1} px (median) off its epipolar lines, and {:.1} px \
+             after a rotation of the right camera, which was corrected (`--keep-rig` prevents it); calibrate again",
+            found.given_px, found.left_px
+        ));
+    }
+    Ok(dataset)
+}
+
+/// Builds the model of a dive and writes it.
+pub(super) fn execute(model: &Model, marks: &Path, by_hand: ModelByHand<'_>, calibration: CalibrationSigma) -> Ended {
+    let faults = |faults: Vec<Fault>| Failure::faults(INPUT, &faults);
+    let arguments = &model.dive;
+    let dataset = opened(model)?;
+    let odometry = arguments.odometry(&dataset)?;
+    let text = read_text(marks).map_err(|fault| Failure::new(INPUT, fault))?;
+    let inputs = [&*model.left, marks];
+    let (halves, pictures) = (arguments.half, arguments.page.is_some());
+    let from_dive = ModelFromDive { by_hand, calibration, odometry: odometry.as_deref(), halves, pictures };
+    if dataset.frames.len() == 1 {
+        let built = from_dive.of_only_pair(&dataset, &text, marks).map_err(faults)?;
+        return model.finish(&pair::printed(&built), &inputs);
+    }
+    // An output that cannot be written is reported before the work.
+    let page = arguments.page.as_deref().map(|path| AtomicFile::begin(path, model.replacing, &inputs)).transpose()?;
+    let progress = Progress::new();
+    progress.expect(dataset.frames.len());
+    let built = arguments.pool()?.install(|| from_dive.model(&dataset, &text, marks, &mut || progress.step("")));
+    progress.end();
+    let built = built.map_err(faults)?;
+    if let Some(page) = page {
+        page.finish(views(&built).map_err(|message| Failure::new(OUTPUT, message))?)?;
+    }
+    let printed = Printed {
+        site: built.site.to_toml(),
+        people: people(&built),
+        machines: machines(&built),
+        warnings: built.warnings.iter().map(ToString::to_string).collect(),
+    };
+    model.finish(&printed, &inputs)
+}
+
+/// The page of the best views.
+fn views(model: &DiveModel) -> Result<String, String> {
+    fn entry(point: &DivePoint) -> page::Entry<'_> {
+        let line = format!(
+            "σ {:.2} mm, {} views, {:.0}° apart, {} rejected",
+            point.sigma * 1e3,
+            point.observations.len(),
+            point.parallax.to_degrees(),
+            point.rejected.len()
+        );
+        page::Entry { id: &point.id, lines: vec![line], pictures: point.pictures.iter().collect() }
+    }
+    let entries: Vec<page::Entry<'_>> = model.points.iter().map(entry).collect();
+    let introduction = format!(
+        "The best views of each point. The cross is the position that the model predicts; the green bars are three \
+         standard deviations of it, {:.0} times enlarged.",
+        page::BAR / 3.0
+    );
+    page::page(&model.site.name, &introduction, &entries)
+}
+
+/// The output for people: position, standard deviation and views of each point.
+fn people(model: &DiveModel) -> String {
+    let mut text = format!(
+        "{:16} {:>9} {:>9} {:>9}  {:>7} {:>6} {:>9} {:>9}\n",
+        "point", "x mm", "y mm", "z mm", "σ mm", "views", "parallax", "rejected"
+    );
+    for point in &model.points {
+        let [x, y, z] = <[f64; 3]>::from(point.at.coords * 1e3);
+        let (id, sigma, views) = (&point.id, point.sigma * 1e3, point.observations.len());
+        let (parallax, rejected) = (point.parallax.to_degrees(), point.rejected.len());
+        text += &format!("{id:16} {x:9.1} {y:9.1} {z:9.1}  {sigma:7.2} {views:6} {parallax:8.1}° {rejected:9}\n");
+    }
+    let [common, difference] = model.excess;
+    text += &format!(
+        "{} points from {} of {} pairs, χ² {:.0} of {}; noise beyond that of the images: {common:.3} px, {difference:.3} \
+         px in the disparity\n",
+        model.points.len(),
+        model.used.len(),
+        model.pairs,
+        model.chi2,
+        model.dof
+    );
+    if let Some(halves) = &model.halves {
+        let chi2 = halves.chi2.map_or_else(String::new, |chi2| format!(", χ² {chi2:.0} of {}", halves.dof));
+        text += &format!("models of every second pair differ by {:.2} mm RMS a coordinate{chi2}\n", halves.rms * 1e3);
+    }
+    let unseen: Vec<&str> = model.sides.iter().filter(|(_, seen)| !seen).map(|(side, _)| *side).collect();
+    if !unseen.is_empty() {
+        text += &format!("no pair sees the object from {}\n", unseen.join(", "));
+    }
+    let object = &model.site.objects[0];
+    let base = object.base.map(|index| object.points[index].id.clone());
+    text + &format!("the object frame is that of {}\n", base.join(", "))
+}
+
+/// The output for programs: one JSON object.
+fn machines(model: &DiveModel) -> String {
+    let point = |point: &DivePoint| -> Value {
+        json!({
+            "id": point.id,
+            "at": <[f64; 3]>::from(point.at.coords),
+            "covariance": <[[f64; 3]; 3]>::from(point.covariance),
+            "sigma": point.sigma,
+            "corner": point.corner,
+            "lines": point.lines,
+            "parallax_deg": point.parallax.to_degrees(),
+            "observations": point.observations.iter().map(|(stamp_ns, at)| json!({
+                "stamp_ns": stamp_ns,
+                "pixels": [[at.left.u, at.left.v], [at.right.u, at.right.v]],
+            })).collect::<Vec<_>>(),
+            "rejected": point.rejected.iter().map(|(stamp_ns, why)| json!({ "stamp_ns": stamp_ns, "why": why }))
+                .collect::<Vec<_>>(),
+        })
+    };
+    let object = &model.site.objects[0];
+    let sides = |seen: bool| model.sides.iter().filter(|side| side.1 == seen).map(|side| side.0).collect::<Vec<_>>();
+    let value = json!({
+        "object": object.id,
+        "base": object.base.map(|index| &object.points[index].id),
+        "points": model.points.iter().map(point).collect::<Vec<_>>(),
+        "given_up": model.given_up.iter().map(|(id, why)| json!({ "id": id, "why": why })).collect::<Vec<_>>(),
+        "pairs": model.pairs,
+        "used": model.used,
+        "motions": model.motions,
+        "excess_px": { "common": model.excess[0], "disparity": model.excess[1] },
+        "chi2": model.chi2,
+        "dof": model.dof,
+        "sides": { "seen": sides(true), "unseen": sides(false) },
+        "halves": model.halves.as_ref().map(|halves| json!({
+            "rms": halves.rms,
+            "chi2": halves.chi2,
+            "dof": halves.dof,
+            "scale": halves.scale,
+            "scale_sigma": halves.scale_sigma,
+        })),
+        "warnings": model.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+    });
+    value.to_string() + "\n"
+}

@@ -1,0 +1,182 @@
+//! `seafix model DIVE`: a model from a dive, and `seafix eval` of two sites.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
+
+use seafix_data::dataset::Dataset;
+use seafix_geometry::Pixel;
+use tempfile::TempDir;
+
+use crate::{Ended, ended_with, program};
+
+/// Half an orbit of six pairs around an object, whose site is the truth.
+const DIVE: &str = r#"
+question = "Does a dive around an object give its model?"
+seed = 5
+
+[source]
+name = "dive"
+frames = 6
+rate = 0.8
+model-sigma = 0.0
+survey-sigma = 0.0
+
+[source.route]
+kind = "orbit"
+object = "manifold"
+altitude = 2.5
+radius = 0.8
+"#;
+
+/// The rendered dive, once for all tests.
+fn dive() -> &'static Path {
+    static FOLDER: OnceLock<TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = TempDir::new().unwrap();
+        fs::write(folder.path().join("dive.toml"), DIVE).unwrap();
+        ended_with(0, program().current_dir(folder.path()).args(["dive", "dive.toml", "--out", "dive"]));
+        folder
+    });
+    folder.path()
+}
+
+/// One mark of each point, a pixel off, in the pair that shows it nearest to the centre: the lines of the table.
+fn marks() -> Vec<String> {
+    let dataset = Dataset::open(&dive().join("dive")).unwrap();
+    let object = dataset.site.as_ref().unwrap().object("manifold").unwrap();
+    let world_from_object = object.world_from_object.unwrap();
+    let [u, v] = dataset.rig.left().principal();
+    let centre = Pixel { u, v };
+    let mark = |point: &seafix_referencing::ModelPoint| {
+        let seen = dataset.frames.iter().filter_map(|frame| {
+            let named = |(object, id): &&(String, String)| object == "manifold" && *id == point.id;
+            frame.visible.iter().find(named)?;
+            let pixels = dataset.rig.project(&(frame.truth?.inverse() * (world_from_object * point.at)))?;
+            Some((pixels.left.distance(&centre), frame.stamp_ns, pixels.left))
+        });
+        let (_, stamp, at) = seen.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(format!("{stamp},{},{:.1},{:.1},,", point.id, at.u + 0.7, at.v - 0.6))
+    };
+    object.points.iter().filter_map(mark).collect()
+}
+
+const HEADER: &str = "stamp_ns,id,left_u,left_v,right_u,right_v";
+
+fn table(lines: &[String]) -> String {
+    format!("{HEADER}\n{}\n", lines.join("\n"))
+}
+
+fn model(folder: &Path, dive: &Path, marks: &str, more: &[&str], code: i32) -> Ended {
+    fs::write(folder.join("marks.csv"), marks).unwrap();
+    let mut command = program();
+    command.current_dir(folder).arg("model").arg(dive);
+    ended_with(code, command.args(["--marks", "marks.csv", "--id", "manifold"]).args(more))
+}
+
+/// One mark a point gives the model to a millimetre, whatever the order of the marks and the number of threads.
+#[test]
+fn one_mark_of_each_point_gives_the_model() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let source = dive().join("dive");
+    let lines = marks();
+    assert!(lines.len() >= 5, "{lines:?}");
+    let message = model(here, &source, &table(&lines), &["--out", "a.toml", "--half", "--threads", "2"], 0).out;
+    assert!(message.contains("of 6 pairs") && message.contains("models of every second pair differ"), "{message}");
+    ended_with(0, program().arg("check").arg(here.join("a.toml")));
+    let reversed: Vec<String> = lines.iter().rev().cloned().collect();
+    let json = model(here, &source, &table(&reversed), &["--out", "b.toml", "--threads", "1", "--json"], 0).out;
+    assert_eq!(fs::read(here.join("a.toml")).unwrap(), fs::read(here.join("b.toml")).unwrap());
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let base = &json["base"][0];
+    let points = json["points"].as_array().unwrap();
+    let first = points.iter().find(|point| point["id"] == *base).unwrap();
+    assert_eq!(first["covariance"], serde_json::json!([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]));
+    assert!(points.iter().all(|point| point["observations"].as_array().unwrap().len() >= 2));
+
+    let mut eval = program();
+    let text = ended_with(0, eval.arg("eval").arg(source.join("site.toml")).arg(here.join("a.toml")).arg("--json")).out;
+    let compared: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let object = &compared["objects"][0];
+    assert_eq!(object["object"], "manifold");
+    let (rms, scale) = (object["rms"].as_f64().unwrap(), object["scale"].as_f64().unwrap());
+    assert!(rms < 1.5e-3 && (scale - 1.0).abs() < 4e-3, "{text}");
+    let people = ended_with(0, program().arg("eval").arg(source.join("site.toml")).arg(here.join("a.toml"))).out;
+    assert!(people.contains("mm a coordinate, worst") && people.contains("χ²"), "{people}");
+}
+
+/// A dive of one pair gives the bytes of the command for one pair.
+#[test]
+fn the_model_of_one_pair_is_that_of_its_images() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let one = here.join("one");
+    fs::create_dir(&one).unwrap();
+    let source = dive().join("dive");
+    let frames = fs::read_to_string(source.join("frames.csv")).unwrap();
+    let lines = marks();
+    // The pair with the largest number of marks.
+    let count = |stamp: &str| lines.iter().filter(|line| line.starts_with(stamp)).count();
+    let row = frames.lines().skip(1).max_by_key(|row| count(row.split(',').next().unwrap())).unwrap();
+    let [stamp, left, right] = row.split(',').collect::<Vec<_>>()[..] else { panic!("{row}") };
+    for file in ["dataset.toml", left, right] {
+        fs::copy(source.join(file), one.join(file)).unwrap();
+    }
+    fs::write(one.join("frames.csv"), format!("stamp_ns,left,right\n{row}\n")).unwrap();
+    let mut own: Vec<String> = lines.iter().filter(|line| line.starts_with(stamp)).cloned().collect();
+    if own.len() < 3 {
+        // Other places with texture serve as well: both commands receive the same.
+        own.extend((0..3).map(|k| format!("{stamp},X{k},{},{},,", 400 + 60 * k, 300 + 30 * k * k)));
+    }
+    model(here, &one, &table(&own), &["--out", "dive.toml"], 0);
+    let pair: Vec<&str> = own.iter().map(|line| line.split_once(',').unwrap().1).collect();
+    fs::write(here.join("clicks.csv"), format!("id,left_u,left_v,right_u,right_v\n{}\n", pair.join("\n"))).unwrap();
+    let mut command = program();
+    command.current_dir(here).arg("model").args([one.join(left), one.join(right)]).arg("--rig");
+    command.arg(one.join("dataset.toml")).args(["--points", "clicks.csv", "--id", "manifold", "--out", "pair.toml"]);
+    ended_with(0, &mut command);
+    assert_eq!(fs::read(here.join("dive.toml")).unwrap(), fs::read(here.join("pair.toml")).unwrap());
+}
+
+#[test]
+fn what_is_wrong_with_marks_is_reported_with_its_lines() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let source = dive().join("dive");
+    let lines = marks();
+    let with = |more: &str| table(&[lines.clone(), vec![more.to_owned()]].concat());
+    let renamed = lines[0].replacen(&format!(",{},", lines[0].split(',').nth(1).unwrap()), ",copy,", 1);
+    let stamp = lines[0].split(',').next().unwrap();
+    let number = lines.len() + 2;
+    let cases: [(String, &[&str], i32, String); 6] = [
+        (with("17,Z,9,9,,"), &[], 3, format!("a mark at the stamp of no pair in marks.csv:{number}: 17")),
+        (with(&renamed), &[], 3, "two names of one place".to_owned()),
+        (with(&lines[0]), &[], 3, "a point marked twice in one pair".to_owned()),
+        (with(&format!("{stamp},Z,5000,9,,")), &[], 3, "a mark outside the left image".to_owned()),
+        (table(&lines), &["--base", "A,B"], 2, "separate three ids by commas".to_owned()),
+        (table(&lines), &["--baseline-sigma", "2"], 2, "invalid --baseline-sigma 2".to_owned()),
+    ];
+    for (marks, more, code, part) in cases {
+        let text = model(here, &source, &marks, &[more, &["--out", "site.toml"]].concat(), code).error;
+        assert!(text.contains(&part), "{text}");
+        assert_eq!(fs::read_dir(here).unwrap().count(), 1, "only the marks");
+    }
+    let no_site = ended_with(2, program().arg("eval").arg(source.join("site.toml"))).error;
+    assert!(no_site.contains("no second site"), "{no_site}");
+}
+
+#[test]
+fn proposals_are_marks_and_a_page() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let out: PathBuf = here.join("marks.csv");
+    let mut command = program();
+    command.current_dir(here).arg("model").arg(dive().join("dive")).args(["--propose", "12", "--page", "page.html"]);
+    ended_with(0, command.arg("--out").arg(&out));
+    let marks = fs::read_to_string(&out).unwrap();
+    assert!(marks.starts_with(HEADER) && (2..=13).contains(&marks.lines().count()), "{marks}");
+    assert!(fs::read_to_string(here.join("page.html")).unwrap().contains("data:image/png;base64,"));
+}

@@ -1,0 +1,274 @@
+//! The model of an object from a dive.
+
+use std::{collections::BTreeMap, path::Path};
+
+use nalgebra::Matrix3;
+use seafix_component::Fault;
+use seafix_geometry::{Transform, UncertainPixels};
+use seafix_navigation::Odometry;
+
+use super::{
+    built::DiveModel,
+    contradictions::contradictions,
+    expect::ExpectedPose,
+    find::Finder,
+    finish::Finish,
+    gather::{Feature, Gathered},
+    marks,
+    relocate::relocate,
+    settle::{HELD, Key, Scene, Settled, settle},
+    start::{Marked, pairs_of},
+    trail::Trail,
+};
+use crate::{
+    dataset::Dataset,
+    model::{
+        adjust::CalibrationSigma,
+        by_hand::{HandModel, ModelByHand},
+        frame::inner,
+    },
+};
+
+/// The settings for a model from a dive.
+#[derive(Debug)]
+pub struct ModelFromDive<'a> {
+    /// The settings of a mark, the object's name and its base; the reach is also the radius of the search in other pairs.
+    pub by_hand: ModelByHand<'a>,
+    /// The uncertainty of the rig.
+    pub calibration: CalibrationSigma,
+    /// The odometry; `None` to find the pose of each pair from the model itself.
+    pub odometry: Option<&'a dyn Odometry>,
+    /// Whether the models of every second pair are compared.
+    pub halves: bool,
+    /// Whether the best views of each point are cut out.
+    pub pictures: bool,
+}
+
+/// The maximum number of searches; later ones find next to nothing.
+const ROUNDS: usize = 5;
+
+/// The progress of a search: the model so far.
+struct Progress<'a> {
+    trail: Trail,
+    scene: Scene,
+    features: Vec<Feature>,
+    gathered: Gathered,
+    /// Whether the position of each feature is known.
+    known: Vec<bool>,
+    finder: Finder<'a>,
+    unread: Vec<Fault>,
+}
+
+impl ModelFromDive<'_> {
+    /// Builds the model of the only pair of `dataset`, as [`ModelByHand`] does.
+    ///
+    /// # Errors
+    /// Invalid marks.
+    pub fn of_only_pair(&self, dataset: &Dataset, text: &str, file: &Path) -> Result<HandModel, Vec<Fault>> {
+        let marks = marks::read(text, file, sizes(dataset)).map_err(|fault| vec![fault])?;
+        pairs_of(dataset, &marks, file)?;
+        let one = |fault| vec![fault];
+        let (left, right) = dataset.pair(&dataset.frames[0]).map_err(one)?;
+        let marks = marks.into_iter().map(|mark| mark.mark).collect();
+        self.by_hand.of_marks([&left, &right], &dataset.rig, marks, file).map_err(one)
+    }
+
+    /// Builds a model from the marks in `text`, the content of `file`, and all pairs of `dataset`.
+    ///
+    /// `progress` is called for each pair of the odometry.
+    ///
+    /// # Errors
+    /// All faults of the marks, pairs without connection, or fewer than three points that remain.
+    pub fn model(
+        &self,
+        dataset: &Dataset,
+        text: &str,
+        file: &Path,
+        progress: &mut dyn FnMut(),
+    ) -> Result<DiveModel, Vec<Fault>> {
+        let marks = marks::read(text, file, sizes(dataset)).map_err(|fault| vec![fault])?;
+        let marked = self.by_hand.located(dataset, marks, file)?;
+        let (trail, unread) = match self.odometry {
+            Some(odometry) => Trail::by_odometry(dataset, odometry, progress),
+            None => (Trail::unknown(dataset.frames.len()), Vec::new()),
+        };
+        let finder = Finder { front_end: self.by_hand.front_end, rig: &dataset.rig, reach: self.by_hand.reach };
+        let mut state = Progress::begin(&marked, trail, finder, unread);
+        let settled = state.rounds(dataset, &marked, file)?;
+        let faults = contradictions(&marked, &state.gathered.seen, &settled, file);
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+        Finish {
+            by_hand: &self.by_hand,
+            calibration: &self.calibration,
+            dataset,
+            marked: &marked,
+            trail: &state.trail,
+            scene: &state.scene,
+            gathered: &state.gathered,
+            settled: &settled,
+            halves: self.halves,
+            pictures: self.pictures,
+            file,
+        }
+        .model(state.unread)
+        .map_err(|fault| vec![fault])
+    }
+}
+
+fn sizes(dataset: &Dataset) -> [[u32; 2]; 2] {
+    [dataset.rig.left(), dataset.rig.right()].map(seafix_geometry::Pinhole::size)
+}
+
+impl<'a> Progress<'a> {
+    /// The marks that one segment of the odometry, or one pair, connects: the world is the camera of the first of them.
+    fn begin(marked: &[Marked], trail: Trail, finder: Finder<'a>, unread: Vec<Fault>) -> Self {
+        let mut counts: BTreeMap<(Option<usize>, usize), usize> = BTreeMap::new();
+        // A pair without an odometry is a group of its own.
+        let group = |pair: usize| trail.segment(pair).map_or((None, pair), |segment| (Some(segment), 0));
+        let all = || marked.iter().flat_map(|feature| &feature.marks);
+        all().for_each(|mark| *counts.entry(group(mark.pair)).or_default() += 1);
+        let best = counts.iter().rev().max_by_key(|(_, count)| **count).map(|(group, _)| *group);
+        let origin = all().map(|mark| mark.pair).filter(|pair| Some(group(*pair)) == best).min().unwrap_or(0);
+        let mut poses = vec![None; trail.pairs()];
+        poses[origin] = Some(Transform::identity());
+        let features = marked.iter().map(|feature| Feature {
+            corner: feature.marks[0].corner,
+            templates: feature.marks.iter().map(|mark| mark.template.clone()).collect(),
+            spread: Matrix3::zeros(),
+        });
+        let scene = Scene { poses, features: vec![seafix_geometry::Point::origin(); marked.len()] };
+        let mut gathered = Gathered::default();
+        for (index, feature) in marked.iter().enumerate() {
+            // A feature that its mark defines has one such mark; others are guesses of the same place.
+            let corner = feature.marks[0].corner;
+            let defining = feature.marks.iter().enumerate().filter(|(k, mark)| *k == 0 || corner && mark.corner);
+            defining.for_each(|(_, mark)| {
+                gathered.seen.insert((mark.pair, index), mark.found);
+            });
+        }
+        let known = vec![false; marked.len()];
+        let features = features.collect();
+        let mut state = Self { trail, scene, features, gathered, known, finder, unread };
+        state.place(marked);
+        state
+    }
+
+    /// Places the features whose first mark lies in a pair with a pose.
+    fn place(&mut self, marked: &[Marked]) {
+        for (index, feature) in marked.iter().enumerate().filter(|(index, _)| !self.known[*index]).collect::<Vec<_>>() {
+            let placed = feature
+                .marks
+                .iter()
+                .find_map(|mark| Some((ExpectedPose::of(mark.pair, &self.scene.poses, &self.trail)?, mark.point)));
+            let Some((pose, point)) = placed else { continue };
+            let turn = pose.world_from_camera.rotation_matrix();
+            self.scene.features[index] = pose.world_from_camera * point.at;
+            self.features[index].spread = turn * point.covariance * turn.transpose();
+            self.known[index] = true;
+        }
+    }
+
+    /// Searches and adjusts until nothing new is found.
+    fn rounds(&mut self, dataset: &'a Dataset, marked: &[Marked], file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
+        let mut tried = vec![0; dataset.frames.len()];
+        for round in 1.. {
+            self.place(marked);
+            let (found, unread) = self.gather(dataset);
+            self.unread.extend(unread);
+            let settled = self.settle(dataset, file)?;
+            let located = self.relocate(dataset, &mut tried);
+            if (found == 0 && located == 0) || round == ROUNDS {
+                return self.complete(settled, marked, file);
+            }
+        }
+        unreachable!("the last round returns")
+    }
+
+    fn gather(&mut self, dataset: &Dataset) -> (usize, Vec<Fault>) {
+        let places = self.places();
+        self.gathered.gather(dataset, &self.finder, &self.trail, &self.scene, &self.features, &places)
+    }
+
+    /// The features with a known position.
+    fn places(&self) -> Vec<usize> {
+        (0..self.known.len()).filter(|index| self.known[*index]).collect()
+    }
+
+    /// Adjusts, and keeps the poses of the adjusted pairs alone.
+    fn settle(&mut self, dataset: &'a Dataset, file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
+        let pairs: Vec<usize> = self.gathered.seen.keys().map(|key| key.0).collect();
+        let expected = |pair: usize| ExpectedPose::of(pair, &self.scene.poses, &self.trail);
+        let poses: Vec<_> = pairs.iter().map(|pair| (*pair, expected(*pair))).collect();
+        for (pair, pose) in poses {
+            self.scene.poses[pair] = pose.map(|pose| pose.world_from_camera);
+        }
+        let seen = self.pixels();
+        let undetermined = |_| {
+            let fault = Fault::new("the marks determine no model", file);
+            vec![fault.remedy("mark at least three features that are not on a line in one pair")]
+        };
+        let settled = settle(&dataset.rig, &self.trail, &mut self.scene, &seen).map_err(undetermined)?;
+        for pair in 0..self.scene.poses.len() {
+            if settled.pairs.binary_search(&pair).is_err() {
+                self.scene.poses[pair] = None;
+            }
+        }
+        let exact = CalibrationSigma { pixels: 0.0, baseline: 0.0 };
+        let spread = settled.adjustment.spread(&settled.excess, &exact).map_err(undetermined)?;
+        let own = inner(&settled.adjustment.points, &spread.noise);
+        for (point, feature) in settled.features.iter().enumerate() {
+            self.features[*feature].spread = own.fixed_view::<3, 3>(3 * point, 3 * point).into_owned();
+        }
+        Ok(settled)
+    }
+
+    fn pixels(&self) -> BTreeMap<Key, UncertainPixels> {
+        self.gathered.seen.iter().map(|(key, found)| (*key, found.pixels)).collect()
+    }
+
+    /// Finds the poses of pairs that no odometry connects, at most twice each; returns their number.
+    ///
+    /// One pair connects its complete segment. Pairs that the odometry skipped are unusable.
+    fn relocate(&mut self, dataset: &Dataset, tried: &mut [usize]) -> usize {
+        let known = self.places();
+        if known.len() < HELD {
+            return 0;
+        }
+        let usable = |pair: &usize| self.trail.is_unknown() || self.trail.segment(*pair).is_some();
+        let pairs: Vec<usize> = (0..dataset.frames.len()).filter(usable).filter(|pair| tried[*pair] < 2).collect();
+        let mut count = 0;
+        for pair in pairs {
+            if ExpectedPose::of(pair, &self.scene.poses, &self.trail).is_some() {
+                continue;
+            }
+            tried[pair] += 1;
+            let Ok((left, right)) = dataset.pair(&dataset.frames[pair]) else { continue };
+            if let Some(pose) = relocate(&self.finder, [&left, &right], &self.scene, &self.features, &known) {
+                self.scene.poses[pair] = Some(pose);
+                count += 1;
+            }
+        }
+        count
+    }
+
+    /// The adjustment, if it connects all marked features.
+    fn complete(&self, settled: Settled<'a>, marked: &[Marked], file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
+        let apart = marked.iter().enumerate().filter(|(index, _)| !self.known[*index]);
+        let faults: Vec<Fault> = apart
+            .map(|(_, feature)| {
+                let mark = &feature.marks[0].mark.mark;
+                let where_marked = match self.trail.segment(feature.marks[0].pair) {
+                    Some(segment) => format!("segment {} of the odometry", segment + 1),
+                    None => "a pair without an odometry".to_owned(),
+                };
+                Fault::new("a mark that nothing connects with the others", file)
+                    .on_line(mark.line)
+                    .value(format!("`{}` in {where_marked}", feature.id))
+                    .remedy("mark three features of the others in this pair as well")
+            })
+            .collect();
+        if faults.is_empty() { Ok(settled) } else { Err(faults) }
+    }
+}

@@ -1,0 +1,31 @@
+//! Object models from the marks of an operator in the pairs of a dive.
+//!
+//! One mark of a feature in any one pair suffices. An odometry predicts every feature into every pair that may show it;
+//! there it is located as a corner, or aligned to the mark's surroundings, and tested against its expectation. One
+//! adjustment then determines all poses and points. Better points are expected more exactly, so search and adjustment
+//! repeat until no new observation is found. Observations that contradict the others are given up, with the reason.
+
+mod best_views;
+mod built;
+mod contradictions;
+mod expect;
+mod find;
+mod finish;
+mod gather;
+mod halves;
+mod marks;
+mod method;
+mod picture;
+mod plane;
+mod propose;
+mod relocate;
+mod settle;
+mod start;
+mod template;
+mod trail;
+
+pub use built::{DiveModel, DivePoint};
+pub use marks::DiveMark;
+pub use method::ModelFromDive;
+pub use picture::Picture;
+pub use propose::{Proposal, Proposer};

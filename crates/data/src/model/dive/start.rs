@@ -1,0 +1,157 @@
+//! The marked features in the pairs of their marks.
+
+use std::path::Path;
+
+use nalgebra::{Matrix2, Matrix4};
+use seafix_component::Fault;
+use seafix_geometry::{Camera, UncertainPixels, UncertainPoint};
+use seafix_vision::Image;
+
+use super::{
+    find::Found,
+    marks::{DiveMark, natural},
+    template::Template,
+};
+use crate::{
+    dataset::Dataset,
+    model::by_hand::{ModelByHand, Seen},
+};
+
+/// A mark, located in its pair.
+#[derive(Debug, Clone)]
+pub(super) struct Located {
+    /// The index of the pair.
+    pub(super) pair: usize,
+    /// The mark.
+    pub(super) mark: DiveMark,
+    /// Whether a corner was found at the mark.
+    pub(super) corner: bool,
+    /// The pixels with their own errors.
+    pub(super) found: Found,
+    /// The point in the camera of the pair.
+    pub(super) point: UncertainPoint<Camera>,
+    /// Its surroundings.
+    pub(super) template: Template,
+}
+
+/// A marked feature: its name and its located marks, the one that defines it first.
+#[derive(Debug, Clone)]
+pub(super) struct Marked {
+    pub(super) id: String,
+    pub(super) marks: Vec<Located>,
+}
+
+/// The standard deviation (px) of the place that a mark defines: zero, but for the rounding of an alignment.
+const BY_DEFINITION: f64 = 0.02;
+
+/// The pair of each mark.
+///
+/// # Errors
+/// All marks whose stamp is that of no pair.
+pub(super) fn pairs_of(dataset: &Dataset, marks: &[DiveMark], file: &Path) -> Result<Vec<usize>, Vec<Fault>> {
+    let mut faults = Vec::new();
+    let mut pairs = Vec::new();
+    for mark in marks {
+        match dataset.frames.binary_search_by_key(&mark.stamp_ns, |frame| frame.stamp_ns) {
+            Ok(pair) => pairs.push(pair),
+            Err(after) => {
+                let around = &dataset.frames[after.saturating_sub(1)..dataset.frames.len().min(after + 1)];
+                let nearest = around.iter().min_by_key(|frame| frame.stamp_ns.abs_diff(mark.stamp_ns));
+                let remedy = nearest.map_or_else(
+                    || "the dive has no pair".to_owned(),
+                    |frame| format!("give the stamp of a pair; the nearest is {}", frame.stamp_ns),
+                );
+                let fault = Fault::new("a mark at the stamp of no pair", file).on_line(mark.mark.line);
+                faults.push(fault.value(mark.stamp_ns).remedy(remedy));
+            }
+        }
+    }
+    if faults.is_empty() { Ok(pairs) } else { Err(faults) }
+}
+
+impl ModelByHand<'_> {
+    /// Locates all marks in their pairs; the features are in the order of their names.
+    ///
+    /// # Errors
+    /// An image that cannot be read, and marks without a match.
+    pub(super) fn located(
+        &self,
+        dataset: &Dataset,
+        marks: Vec<DiveMark>,
+        file: &Path,
+    ) -> Result<Vec<Marked>, Vec<Fault>> {
+        let pairs = pairs_of(dataset, &marks, file)?;
+        let mut all: Vec<(usize, DiveMark)> = pairs.into_iter().zip(marks).collect();
+        all.sort_by(|a, b| (a.0, a.1.mark.line).cmp(&(b.0, b.1.mark.line)));
+        let (mut faults, mut located) = (Vec::new(), Vec::new());
+        for same_pair in all.chunk_by(|a, b| a.0 == b.0) {
+            let pair = same_pair[0].0;
+            match dataset.pair(&dataset.frames[pair]) {
+                Err(fault) => faults.push(fault),
+                Ok((left, right)) => {
+                    let keypoints = [&left, &right].map(|image| self.front_end.detector.detect(image));
+                    for (_, mark) in same_pair {
+                        let seen = self.see(mark.mark.clone(), [&left, &right], &keypoints, &dataset.rig, file);
+                        match seen.and_then(|seen| self.located_mark(pair, mark, &seen, &left, file)) {
+                            Ok(mark) => located.push(mark),
+                            Err(fault) => faults.push(fault),
+                        }
+                    }
+                }
+            }
+        }
+        if faults.is_empty() { Ok(by_feature(located)) } else { Err(faults) }
+    }
+
+    fn located_mark(
+        &self,
+        pair: usize,
+        mark: &DiveMark,
+        seen: &Seen,
+        left: &Image,
+        file: &Path,
+    ) -> Result<Located, Fault> {
+        let calibration = self.front_end.triangulator.rules().calibration_px;
+        let measured = seen.measured;
+        let given = measured.pixels.expect("the triangulator keeps the pixels");
+        // All pairs have one calibration error, which is treated apart.
+        let own = given.covariance - Matrix4::identity() * (calibration * calibration);
+        let covariance = if seen.corner { own } else { by_definition(&own) };
+        let template = Template::cut(pair, left, given.at.left).ok_or_else(|| {
+            Fault::new("a mark outside the left image", file).on_line(mark.mark.line).remedy("move the mark inside")
+        })?;
+        Ok(Located {
+            pair,
+            mark: mark.clone(),
+            corner: seen.corner,
+            found: Found { pixels: UncertainPixels { at: given.at, covariance }, correlation: None },
+            point: measured.position,
+            template,
+        })
+    }
+}
+
+/// The covariance of pixels whose left place defines the point: the right one has the error of its alignment.
+fn by_definition(own: &Matrix4<f64>) -> Matrix4<f64> {
+    let block = |row, column| own.fixed_view::<2, 2>(row, column).into_owned();
+    let (place, across, right): (Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) = (block(0, 0), block(2, 0), block(2, 2));
+    let aligned = place.try_inverse().map_or(right, |inverse| right - across * inverse * across.transpose());
+    let mut covariance = Matrix4::identity() * (BY_DEFINITION * BY_DEFINITION);
+    let mut corner = covariance.fixed_view_mut::<2, 2>(2, 2);
+    corner += aligned;
+    covariance
+}
+
+/// The marks by features, in the order of names; a corner comes before other marks of its feature.
+fn by_feature(located: Vec<Located>) -> Vec<Marked> {
+    let mut features: Vec<Marked> = Vec::new();
+    for mark in located {
+        match features.iter_mut().find(|feature| feature.id == mark.mark.mark.id) {
+            Some(feature) => feature.marks.push(mark),
+            None => features.push(Marked { id: mark.mark.mark.id.clone(), marks: vec![mark] }),
+        }
+    }
+    features.iter_mut().for_each(|feature| feature.marks.sort_by_key(|mark| (!mark.corner, mark.pair)));
+    features.sort_by(|a, b| natural(&a.id, &b.id));
+    features
+}
