@@ -9,6 +9,7 @@ Lengths are in metres, angles in radians, times in nanoseconds. A transform ``a_
 >>> T, covariance = sf.register(src, dst)
 """
 
+from . import convert, plot
 from ._seafix import (
     Answer,
     BoxPrior,
@@ -35,7 +36,6 @@ from ._seafix import (
     solve,
     solvers,
 )
-from . import convert, plot
 from .components import detector, search, solver
 from .laws import check_laws
 from .runs import Run, run

@@ -170,9 +170,9 @@ def open3d_cloud(points: Any) -> Any:
 def rerun_log(log: Log, recording: Any = None, *, entity: str = "seafix") -> None:
     """Send a log to Rerun.
 
-    Below `entity` there are the feature points of each surveyed object in the world, the estimated camera with its cloud
-    and left image, the true camera, and each fix as a camera of its own. The timelines are `stamp` and `frame`. The world
-    is north, east, down.
+    Below `entity` there are the feature points of each surveyed object in the world, the estimated camera with its
+    cloud, the left image, the true camera, and each fix as a camera of its own. The timelines are `stamp` and `frame`.
+    The world is north, east, down.
 
     Parameters
     ----------

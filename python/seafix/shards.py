@@ -17,8 +17,9 @@ from .runs import Run, _settings, _threads
 class Shard:
     """A part of a run; calling it computes the part.
 
-    A shard is a small value that can be pickled, so that any engine can send it to a worker; :func:`compute` does so with
-    :mod:`concurrent.futures`, Dask and Ray. A shard that was interrupted is called again and continues where it stopped.
+    A shard is a small value that can be pickled, so that any engine can send it to a worker; :func:`compute` does so
+    with :mod:`concurrent.futures`, Dask and Ray. A shard that was interrupted is called again and continues where it
+    stopped.
 
     Attributes
     ----------
@@ -154,9 +155,9 @@ def compute(parts: Sequence[Shard], engine: Any = None, *, retries: int = 3) -> 
 
     Notes
     -----
-    The workers need the package, and the folders of the experiment and of the parts under the same paths. Dask counts the
-    end of a worker against a part; a part that ended several workers is not started again. Ctrl-C leaves the parts to
-    the engine.
+    The workers need the package, and the folders of the experiment and of the parts under the same paths. Dask counts
+    the end of a worker against a part; a part that ended several workers is not started again. Ctrl-C leaves the parts
+    to the engine.
 
     Examples
     --------
@@ -175,9 +176,8 @@ def compute(parts: Sequence[Shard], engine: Any = None, *, retries: int = 3) -> 
     if hasattr(engine, "remote") and hasattr(engine, "get"):
         task = engine.remote(max_retries=retries)(Shard.__call__)
         return list(engine.get([task.remote(part) for part in parts]))
-    raise TypeError(
-        f"`engine` is a {type(engine).__name__}; give an executor of concurrent.futures, a client of Dask, or the module ray"
-    )
+    remedy = "give an executor of concurrent.futures, a client of Dask, or the module ray"
+    raise TypeError(f"`engine` is a {type(engine).__name__}; {remedy}")
 
 
 def merge(

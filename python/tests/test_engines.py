@@ -78,7 +78,8 @@ class Killer(Thread):
 
 
 def files(run):
-    return {path.name: path.read_bytes() for path in run.folder.iterdir() if path.suffix in (".mcap", ".parquet", ".csv")}
+    kept = (path for path in run.folder.iterdir() if path.suffix in (".mcap", ".parquet", ".csv"))
+    return {path.name: path.read_bytes() for path in kept}
 
 
 def assert_same(sweep, parts, killer, tmp_path):

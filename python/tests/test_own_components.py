@@ -225,7 +225,7 @@ def test_an_own_detector_finds_what_the_library_finds(tmp_path):
         if one.is_fix:
             np.testing.assert_array_equal(one.object_from_camera, other.object_from_camera)
     runs = [
-        sf.run(folder, tmp_path / f"{name}-{threads}", threads=threads, settings={"pipeline.detector": name}, timed=False)
+        sf.run(folder, tmp_path / f"{name}-{threads}", threads=threads, timed=False, settings={"pipeline.detector": name})
         for name, threads in [("own-harris", 1), ("own-harris", 2), ("harris", 2)]
     ]
     tables = [(run.folder / "results.parquet").read_bytes() for run in runs]

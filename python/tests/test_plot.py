@@ -60,7 +60,8 @@ def test_errors_grow_with_the_noise_above_the_bound(noise):
     ax = sf.plot.errors(noise, "source.sigma-px")
     assert labels(ax) == ("sigma (px)", "RMS TRE (mm)")
     *methods, bound = ax.lines
-    assert [line.get_label() for line in methods] == ["kabsch", "mahalanobis"] and bound.get_label() == "Cramér–Rao bound"
+    assert [line.get_label() for line in methods] == ["kabsch", "mahalanobis"]
+    assert bound.get_label() == "Cramér–Rao bound"
     # One bar for each method and value.
     assert sum(len(bars.get_segments()) for bars in ax.collections) == 4
     assert all(np.diff(line.get_ydata())[0] > 0 for line in ax.lines)
@@ -92,7 +93,7 @@ def test_a_mapping_of_arrays_is_a_table():
 
 
 def test_a_roc_counts_right_and_false_fixes():
-    present = {"outcome": ["fix"] * 3 + ["rejected"], "wrong": [False, False, True, False], "p_wrong": [1e-4, 0.2, 0.1, 0.5]}
+    present = {"outcome": ["fix"] * 3 + ["rejected"], "wrong": [0, 0, True, 0], "p_wrong": [1e-4, 0.2, 0.1, 0.5]}
     absent = {"outcome": ["fix", "rejected"], "wrong": [True, False], "p_wrong": [0.1, 0.9]}
     ax = sf.plot.roc(present, absent, label="mine")
     curve, marked = ax.lines
@@ -136,7 +137,7 @@ def test_a_forest_shows_the_intervals_of_the_reports(noise):
     ax = sf.plot.forest(differences)
     names = [text.get_text() for text in ax.get_yticklabels()]
     assert names == ["a – c", "a – b"] and labels(ax)[0] == "median difference of TRE (mm)"
-    zero, lowest, highest = ax.lines
+    _, lowest, highest = ax.lines
     assert lowest.get_xdata()[0] == pytest.approx(1e3 * np.median(differences["a – c"]))
     # A significant difference has another colour.
     assert highest.get_color() != lowest.get_color()

@@ -71,7 +71,8 @@ class Columns:
         axes = {trial: self.run.axes(trial) for trial in self.run.trials} if self.run else {}
         known = sorted({key for one in axes.values() for key in one})
         if name not in known:
-            raise ValueError(f"no column and no varied setting is called `{name}`; there are {', '.join(known + self.names)}")
+            there = ", ".join(known + self.names)
+            raise ValueError(f"no column and no varied setting is called `{name}`; there are {there}")
         return [axes[trial].get(name) for trial in self._values("trial")]
 
 

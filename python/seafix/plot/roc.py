@@ -28,16 +28,16 @@ def roc(
 ) -> Any:
     """Draw the fraction of right fixes over that of false ones, as the limit of `p_wrong` varies.
 
-    A point of the curve belongs to a limit: an attempt counts if it is a fix with at most this `p_wrong`. The ordinate is
-    the fraction of the attempts at a present object that are right fixes, the abscissa the fraction of the attempts at
-    an absent object that are fixes, which are false by definition.
+    A point of the curve belongs to a limit: an attempt counts if it is a fix with at most this `p_wrong`. The ordinate
+    is the fraction of the attempts at a present object that are right fixes, the abscissa the fraction of the attempts
+    at an absent object that are fixes, which are false by definition.
 
     Parameters
     ----------
     present, absent : Run, pyarrow.Table or mapping
         The results with the object present, and those with it absent (``source.absent = true`` of
-        ``generated-problems``). Both come from runs with ``pipeline.acceptance.max-p-wrong = 1.0``: a run with a stricter
-        limit has the curve only up to it. A mapping has the arrays `outcome`, `wrong` and `p_wrong`.
+        ``generated-problems``). Both come from runs with ``pipeline.acceptance.max-p-wrong = 1.0``: a run with a
+        stricter limit has the curve only up to it. A mapping has the arrays `outcome`, `wrong` and `p_wrong`.
     marked : float, optional
         The limit whose point is marked, from 0 to 1; None marks none.
     label : str, optional
@@ -71,15 +71,14 @@ def roc(
     limits = np.unique(np.concatenate([[0.0], p[counts], q[false]]))
     limits = limits[np.isfinite(limits)]
     ax = style.axes(ax)
-    ax.step(_fractions(q, false, limits), _fractions(p, counts, limits), where="post", **style.line(series), label=label)
+    curve = _fractions(q, false, limits), _fractions(p, counts, limits)
+    ax.step(*curve, where="post", **style.line(series), label=label)
     if marked is not None:
         limit = np.array([marked])
-        text = f"p_wrong ≤ {marked:g}"
-        # A named curve shares the text of its mark with the others.
-        text = text if label is None or series == 0 else None
-        ax.plot(
-            _fractions(q, false, limit), _fractions(p, counts, limit), **style.mark(series, 2.4), label=text, clip_on=False
-        )
+        # Further curves have the same mark; one entry of the legend is enough.
+        text = f"p_wrong ≤ {marked:g}" if series == 0 else None
+        point = _fractions(q, false, limit), _fractions(p, counts, limit)
+        ax.plot(*point, **style.mark(series, 2.4), label=text, clip_on=False)
     # One false fix is in view even where there is none.
     ax.set_xlim(0.0, 1.05 * max(ax.dataLim.x1, 1.0 / len(q)))
     ax.set_ylim(0.0, 1.0)
