@@ -153,6 +153,24 @@ def test_a_forest_shows_the_intervals_of_the_reports(noise):
         sf.plot.forest(differences, confidence=95)
 
 
+def test_the_interval_of_a_median_is_that_of_a_block_bootstrap():
+    from seafix._seafix import median_interval
+
+    values = np.random.default_rng(1).normal(size=64)
+    middle, low, high = median_interval(values, 0.95)
+    assert middle == np.median(values) and low < middle < high and median_interval(values, 0.95) == (middle, low, high)
+    # The standard deviation of the median of 64 independent normal values is √(π/2)/8; an interval has 2 · 1.96 of them.
+    samples = np.random.default_rng(2).normal(size=(50, 64))
+    widths = [high - low for _, low, high in (median_interval(sample, 0.95) for sample in samples)]
+    assert np.mean(widths) / (2 * 1.96) == pytest.approx(np.sqrt(np.pi / 2) / 8, rel=0.15)
+    # A wider confidence has a wider interval, and a failure moves one end only.
+    assert median_interval(values, 0.99)[2] > high
+    failed = np.where(np.arange(64) < 40, np.inf, values)
+    assert median_interval(failed, 0.95)[2] == np.inf
+    with pytest.raises(ValueError, match="NaN"):
+        median_interval([np.nan], 0.95)
+
+
 def test_without_matplotlib_the_remedy_is_one_line(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ImportError, match="pip install matplotlib") as raised:
