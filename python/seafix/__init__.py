@@ -9,6 +9,7 @@ Lengths are in metres, angles in radians, times in nanoseconds. A transform ``a_
 >>> T, covariance = sf.register(src, dst)
 """
 
+from . import convert, plot
 from ._seafix import (
     Answer,
     BoxPrior,
@@ -27,16 +28,18 @@ from ._seafix import (
     TargetResult,
     __version__,
     describe,
+    detect,
+    detectors,
     read_log,
     register,
     searches,
     solve,
     solvers,
 )
-from .components import search, solver
+from .components import detector, search, solver
 from .laws import check_laws
 from .runs import Run, run
-from .shards import Shard, merge, shards
+from .shards import Shard, compute, merge, shards
 
 __all__ = [
     "Answer",
@@ -58,8 +61,14 @@ __all__ = [
     "TargetResult",
     "__version__",
     "check_laws",
+    "compute",
+    "convert",
     "describe",
+    "detect",
+    "detector",
+    "detectors",
     "merge",
+    "plot",
     "read_log",
     "register",
     "run",

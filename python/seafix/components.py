@@ -1,4 +1,4 @@
-"""Solvers and searches of your own, written in Python."""
+"""Solvers, searches and detectors of your own, written in Python."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from ._seafix import add_search, add_solver
+from ._seafix import add_detector, add_search, add_solver
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -129,6 +129,55 @@ def search(name: str, *, source: str = "", version: int = 1) -> Callable[[_Funct
 
     def register(function: _Function) -> _Function:
         add_search(function, _declared(function, name, source, version))
+        return function
+
+    return register
+
+
+def detector(name: str, *, source: str = "", version: int = 1, scale: float = 1.8) -> Callable[[_Function], _Function]:
+    """Register a function as a detector of key points.
+
+    Parameters
+    ----------
+    name : str
+        Name of the detector, in kebab-case.
+    source : str, optional
+        Literature source.
+    version : int, default 1
+        Version of the results. Raise it with every change that alters a result; a run that is resumed compares it.
+    scale : float, default 1.8
+        Size of the detected structures: the standard deviation of the Gaussian of their detection (px), by which
+        descriptors choose their patch. The default is that of ``harris``.
+
+    Returns
+    -------
+    callable
+        A decorator. The function is ``function(image, *, setting=default) -> points`` with `image` of shape (h, w) and
+        type float32 (grey levels, 0 black and 255 white), and `points` of shape (n, 3): rows u, v, score, with u to the
+        right from 0 to w − 1 and v down from 0 to h − 1 (px). A larger score is stronger; the order of the rows decides
+        between equals. Keyword-only parameters are settings. The image is a copy that the function may change.
+
+    Raises
+    ------
+    ValueError
+        A name that is not in kebab-case or that the library uses, a setting without default, or a scale that is not
+        positive.
+
+    Notes
+    -----
+    A result must depend on the image and the settings alone, so that a run has the same bytes on any number of threads.
+
+    Examples
+    --------
+    >>> @sf.detector("brightest")
+    ... def brightest(image, *, features=100):
+    ...     v, u = np.unravel_index(np.argsort(-image, axis=None, kind="stable")[:features], image.shape)
+    ...     return np.column_stack([u, v, image[v, u]])
+    >>> localizer = sf.Localizer(site, rig, settings='detector = "brightest"')
+    """
+
+    def register(function: _Function) -> _Function:
+        add_detector(function, _declared(function, name, source, version), scale)
         return function
 
     return register

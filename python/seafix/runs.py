@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ._seafix import Log, read_log, run_experiment
+from ._seafix import Log, read_axes, read_log, run_experiment
 
 
 class Run:
@@ -75,9 +75,32 @@ class Run:
         KeyError
             The run has no log of this trial.
         """
+        return read_log(self._file(trial))
+
+    def axes(self, trial: str) -> dict[str, str]:
+        """The settings of a trial that the run varies.
+
+        Parameters
+        ----------
+        trial : str
+            Its name.
+
+        Returns
+        -------
+        dict
+            The value by the key of each varied setting. Only the head of the log is read.
+
+        Raises
+        ------
+        KeyError
+            The run has no log of this trial.
+        """
+        return read_axes(self._file(trial))
+
+    def _file(self, trial: str) -> Path:
         if trial not in self.trials:
             raise KeyError(f"no trial is called {trial!r}; there are {', '.join(self.trials)}")
-        return read_log(self.folder / f"{trial}.mcap")
+        return self.folder / f"{trial}.mcap"
 
     def __repr__(self) -> str:
         return f"Run({str(self.folder)!r})"

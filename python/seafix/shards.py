@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,9 @@ from .runs import Run, _settings, _threads
 class Shard:
     """A part of a run; calling it computes the part.
 
-    A shard is a small value that can be pickled, so that any engine can send it to a worker: ``executor.submit(shard)``
-    of :mod:`concurrent.futures` and of ``dask.distributed``, or ``ray.remote(shard.__call__)``. A shard that was
-    interrupted is called again and continues where it stopped.
+    A shard is a small value that can be pickled, so that any engine can send it to a worker; :func:`compute` does so
+    with :mod:`concurrent.futures`, Dask and Ray. A shard that was interrupted is called again and continues where it
+    stopped.
 
     Attributes
     ----------
@@ -111,7 +112,7 @@ def shards(
     Examples
     --------
     >>> with concurrent.futures.ProcessPoolExecutor() as pool:
-    ...     folders = list(pool.map(sf.Shard.__call__, sf.shards("experiment.toml", 4, "parts")))
+    ...     folders = sf.compute(sf.shards("experiment.toml", 4, "parts"), pool)
     >>> run = sf.merge(folders, "run")
     """
     if count < 1:
@@ -122,6 +123,61 @@ def shards(
         Shard(source, number, count, str(folder / f"{number}-of-{count}"), _threads(threads), timed, changed)
         for number in range(1, count + 1)
     ]
+
+
+def compute(parts: Sequence[Shard], engine: Any = None, *, retries: int = 3) -> list[str]:
+    """Compute the parts of a run with an engine.
+
+    Parameters
+    ----------
+    parts : sequence of Shard
+        The parts.
+    engine : concurrent.futures.Executor, dask.distributed.Client or module ray, optional
+        The engine: an executor, a client of a Dask cluster, or the module ``ray`` after ``ray.init()``. By default this
+        process computes one part after the other.
+    retries : int, default 3
+        How often Ray starts a part again whose worker ended. Dask has a setting for it
+        (``distributed.scheduler.allowed-failures``); an executor starts none again.
+
+    Returns
+    -------
+    list of str
+        The folders of the parts, in their order, for :func:`merge`.
+
+    Raises
+    ------
+    ValueError
+        The experiment has faults.
+    TypeError
+        Another kind of engine.
+    concurrent.futures.process.BrokenProcessPool
+        A worker of a process pool ended. The same parts in a new pool continue where they stopped.
+
+    Notes
+    -----
+    The workers need the package, and the folders of the experiment and of the parts under the same paths. Dask counts
+    the end of a worker against a part; a part that ended several workers is not started again. Ctrl-C leaves the parts
+    to the engine.
+
+    Examples
+    --------
+    >>> with dask.distributed.Client(cluster) as client:
+    ...     folders = sf.compute(sf.shards("experiment.toml", 64, "parts"), client)
+    >>> ray.init(address="auto")
+    >>> folders = sf.compute(sf.shards("experiment.toml", 64, "parts"), ray)
+    """
+    if engine is None:
+        return [part() for part in parts]
+    if isinstance(engine, Executor):
+        return list(engine.map(Shard.__call__, parts))
+    if hasattr(engine, "gather") and hasattr(engine, "map"):
+        # Dask would take two parts with equal values for one; parts write files, so each is computed.
+        return list(engine.gather(engine.map(Shard.__call__, parts, pure=False)))
+    if hasattr(engine, "remote") and hasattr(engine, "get"):
+        task = engine.remote(max_retries=retries)(Shard.__call__)
+        return list(engine.get([task.remote(part) for part in parts]))
+    remedy = "give an executor of concurrent.futures, a client of Dask, or the module ray"
+    raise TypeError(f"`engine` is a {type(engine).__name__}; {remedy}")
 
 
 def merge(

@@ -18,6 +18,18 @@ pub(crate) fn pair(left: &Bound<'_, PyAny>, right: &Bound<'_, PyAny>, rig: &seaf
     Ok((image(left, "left", sizes[0], rig.bits)?, image(right, "right", sizes[1], rig.bits)?))
 }
 
+/// An image of any size from an array, with 16-bit levels from 0 to 65535.
+pub(crate) fn single(given: &Bound<'_, PyAny>) -> PyResult<Image> {
+    let shape: Option<Vec<u32>> = given.getattr_opt("shape")?.and_then(|shape| shape.extract().ok());
+    match shape.as_deref() {
+        Some(&[height, width] | &[height, width, 3]) => image(given, "image", [width, height], 16),
+        _ => {
+            let what = format!("the image is a {}", given.get_type().name()?);
+            Err(invalid(given.py(), "image", what, "give an array (h, w), or (h, w, 3) of uint8"))
+        }
+    }
+}
+
 /// An image: the path of a file, a grey array (h, w) of uint8, uint16 or float32, or an array (h, w, 3) of uint8 in
 /// OpenCV's order blue, green, red.
 fn image(given: &Bound<'_, PyAny>, name: &str, size: [u32; 2], bits: u8) -> PyResult<Image> {

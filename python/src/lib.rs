@@ -16,6 +16,7 @@ mod localizer;
 mod log;
 mod odometry;
 mod own;
+mod own_detector;
 mod own_search;
 mod own_solver;
 mod prior;
@@ -24,6 +25,7 @@ mod register;
 mod rig;
 mod run;
 mod solve;
+mod statistics;
 
 #[pyo3::pymodule]
 mod _seafix {
@@ -32,10 +34,11 @@ mod _seafix {
         answer::{Answer, Pose},
         invalid::DegenerateError,
         laws::{search_laws, solver_laws},
-        listing::{describe, searches, solvers},
+        listing::{describe, detectors, searches, solvers},
         localizer::Localizer,
-        log::{Frame, Log, TargetResult, read_log},
+        log::{Frame, Log, TargetResult, read_axes, read_log},
         odometry::{Motion, Odometry},
+        own_detector::{add_detector, detect},
         own_search::{SearchProblem, add_search},
         own_solver::add_solver,
         prior::{BoxPrior, PosePrior},
@@ -44,6 +47,7 @@ mod _seafix {
         rig::{Rig, Site},
         run::{merge_runs, run_experiment},
         solve::solve,
+        statistics::median_interval,
     };
 
     #[pymodule_export]

@@ -4,6 +4,7 @@ use pyo3::{prelude::*, types::PyDict};
 use seafix::{
     component::Listing,
     referencing::{SEARCHES, SOLVERS},
+    vision::DETECTORS,
 };
 
 /// The names of the registered searches.
@@ -26,7 +27,17 @@ pub(crate) fn solvers() -> Vec<&'static str> {
     SOLVERS.names().collect()
 }
 
-/// Describe a registered search or solver.
+/// The names of the registered detectors of key points.
+///
+/// Returns
+/// -------
+/// list of str
+#[pyfunction]
+pub(crate) fn detectors() -> Vec<&'static str> {
+    DETECTORS.names().collect()
+}
+
+/// Describe a registered search, solver or detector.
 ///
 /// Parameters
 /// ----------
@@ -44,12 +55,17 @@ pub(crate) fn solvers() -> Vec<&'static str> {
 ///     No component has this name.
 #[pyfunction]
 pub(crate) fn describe<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
-    let all: Vec<Listing> = [SEARCHES.listings(), SOLVERS.listings()].concat();
+    let all: Vec<Listing> = [SEARCHES.listings(), SOLVERS.listings(), DETECTORS.listings()].concat();
     // A search and a solver may share a name; the search is meant then, as it is the first stage.
     let found = all.iter().find(|listing| listing.name == name);
     let Some(listing) = found else {
-        let remedy = "see `searches()` and `solvers()`";
-        return Err(crate::invalid::invalid(py, "name", format!("no search or solver is called `{name}`"), remedy));
+        let remedy = "see `searches()`, `solvers()` and `detectors()`";
+        return Err(crate::invalid::invalid(
+            py,
+            "name",
+            format!("no search, solver or detector is called `{name}`"),
+            remedy,
+        ));
     };
     let about = PyDict::new(py);
     about.set_item("kind", listing.kind)?;

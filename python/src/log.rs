@@ -8,9 +8,13 @@ use pyo3::{
     prelude::*,
     types::PyDict,
 };
-use seafix_log::{FrameRecord, LogError, Pair, TargetRecord, TrialLog, read};
+use seafix_log::{FrameRecord, LogError, Matrix4, Pair, Reader, TargetRecord, TrialHeader, TrialLog, read};
 
-use crate::{array::table, interpreter::interruptible, invalid::with_attributes};
+use crate::{
+    array::table,
+    interpreter::{detached, interruptible},
+    invalid::with_attributes,
+};
 
 /// Read the log of a trial.
 ///
@@ -34,6 +38,39 @@ use crate::{array::table, interpreter::interruptible, invalid::with_attributes};
 pub(crate) fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Log> {
     let log = interruptible(py, move || read(&path))?.map_err(|error| of_log(py, &error))?;
     Ok(Log { inner: Arc::new(log) })
+}
+
+/// The axes of the trial of a log, without its frames.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///     An MCAP file that a run wrote.
+///
+/// Returns
+/// -------
+/// dict
+///     The value of the trial by the key of each varied setting.
+#[pyfunction]
+pub(crate) fn read_axes(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let header = detached(py, || Reader::open(&path).map(|reader| reader.header().clone()))?;
+    axes_of(py, &header.map_err(|error| of_log(py, &error))?)
+}
+
+fn axes_of<'py>(py: Python<'py>, header: &TrialHeader) -> PyResult<Bound<'py, PyDict>> {
+    let axes = PyDict::new(py);
+    header.axes.iter().try_for_each(|axis| axes.set_item(&axis.key, &axis.value))?;
+    Ok(axes)
+}
+
+/// The surveyed pose of a target, `world_from_object`; `None` if the site has no pose in the world.
+fn surveyed(header: &TrialHeader, target: &str) -> Option<Matrix4> {
+    let model = header.targets.iter().find(|model| model.id == target)?;
+    Some(product(header.world_from_site.as_ref()?, model.site_from_object.as_ref()?))
+}
+
+fn product(a: &Matrix4, b: &Matrix4) -> Matrix4 {
+    std::array::from_fn(|r| std::array::from_fn(|c| (0..4).map(|k| a[r][k] * b[k][c]).sum()))
 }
 
 /// The exception of a log's error.
@@ -73,9 +110,21 @@ impl Log {
     /// dict: the value of the trial on each axis of the experiment.
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let axes = PyDict::new(py);
-        self.inner.header.axes.iter().try_for_each(|axis| axes.set_item(&axis.key, &axis.value))?;
-        Ok(axes)
+        axes_of(py, &self.inner.header)
+    }
+
+    /// dict of ndarray: the surveyed pose ``world_from_object``, shape (4, 4), of each target by its name (m).
+    ///
+    /// It is empty if the site has no pose in the world.
+    #[getter]
+    fn objects<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let objects = PyDict::new(py);
+        for target in &self.inner.header.targets {
+            if let Some(pose) = surveyed(&self.inner.header, &target.id) {
+                objects.set_item(&target.id, table(py, &pose))?;
+            }
+        }
+        Ok(objects)
     }
 
     /// dict of ndarray: the model points of each target by its name, object frame (m).
@@ -171,6 +220,16 @@ impl Frame {
     #[getter]
     fn truth<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
         self.record().truth.as_ref().map(|truth| table(py, &truth.world_from_camera))
+    }
+
+    /// ndarray, shape (4, 4), or None: the pose ``world_from_camera`` that the navigator estimates (m).
+    ///
+    /// It is None in trials without a navigator, and while no fix holds.
+    #[getter]
+    fn navigated<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {
+        let pose = self.record().navigation.as_ref()?.pose.as_ref()?;
+        let object = surveyed(&self.log.header, &pose.object)?;
+        Some(table(py, &product(&object, &pose.object_from_camera)))
     }
 
     /// list of TargetResult: the result for each attempted target.

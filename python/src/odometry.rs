@@ -84,7 +84,7 @@ impl Odometry {
             return Err(invalid(py, "odometry", what, "use `stereo` or `icp`, or run an experiment with a recording"));
         }
         // A session borrows its odometry and its rig. Both are some kilobytes and live as long as the program.
-        let (odometry, stereo) = (Box::leak(built), Box::leak(Box::new(rig.inner.stereo.clone())));
+        let (odometry, stereo) = (Box::leak(built), Box::leak(Box::new(rig.inner.stereo)));
         let session = odometry.begin(stereo, rig.inner.body_from_camera, Threads::One);
         Ok(Self { session: Mutex::new(session), rig: rig.inner.clone() })
     }
@@ -146,7 +146,7 @@ impl Odometry {
     ///     The times (ns).
     /// poses : ndarray, shape (k, 4, 4)
     ///     The poses ``world_from_camera`` (m). A segment after a break begins where the previous one ended.
-    fn trajectory<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f64>>)> {
+    fn trajectory<'py>(&self, py: Python<'py>) -> PyResult<StampedPoses<'py>> {
         let trajectory = detached(py, || self.session.lock().unwrap_or_else(PoisonError::into_inner).trajectory())?;
         let poses = || trajectory.segments.iter().flat_map(|segment| &segment.poses);
         let rows: Vec<[f64; 16]> = poses()
@@ -163,3 +163,6 @@ impl Odometry {
         "Odometry()".to_owned()
     }
 }
+
+/// Times (ns) and the poses at them.
+type StampedPoses<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f64>>);

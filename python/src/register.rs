@@ -135,7 +135,7 @@ fn solution(
     weights: Option<&[f64]>,
     solver: &dyn Solver,
     sigma: Option<f64>,
-) -> Result<(Transform<Object, Camera>, Covariance6<Object, Camera>), Degenerate> {
+) -> Result<Estimate, Degenerate> {
     let weight = |k: usize| weights.map_or(1.0, |all| all[k]);
     let observation = |k: usize, sigma: f64| Observation {
         measured: UncertainPoint::isotropic(Point::from(src[k]), sigma / weight(k).sqrt()),
@@ -182,3 +182,6 @@ fn least_squares(weighted: bool) -> &'static dyn Solver {
     }
     if weighted { &**WEIGHTED } else { &**EQUAL }
 }
+
+/// A motion and its covariance.
+type Estimate = (Transform<Object, Camera>, Covariance6<Object, Camera>);

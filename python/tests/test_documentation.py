@@ -16,6 +16,9 @@ def members():
                 for key, member in sorted(vars(value).items()):
                     if not key.startswith("_"):
                         yield f"{name}.{key}", member
+            elif inspect.ismodule(value):
+                for key in sorted(value.__all__):
+                    yield f"{name}.{key}", getattr(value, key)
 
 
 def test_every_public_name_has_a_docstring():

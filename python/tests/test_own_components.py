@@ -1,4 +1,6 @@
-"""Solvers and searches written in Python."""
+"""Solvers, searches and detectors written in Python."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -165,3 +167,75 @@ def test_the_laws_of_searches_hold_for_a_library_search_and_find_a_wrong_one(cap
         sf.check_laws("kabsch", kind="search")
     with pytest.raises(ValueError, match="'solver' or 'search'"):
         sf.check_laws("kabsch", kind="detector")
+
+
+@sf.detector("own-brightest", scale=2.0)
+def own_brightest(image, *, features=50):
+    """The pixels of the largest grey levels."""
+    v, u = np.unravel_index(np.argsort(-image, axis=None, kind="stable")[:features], image.shape)
+    return np.column_stack([u, v, image[v, u]])
+
+
+def test_an_own_detector_is_one_of_the_detectors():
+    assert {"own-brightest", "harris"} <= set(sf.detectors())
+    assert "features" in sf.describe("own-brightest")["settings"]
+    image = np.zeros((30, 40), np.uint8)
+    image[7, 11], image[20, 5] = 200, 250
+    points = sf.detect(image, {"name": "own-brightest", "features": 2})
+    np.testing.assert_array_equal(points, [[5, 20, 250], [11, 7, 200]])
+    assert sf.detect(image).shape[1] == 3
+    with pytest.raises(ValueError, match="did you mean `own-brightest`"):
+        sf.detect(image, "own-brightes")
+    with pytest.raises(ValueError, match="above 0"):
+        sf.detector("own-flat", scale=0.0)(own_brightest)
+
+
+def test_bad_key_points_are_refused():
+    image = np.zeros((30, 40), np.uint8)
+    cases = [
+        (lambda image: [[40.0, 3.0, 1.0]], "not in the image"),
+        (lambda image: [[4.0, np.nan, 1.0]], "not in the image"),
+        (lambda image: np.zeros((3, 2)), r"\(n, 3\)"),
+        (lambda image: {}["a"], "a"),
+    ]
+    for function, text in cases:
+        sf.detector("own-bad")(function)
+        with pytest.raises((ValueError, KeyError), match=text):
+            sf.detect(image, "own-bad")
+    sf.detector("own-bad")(lambda image: [])
+    assert sf.detect(image, "own-bad").shape == (0, 3)
+
+
+def test_an_own_detector_finds_what_the_library_finds(tmp_path):
+    """A detector that passes on the points of `harris` gives the fixes of `harris`."""
+    pytest.importorskip("pyarrow")
+
+    @sf.detector("own-harris")
+    def harris(image):
+        return sf.detect(image, "harris")
+
+    folder = Path(__file__).parents[2] / "datasets" / "virtual-sample"
+    rig, site = sf.Rig.load(folder), sf.Site.load(folder / "site.toml")
+    images = folder / "left000.png", folder / "right000.png"
+    mine, known = (sf.Localizer(site, rig, f'detector = "{name}"') for name in ("own-harris", "harris"))
+    answers = list(zip(mine.localize(*images), known.localize(*images)))
+    assert any(one.is_fix for one, _ in answers)
+    for one, other in answers:
+        assert one.outcome == other.outcome
+        if one.is_fix:
+            np.testing.assert_array_equal(one.object_from_camera, other.object_from_camera)
+    runs = [
+        sf.run(folder, tmp_path / f"{name}-{threads}", threads=threads, timed=False, settings={"pipeline.detector": name})
+        for name, threads in [("own-harris", 1), ("own-harris", 2), ("harris", 2)]
+    ]
+    tables = [(run.folder / "results.parquet").read_bytes() for run in runs]
+    assert tables[0] == tables[1] == tables[2]
+
+    @sf.detector("own-harris")
+    def broken(image):
+        raise RuntimeError("in my detector")
+
+    with pytest.raises(RuntimeError, match="in my detector"):
+        sf.Localizer(site, rig, 'detector = "own-harris"').localize(*images)
+    with pytest.raises(RuntimeError, match="in my detector"):
+        sf.run(folder, tmp_path / "broken", settings={"pipeline.detector": "own-harris"})

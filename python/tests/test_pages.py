@@ -9,10 +9,13 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("pyarrow")
+pytest.importorskip("matplotlib")
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]*)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 DATA = "toml", "yaml", "csv"
+#: A script that needs a cluster, which is run by the long proofs.
+ENGINE = re.compile(r"^(?:from|import) (dask|ray)\b", re.MULTILINE)
 
 
 def blocks(page):
@@ -47,12 +50,15 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch, capfd):
     for name in "datasets", "experiments":
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
     names = {"__name__": "page"}
     printed = None
     for language, title, text in blocks(page):
         if title and language in (*DATA, "python"):
             Path(title).write_text(text, encoding="utf-8")
-        if language == "python" and title:
+        if language == "python" and title and ENGINE.search(text):
+            compile(text, title, "exec")
+        elif language == "python" and title:
             subprocess.run([sys.executable, title], check=True, env=os.environ)
         elif language == "python":
             capfd.readouterr()
@@ -68,3 +74,19 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch, capfd):
 
 def test_every_page_with_python_is_run():
     assert {"first-fix", "own-component", "property-test", "compare", "cluster", "python"} <= {p.stem for p in pages()}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("engine", ["dask", "ray"])
+def test_the_script_of_an_engine_runs(engine, tmp_path, monkeypatch):
+    pytest.importorskip(engine)
+    monkeypatch.chdir(tmp_path)
+    page = blocks(ROOT / "docs" / "tutorials" / "cluster.md")
+    for language, title, text in page:
+        if title and language in DATA:
+            Path(title).write_text(text, encoding="utf-8")
+    found = [(title, text) for _, title, text in page if title and engine in ENGINE.findall(text)]
+    assert found
+    for title, text in found:
+        Path(title).write_text(text, encoding="utf-8")
+        subprocess.run([sys.executable, title], check=True, env=os.environ)
