@@ -70,7 +70,7 @@ impl DiveArguments {
             *corrects = false.into();
         }
         let odometry = ODOMETRIES.build(&choice).map_err(usage)?;
-        if odometry.listens() && !dataset.has_readings() {
+        if odometry.needs_readings() && !dataset.has_readings() {
             let what = format!("no readings for odometry `{}`", self.odometry);
             let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
             let remedy =
