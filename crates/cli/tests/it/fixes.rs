@@ -32,14 +32,14 @@ fn fixes_are_a_table_or_a_trajectory() {
     assert!(table.starts_with("trial,frame,stamp_ns,object,tx,ty,tz,qx,qy,qz,qw,c00,c01"), "{table}");
     let several = fixes(3, &["run", "--format", "tum"]);
     assert!(several.contains("001-solver-kabsch, 002-solver-horn") && several.contains("--trial"), "{several}");
-    let way = fixes(0, &["run", "--format", "tum", "--trial", "001-solver-kabsch"]);
-    let lines: Vec<&str> = way.lines().filter(|line| !line.starts_with('#')).collect();
-    assert!(!lines.is_empty() && lines.len() <= 3, "{way}");
-    assert!(lines.iter().all(|line| line.split(' ').count() == 8), "{way}");
-    assert_eq!(fixes(0, &["run/001-solver-kabsch.mcap", "--format", "tum"]), way);
+    let trajectory = fixes(0, &["run", "--format", "tum", "--trial", "001-solver-kabsch"]);
+    let lines: Vec<&str> = trajectory.lines().filter(|line| !line.starts_with('#')).collect();
+    assert!(!lines.is_empty() && lines.len() <= 3, "{trajectory}");
+    assert!(lines.iter().all(|line| line.split(' ').count() == 8), "{trajectory}");
+    assert_eq!(fixes(0, &["run/001-solver-kabsch.mcap", "--format", "tum"]), trajectory);
     // Poses in the world are those that `eval` compares with the truth of the log.
-    fs::write(folder.path().join("way.tum"), &way).unwrap();
-    let eval = ["eval", "run/001-solver-kabsch.mcap", "way.tum", "--json"];
+    fs::write(folder.path().join("trajectory.tum"), &trajectory).unwrap();
+    let eval = ["eval", "run/001-solver-kabsch.mcap", "trajectory.tum", "--json"];
     let errors = ended_with(0, program().current_dir(folder.path()).args(eval)).out;
     let errors: serde_json::Value = serde_json::from_str(&errors).unwrap();
     assert!(errors["ape"]["rmse"].as_f64().unwrap() < 0.1, "{errors}");
