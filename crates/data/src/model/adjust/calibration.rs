@@ -23,12 +23,12 @@ impl Default for CalibrationSigma {
 }
 
 /// A calibration parameter with its standard deviation.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) enum Parameter {
     /// A coordinate of a principal point, in the order of pixels (px).
     Offset(usize, f64),
     /// The rig with a longer baseline.
-    Baseline(StereoRig),
+    Baseline(Box<StereoRig>),
 }
 
 impl CalibrationSigma {
@@ -38,7 +38,7 @@ impl CalibrationSigma {
         let across = rig.right_from_left();
         let longer = Transform::new(across.rotation(), across.translation() * (1.0 + self.baseline));
         let longer = StereoRig::new(*rig.left(), *rig.right(), longer).ok();
-        offsets.chain(longer.filter(|_| self.baseline > 0.0).map(Parameter::Baseline)).collect()
+        offsets.chain(longer.filter(|_| self.baseline > 0.0).map(|rig| Parameter::Baseline(Box::new(rig)))).collect()
     }
 }
 

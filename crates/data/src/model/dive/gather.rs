@@ -37,6 +37,9 @@ pub(super) struct Gathered {
     pub(super) missed: BTreeMap<Key, (Pixel, Missed)>,
 }
 
+/// A searched feature, where it was expected, and the result.
+type Searched = (Key, Pixel, Result<Found, Missed>);
+
 /// A displacement (px) of the expected place by which a new search begins elsewhere.
 const ELSEWHERE: f64 = 1.0;
 
@@ -60,7 +63,7 @@ impl Gathered {
         features: &[Feature],
         known: &[usize],
     ) -> (usize, Vec<Fault>) {
-        let search = |pair: usize| -> Option<Result<Vec<(Key, Pixel, Result<Found, Missed>)>, Fault>> {
+        let search = |pair: usize| -> Option<Result<Vec<Searched>, Fault>> {
             let pose = ExpectedPose::of(pair, &scene.poses, trail)?;
             let expected: Vec<(usize, Expectation)> = known
                 .iter()

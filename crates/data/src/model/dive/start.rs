@@ -82,7 +82,7 @@ impl ModelByHand<'_> {
     ) -> Result<Vec<Marked>, Vec<Fault>> {
         let pairs = pairs_of(dataset, &marks, file)?;
         let mut all: Vec<(usize, DiveMark)> = pairs.into_iter().zip(marks).collect();
-        all.sort_by(|a, b| (a.0, a.1.mark.line).cmp(&(b.0, b.1.mark.line)));
+        all.sort_by_key(|(pair, mark)| (*pair, mark.mark.line));
         let (mut faults, mut located) = (Vec::new(), Vec::new());
         for same_pair in all.chunk_by(|a, b| a.0 == b.0) {
             let pair = same_pair[0].0;
