@@ -433,7 +433,7 @@ mod tests {
         // The seed varies in neither run: it is a difference and does not pair trials.
         assert_eq!(pairs(&a, &b), [(Some(0), Some(1)), (Some(1), Some(0)), (None, Some(2))]);
         assert_eq!(pairs(&b, &a), [(Some(0), Some(1)), (Some(1), Some(0)), (Some(2), None)]);
-        let run_inputs = |trials| RunInputs { inputs: BTreeMap::new(), trials };
+        let run_inputs = |trials| RunInputs { inputs: BTreeMap::new(), trials, axes: Default::default() };
         let message: Vec<String> = configuration(
             &run_inputs(a.into()),
             &run_inputs(b.into()),

@@ -206,6 +206,7 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         images: None,
         key_points: cloud.iter().filter_map(|point| point.pixels).map(|pixels| pixels.left).collect(),
         cloud,
+        lines: Vec::new(),
         prior: Some(PriorRecord { world_from_camera }),
         truth: Some(TruthRecord {
             world_from_camera,
