@@ -5,18 +5,22 @@ use std::collections::BTreeMap;
 use crate::{
     field::Field,
     run::{AttemptRow, Run, Trial},
-    summary::Row,
 };
 
 /// The sentence; `None` for a run in which every attempt has a fix.
 ///
 /// A run without any attempt names the most common reason of its frames. The reason comes with the logged sentence of a
 /// typical attempt, which ends with the remedy for its own numbers.
-pub(crate) fn sentence(run: &Run, rows: &[Row]) -> Option<String> {
-    let total = |of: fn(&Row) -> usize| rows.iter().map(of).sum::<usize>();
-    let (attempted, refused, frames) = (total(|row| row.attempted), total(|row| row.refused), total(|row| row.frames));
+///
+/// The numbers are those of attempts, of attempts without a fix, and of frames; the reasons are those of attempts and of
+/// frames without an attempt, counted for each trial.
+pub(crate) fn sentence(
+    run: &Run,
+    [attempted, refused, frames]: [usize; 3],
+    [reasons, idle]: [Vec<&BTreeMap<String, usize>>; 2],
+) -> Option<String> {
     let fixes = attempted - refused;
-    let counted = if attempted > 0 { counts(rows, |row| &row.reasons) } else { counts(rows, |row| &row.idle) };
+    let counted = counts(if attempted > 0 { &reasons } else { &idle });
     let (reason, count) = counted.into_iter().rev().max_by_key(|(_, count)| *count)?;
     let why = typical(run, reason, attempted > 0).map_or_else(String::new, |why| format!(": {why}"));
     Some(match (attempted, fixes) {
@@ -26,9 +30,9 @@ pub(crate) fn sentence(run: &Run, rows: &[Row]) -> Option<String> {
     })
 }
 
-fn counts(rows: &[Row], of: fn(&Row) -> &BTreeMap<String, usize>) -> BTreeMap<&str, usize> {
+fn counts<'a>(of_trials: &[&'a BTreeMap<String, usize>]) -> BTreeMap<&'a str, usize> {
     let mut counts = BTreeMap::new();
-    for (reason, count) in rows.iter().flat_map(of) {
+    for (reason, count) in of_trials.iter().copied().flatten() {
         *counts.entry(reason.as_str()).or_default() += count;
     }
     counts

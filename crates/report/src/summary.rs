@@ -215,7 +215,12 @@ impl RunSummary {
             run: header.run.clone(),
             question: header.question.clone(),
             published: Published::of(run).iter().map(Published::sentence).collect(),
-            rejections: rejections::sentence(run, &rows),
+            rejections: {
+                let total = |of: fn(&Row) -> usize| rows.iter().map(of).sum::<usize>();
+                let counts = [total(|row| row.attempted), total(|row| row.refused), total(|row| row.frames)];
+                let reasons = rows.iter().map(|row| &row.reasons).collect();
+                rejections::sentence(run, counts, [reasons, rows.iter().map(|row| &row.idle).collect()])
+            },
             rows,
             lacking: run.trials.iter().filter_map(Trial::lacking).collect(),
         }

@@ -104,7 +104,9 @@ fn a_right_mark_that_the_images_contradict_is_reported() {
     for frame in [0, 2, 4] {
         let (_, text) = marks(&*sequence, frame, 1.0, true);
         let sound = model(&*sequence, frame, &text, None).unwrap();
-        let untold: Vec<String> = sound.warnings.iter().map(ToString::to_string).collect();
+        // A left mark without a corner has a warning of its own.
+        let of_right = |warning: &String| !warning.contains("of the left mark");
+        let untold: Vec<String> = sound.warnings.iter().map(ToString::to_string).filter(of_right).collect();
         assert!(untold.is_empty(), "{untold:?}");
         let lines: Vec<&str> = text.lines().collect();
         for (k, line) in lines.iter().enumerate().skip(1) {
@@ -112,7 +114,7 @@ fn a_right_mark_that_the_images_contradict_is_reported() {
             // The epipolar line of a rectified pair is the row.
             cells[3] = (cells[3].parse::<f64>().unwrap() - 25.0).to_string();
             let Ok(found) = model(&*sequence, frame, &text.replace(line, &cells.join(",")), None) else { continue };
-            let reported: Vec<String> = found.warnings.iter().map(ToString::to_string).collect();
+            let reported: Vec<String> = found.warnings.iter().map(ToString::to_string).filter(of_right).collect();
             let place = format!("clicks.csv:{}: `{}`", k + 1, cells[0]);
             assert!(
                 reported.len() == 1 && reported[0].contains(&place) && reported[0].contains("px from the best match"),

@@ -163,6 +163,8 @@ impl Output {
             self.begun = true;
             // A single gap before the first frame took nothing of it.
             self.torn &= self.spare.is_none() || self.gaps > 1;
+            // As in the log of a run, the records before the first frame have a chunk of their own.
+            self.mcap.flush().map_err(|error| unwritten(self.partial.unfinished(), error))?;
         }
         let message = Pending { header: MessageHeader { channel_id, ..header }, data };
         // The totals are correct whatever is lost of the frames.

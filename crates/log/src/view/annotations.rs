@@ -64,7 +64,7 @@ pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize
         }
     }
     use points_annotation::Type;
-    let drawn = |kind: Type, points, colour: [u8; 3], thickness| PointsAnnotation {
+    let marked = |kind: Type, points, colour: [u8; 3], thickness| PointsAnnotation {
         timestamp: Some(timestamp(frame.stamp_ns)),
         r#type: kind.into(),
         points,
@@ -74,10 +74,10 @@ pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize
     };
     let segment = |line: &Line| line.segments.map(|segments| segments[side].map(|offset| mark(offset.at)));
     let mut points =
-        vec![drawn(Type::Points, key_points, [255; 3], 2.0), drawn(Type::Points, candidates, [86, 180, 233], 4.0)];
+        vec![marked(Type::Points, key_points, [255; 3], 2.0), marked(Type::Points, candidates, [86, 180, 233], 4.0)];
     let lines: Vec<Point2> = frame.lines.iter().filter_map(segment).flatten().collect();
     if !lines.is_empty() {
-        points.push(drawn(Type::LineList, lines, [255; 3], 1.0));
+        points.push(marked(Type::LineList, lines, [255; 3], 1.0));
     }
     for target in frame.targets.iter().filter(|target| !target.edges.is_empty()) {
         let Some(index) = header.targets.iter().position(|model| model.id == target.object) else { continue };
@@ -98,7 +98,7 @@ pub(crate) fn annotations(header: &TrialHeader, frame: &FrameRecord, side: usize
             });
         }
         let ends = identified.into_iter().flat_map(|(_, ends)| ends).collect();
-        points.push(drawn(Type::LineList, ends, colour(index), 3.0));
+        points.push(marked(Type::LineList, ends, colour(index), 3.0));
     }
     ImageAnnotations { timestamp: Some(timestamp(frame.stamp_ns)), circles, points, texts, metadata: Vec::new() }
 }

@@ -5,7 +5,7 @@ use seafix_component::{counted, number};
 use seafix_geometry::{MeasuredLine, Point};
 use serde::Deserialize;
 
-use super::parts::{FARTHEST, InvalidPart, MAX_SIGMA, ROUNDING, invalid};
+use super::invalid_part::{FARTHEST, InvalidPart, MAX_SIGMA, ROUNDING, invalid};
 use crate::{
     candidates::Gate,
     edge_candidates::edge_candidates,

@@ -319,7 +319,7 @@ fn every_fault_names_its_place() {
     let sigmas = "\"sigma\": 0.01, \"sigma_xyz\": ";
     for (from, to, expected) in [
         ("problem/1", "problem/2", "unknown format in p.json:1:12: `coherence-problem/2`; this reader supports"),
-        ("problem/1\"", "problem/1.1\", \"new\": 1", "unknown format in p.json:1:12: `coherence-problem/1.1`; this"),
+        ("problem/1\"", "problem/1.2\", \"new\": 1", "unknown format in p.json:1:12: `coherence-problem/1.2`; this"),
         ("0.04", "-1", "`delta` is out of range in p.json:4:25: -1; allowed: above 0, at most"),
         ("0.04", "2.0", "`delta` is out of range in p.json:4:25: 2.0; allowed"),
         ("0.04", "1e300", "`delta` is out of range in p.json:4:25: 1e300; allowed"),

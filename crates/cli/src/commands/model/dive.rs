@@ -11,7 +11,10 @@ use seafix_data::{
 use seafix_navigation::{ODOMETRIES, Odometry};
 use serde_json::{Value, json};
 
-use super::{Model, Printed, page, pair};
+use super::{
+    arguments::{Model, Printed},
+    page, pair,
+};
 use crate::{
     atomic_file::AtomicFile,
     exit::{Ended, Failure, INPUT, OUTPUT, USAGE},

@@ -11,7 +11,7 @@ use seafix_data::{
 use seafix_io::read_image;
 use serde_json::{Value, json};
 
-use super::{Model, Printed};
+use super::arguments::{Model, Printed};
 use crate::exit::{Ended, Failure, INPUT};
 
 /// The files of a pair: both images, the rig and the marks.

@@ -4,7 +4,7 @@ use seafix_component::Fault;
 use seafix_data::{Proposal, Proposer};
 use seafix_vision::FrontEnd;
 
-use super::{Model, dive, page};
+use super::{arguments::Model, dive, page};
 use crate::{
     atomic_file::AtomicFile,
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},

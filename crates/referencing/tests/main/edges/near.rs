@@ -8,7 +8,7 @@ use seafix_referencing::{End, ModelEdge, Outcome};
 
 use super::{
     scene::{SIDES, corner, line, pose, rig, square},
-    search::{Model, SIGMA, drawn_prior},
+    search::{Model, SIGMA, random_prior},
 };
 
 /// Distance of the two edges (m).
@@ -38,7 +38,7 @@ fn of_two_near_edges_the_right_one_is_identified_or_none() {
         let hidden = if rng.random() { 0 } else { 9 };
         let shown: Vec<usize> = (0..10).filter(|&k| k != hidden).collect();
         let truth = pose(3.0, rng.random_range(0.0..6.0));
-        let prior = drawn_prior(&truth, (0.0087, 0.1), &mut rng);
+        let prior = random_prior(&truth, (0.0087, 0.1), &mut rng);
         let into = truth.inverse();
         let measured = |k: &usize| model.edges[*k].places(&[]).map(|end| into * Point::from(end.coords));
         let lines: Vec<MeasuredLine> = shown.iter().map(|k| line(&rig, measured(k), SIGMA, &mut rng)).collect();

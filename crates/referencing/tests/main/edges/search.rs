@@ -43,7 +43,7 @@ impl Model {
 }
 
 /// A prior drawn about the true pose; the standard deviations are those of attitude (rad) and position (m).
-pub(super) fn drawn_prior(truth: &Transform<Object, Camera>, sigmas: (f64, f64), rng: &mut ChaCha8Rng) -> Prior {
+pub(super) fn random_prior(truth: &Transform<Object, Camera>, sigmas: (f64, f64), rng: &mut ChaCha8Rng) -> Prior {
     let xi = nalgebra::Vector6::from_fn(|k, _| {
         let [angle, position] = [normal3(rng, sigmas.0).x, normal3(rng, sigmas.1).x];
         if k < 3 { angle } else { position }
@@ -98,7 +98,7 @@ fn attempt(frame: Frame, rng: &mut ChaCha8Rng) -> (Attempt, Transform<Object, Ca
     let Model { points, edges } = &model;
     let rig = rig();
     let truth = pose(3.5, rng.random_range(0.0..6.0));
-    let prior = drawn_prior(&truth, frame.prior, rng);
+    let prior = random_prior(&truth, frame.prior, rng);
     let into = truth.inverse();
     let mut cloud: Vec<MeasuredPoint> = Vec::new();
     let mut lines: Vec<MeasuredLine> = Vec::new();
