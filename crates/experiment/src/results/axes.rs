@@ -42,7 +42,8 @@ impl Axes {
     pub(crate) fn of<'a>(columns: &[AxisColumn], trials: impl Iterator<Item = &'a AxisValues> + Clone) -> Self {
         let typed = |column: &AxisColumn| {
             let values = trials.clone().filter_map(|values| values.get(&column.key));
-            let kinds: [(fn(&serde_json::Value) -> bool, Kind); 3] = [
+            type Holds = fn(&serde_json::Value) -> bool;
+            let kinds: [(Holds, Kind); 3] = [
                 (serde_json::Value::is_i64, Kind::Integer),
                 (serde_json::Value::is_number, Kind::Real),
                 (serde_json::Value::is_boolean, Kind::Flag),

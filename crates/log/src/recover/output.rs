@@ -117,6 +117,11 @@ impl Output {
                 self.schemas.insert(header.id, id);
             }),
             Record::Channel(channel) => {
+                // A lost chunk may have held the schema of a channel that a later one declares.
+                let declared = self.schemas.contains_key(&channel.schema_id);
+                if let Some(schema) = self.summary.schemas.remove(&channel.schema_id).filter(|_| !declared) {
+                    self.take(schema)?;
+                }
                 let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or(0);
                 let id = self.mcap.add_channel(schema, &channel.topic, &channel.message_encoding, &channel.metadata);
                 id.map(|id| {
@@ -140,9 +145,6 @@ impl Output {
     fn message(&mut self, header: MessageHeader, data: Vec<u8>) -> Result<(), LogError> {
         let declared = self.channels.contains_key(&header.channel_id);
         if let Some(channel) = self.summary.channels.remove(&header.channel_id).filter(|_| !declared) {
-            if let Some(schema) = self.summary.schemas.remove(&channel.schema_id) {
-                self.take(schema)?;
-            }
             self.take(Record::Channel(channel))?;
         }
         let Some((channel_id, topic)) = self.channels.get(&header.channel_id).cloned() else {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{super::limits::Limits, dive::DiveArguments};
+use super::{super::limits::Limits, dive_arguments::DiveArguments};
 use crate::{
     atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended},

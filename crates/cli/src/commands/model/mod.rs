@@ -2,6 +2,7 @@
 
 mod arguments;
 mod dive;
+mod dive_arguments;
 mod page;
 mod pair;
 mod propose;

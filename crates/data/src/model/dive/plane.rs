@@ -69,7 +69,7 @@ mod tests {
     fn the_plane_is_that_of_the_seabed_and_not_of_the_boxes_on_it() {
         let at = |k: usize| {
             let (x, y) = ((k * 37 % 100) as f64 * 0.05, (k * 61 % 100) as f64 * 0.05);
-            let rises = if k % 2 == 0 { 0.004 * ((k % 7) as f64 - 3.0) } else { 0.3 + 0.01 * (k % 50) as f64 };
+            let rises = if k.is_multiple_of(2) { 0.004 * ((k % 7) as f64 - 3.0) } else { 0.3 + 0.01 * (k % 50) as f64 };
             Vector3::new(x, y, 0.1 * x + rises)
         };
         let points: Vec<Vector3<f64>> = (0..200).map(at).collect();

@@ -44,8 +44,11 @@ impl<'a> Sample<'a> {
     }
 }
 
+/// The distribution of a quantity in a row; `None` where it is unknown.
+pub(super) type DistributionOf = fn(&Row) -> Option<Distribution>;
+
 /// The quantity that an answer about accuracy states: the camera position error, or the TRE of runs without it.
-pub(super) fn error(summary: &RunSummary) -> (&'static str, Field, fn(&Row) -> Option<Distribution>) {
+pub(super) fn error(summary: &RunSummary) -> (&'static str, Field, DistributionOf) {
     if summary.rows.iter().any(|row| row.position_error.is_some()) {
         ("camera position error", Field::Position, |row| row.position_error)
     } else {
