@@ -121,8 +121,10 @@ mod tests {
         assert_eq!(sections.iter().map(|(name, _)| *name).collect::<Vec<_>>(), listed);
         for (name, section) in sections {
             let page = plain(&std::fs::read_to_string(reports.join(name).join("report.html")).unwrap());
-            let message =
-                section.lines().filter_map(|line| line.strip_prefix("- ")).map(|message| message.replace('\\', ""));
+            let message = section
+                .lines()
+                .filter_map(|line| line.strip_prefix("- "))
+                .map(|message| message.replace(['\\', '`'], "").replace("**", ""));
             let message: Vec<String> =
                 message.map(|message| message.split_whitespace().collect::<Vec<_>>().join(" ")).collect();
             assert!(!message.is_empty(), "{name}");

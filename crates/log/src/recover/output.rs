@@ -165,18 +165,19 @@ impl Output {
             self.begun = true;
             // A single gap before the first frame took nothing of it.
             self.torn &= self.spare.is_none() || self.gaps > 1;
-            // As in the log of a run, the records before the first frame have a chunk of their own.
-            self.mcap.flush().map_err(|error| unwritten(self.partial.unfinished(), error))?;
         }
         let message = Pending { header: MessageHeader { channel_id, ..header }, data };
         // The totals are correct whatever is lost of the frames.
         let totals = self.trial && topic == topic::TOTALS;
         if !self.trial || !self.begun || totals {
+            self.write(&message)?;
             if self.trial && topic == topic::MODEL {
-                // A gap before the first frame took nothing of it.
+                // A gap before the first frame took nothing of it. As in the log of a run, the records before the first
+                // frame have a chunk of their own.
                 (self.begun, self.torn) = (true, false);
+                self.mcap.flush().map_err(|error| unwritten(self.partial.unfinished(), error))?;
             }
-            return self.write(&message);
+            return Ok(());
         }
         self.pending_bytes += message.data.len() + size_of::<Pending>();
         if self.pending_bytes > self.limit {
@@ -213,7 +214,7 @@ impl Output {
             self.write(&Pending { header, data })?;
         }
         self.trial = true;
-        Ok(())
+        self.mcap.flush().map_err(|error| unwritten(self.partial.unfinished(), error))
     }
 
     fn channel(&mut self, topic: &str, schema: fn() -> Schema) -> Result<u16, McapError> {
