@@ -354,7 +354,7 @@ mod tests {
         }
     }
 
-    /// Seen to fail where the place in the file is reported for a value of the command line.
+    /// The place in the file is not reported for a value of the command line.
     #[test]
     fn a_value_of_the_command_line_is_at_fault_there() {
         let texts = Texts::of(Path::new("e.toml"), "[pipeline]\nsolver = 'kabsch'\n");

@@ -85,7 +85,6 @@ pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> 
 mod tests {
     use super::*;
 
-    /// Seen to fail with the interval of another fraction than one half.
     #[test]
     fn a_median_lies_within_its_interval() {
         // For 100 independent values, Clopper–Pearson of 50 in 100 is [0.398, 0.602].

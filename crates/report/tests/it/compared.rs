@@ -59,8 +59,6 @@ fn runs_of_other_data_are_refused() {
 }
 
 /// A replay has the data of the log that it reads; without this log its data are unknown.
-///
-/// Seen to fail where the source of the replay itself is compared.
 #[test]
 fn a_replay_is_compared_with_its_original() {
     let folder = tempfile::tempdir().unwrap();
