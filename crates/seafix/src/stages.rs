@@ -340,7 +340,10 @@ impl PipelineStages {
             Ok(candidates) => (candidates, None),
             Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
         };
-        let edges = problem.edges.candidates(&target.points, problem.prior.as_ref());
+        let edges = match self.settings.edges {
+            UseOfEdges::On => problem.edges.candidates(&target.points, problem.prior.as_ref()),
+            UseOfEdges::Off => Vec::new(),
+        };
         let posed = posed(target, problem, &candidates, &edges);
         let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
         Sought { candidates, edges, found, spent: [stage1, stage2] }

@@ -169,7 +169,7 @@ fn what_is_wrong_with_marks_is_reported_with_its_lines() {
 }
 
 #[test]
-#[ignore = "renders 24 pairs; .ci/long model"]
+#[ignore = "long: renders 24 pairs"]
 fn proposals_are_marks_and_a_page() {
     let folder = TempDir::new().unwrap();
     let here = folder.path();

@@ -1,9 +1,9 @@
 //! Edges as a setting of the pipeline.
 
-use std::fs;
+use std::{fs, path::Path};
 
-use seafix_experiment::{Options, Plan, Silent, run};
-use seafix_log::{TargetRecord, TargetTimes, read};
+use seafix_experiment::{Options, Plan, Replay, Silent, run};
+use seafix_log::{Outcome, TargetRecord, TargetTimes, read};
 use tempfile::TempDir;
 
 /// The rows of a short dive with these settings, without what only edges have.
@@ -34,4 +34,57 @@ fn edges_that_are_off_change_nothing() {
     assert!(!off.is_empty());
     assert_eq!(off, rows(&["source.model-edges=0.0"]));
     assert_ne!(off, rows(&[]), "edges that are on change something");
+}
+
+/// A problem of the twelve edges of a box of 1.2 × 0.8 × 0.5 m, seen from 3 m, without a measured point; one end of an edge
+/// is a model point.
+fn wireframe() -> String {
+    let corner = |c: usize| [0, 1, 2].map(|axis| if c >> axis & 1 == 1 { [1.2, 0.8, 0.5][axis] } else { 0.0 });
+    let sides = (0..8).flat_map(|a| [1, 2, 4].map(|step| (a, a | step))).filter(|(a, b)| a != b);
+    let sides: Vec<(usize, usize)> = sides.collect();
+    let end = |c: usize| if c == 0 { "0".to_owned() } else { format!("{:?}", corner(c)) };
+    let edges: Vec<String> = sides.iter().map(|&(a, b)| format!("[{}, {}]", end(a), end(b))).collect();
+    let lines: Vec<String> = sides
+        .iter()
+        .map(|&(a, b)| {
+            let at = |t: f64| [0, 1, 2].map(|k| corner(a)[k] + t * (corner(b)[k] - corner(a)[k]) + [0.0, 0.0, 3.0][k]);
+            let covariance = "[[1e-6,0,0,0],[0,1e-6,0,0],[0,0,1e-6,0],[0,0,0,1e-6]]";
+            format!("{{\"ends\": [{:?}, {:?}], \"covariance\": {covariance}}}", at(0.1), at(0.9))
+        })
+        .collect();
+    format!(
+        "{{\"format\": \"coherence-problem/1.1\", \"id\": \"box\", \"model\": [[0,0,0],[1.2,0,0],[0,0.8,0]], \
+         \"cloud\": [], \"sigma\": 0.001, \"delta\": 0.01, \"prior\": {{\"T_cam_obj\": \
+         [[1,0,0,0.05],[0,1,0,0],[0,0,1,3],[0,0,0,1]], \"shell_half_m\": 0.2}}, \"edges\": [{}], \"lines\": [{}]}}",
+        edges.join(", "),
+        lines.join(", ")
+    )
+}
+
+/// The row of the only frame of a plan.
+fn row(plan: &Plan, out: &Path) -> TargetRecord {
+    run(plan, &Options { threads: 1, ..Options::into(out) }, &Silent).unwrap();
+    let mut frames = read(&out.join(format!("{}.mcap", plan.trials[0].name))).unwrap().frames;
+    let mut row = frames.remove(0).targets.remove(0);
+    row.times = TargetTimes::default();
+    row
+}
+
+/// A problem with edges has a fix in an experiment, the same again from its log, and none without edges.
+#[test]
+fn edges_of_a_problem_are_used_and_replayed() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    fs::create_dir(here.join("all")).unwrap();
+    fs::write(here.join("all/box.json"), wireframe()).unwrap();
+    let file = here.join("e.toml");
+    let source = "[source]\nname = 'problems'\npath = 'all'\n[pipeline]\nsolver = 'mahalanobis'\n";
+    fs::write(&file, format!("question = 'Is the box found?'\n{source}")).unwrap();
+    let plan = Plan::read(&file, &[]).unwrap();
+    let found = row(&plan, &here.join("run"));
+    assert_eq!((found.outcome, found.edges.len(), found.pairs.len()), (Outcome::Fix, 12, 0), "{}", found.explanation);
+    let log = here.join(format!("run/{}.mcap", plan.trials[0].name));
+    assert_eq!(row(&Replay::default().plan(&log).unwrap(), &here.join("again")), found);
+    let off = Plan::read(&file, &["pipeline.edges=off".to_owned()]).unwrap();
+    assert_eq!(row(&off, &here.join("off")).outcome, Outcome::Rejected);
 }

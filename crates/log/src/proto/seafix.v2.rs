@@ -315,7 +315,7 @@ pub struct Target {
     pub site_from_object: ::prost::alloc::vec::Vec<f64>,
     #[prost(message, repeated, tag = "3")]
     pub points: ::prost::alloc::vec::Vec<ModelPoint>,
-    /// A pose with m2 beyond this (m) is wrong.
+    /// A pose with a target registration error (TRE) beyond this (m) is wrong.
     #[prost(double, tag = "4")]
     pub alert_limit: f64,
     #[prost(message, repeated, tag = "5")]
@@ -380,13 +380,13 @@ pub struct ReferencingResult {
     pub solver: ::prost::alloc::string::String,
     #[prost(enumeration = "Outcome", tag = "7")]
     pub outcome: i32,
-    /// Why not, in one word; empty when referenced.
+    /// The reason of an outcome without a fix, in one word; empty of a fix.
     #[prost(string, tag = "8")]
     pub reason: ::prost::alloc::string::String,
     /// Why not, in a sentence; of a fix, why the joint fix did not replace it.
     #[prost(string, tag = "9")]
     pub explanation: ::prost::alloc::string::String,
-    /// 4 x 4, p_object = object_from_camera * p_camera; empty unless referenced.
+    /// 4 x 4, p_object = object_from_camera * p_camera; empty without a fix.
     #[prost(double, repeated, tag = "10")]
     pub object_from_camera: ::prost::alloc::vec::Vec<f64>,
     /// 6 x 6, of xi = (phi, rho) in T_true = T_est * Exp(xi), camera frame, rotation first.
@@ -414,7 +414,7 @@ pub struct ReferencingResult {
     /// Root mean square of C H - P over the pairs (m).
     #[prost(double, optional, tag = "19")]
     pub residual_rms: ::core::option::Option<f64>,
-    /// What supports the fix beyond its covariance; absent unless referenced.
+    /// What supports the fix beyond its covariance; absent without a fix.
     #[prost(message, optional, tag = "20")]
     pub integrity: ::core::option::Option<Integrity>,
     /// Probability that the object is absent; absent for labelled points.
@@ -741,7 +741,7 @@ pub struct Evaluation {
     pub index: u32,
     #[prost(string, tag = "4")]
     pub object: ::prost::alloc::string::String,
-    /// Referenced, and m2 beyond the alert limit.
+    /// A fix whose target registration error (TRE) exceeds the alert limit.
     #[prost(bool, optional, tag = "5")]
     pub wrong: ::core::option::Option<bool>,
     /// A false pair was used.
@@ -772,12 +772,12 @@ pub struct Evaluation {
     /// Normalised estimation error squared, six degrees of freedom.
     #[prost(double, optional, tag = "15")]
     pub nees: ::core::option::Option<f64>,
-    /// Cramer-Rao bound on m2, and on the position (m): what no unbiased estimate betters on average.
+    /// Cramer-Rao bound of the TRE, and of the position (m): what no unbiased estimate betters on average.
     #[prost(double, optional, tag = "16")]
     pub tre_crlb: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "17")]
     pub position_crlb: ::core::option::Option<f64>,
-    /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable.
+    /// The alert limit (m): a TRE beyond it is wrong, a protection level beyond it leaves the fix unavailable.
     #[prost(double, optional, tag = "18")]
     pub alert_limit: ::core::option::Option<f64>,
     /// Straight edges of the target that truly face the camera and lie in both images.
@@ -817,7 +817,7 @@ pub struct Totals {
     pub wrong: u64,
     #[prost(uint64, tag = "9")]
     pub unjudged: u64,
-    /// Why attempts were refused, and how often.
+    /// The reasons of attempts without a fix, and their numbers.
     #[prost(message, repeated, tag = "10")]
     pub reasons: ::prost::alloc::vec::Vec<Reason>,
     /// Over all fixes that truth could judge, wrong ones included: how many, sums of squares (m^2).

@@ -111,7 +111,7 @@ pub struct TargetModel {
     pub site_from_object: Option<Matrix4>,
     /// Its feature points.
     pub points: Vec<ModelPoint>,
-    /// A pose with m2 beyond this (m) is wrong.
+    /// A pose with a target registration error (TRE) beyond this (m) is wrong.
     pub alert_limit: f64,
     /// Its straight edges.
     pub edges: Vec<ModelEdge>,

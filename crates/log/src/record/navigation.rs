@@ -52,15 +52,15 @@ mirror! {
     /// How the navigated poses compare with truth; `None` where truth or a pose is missing.
     #[derive(Debug, Clone, Copy, PartialEq, Default)]
     pub struct NavigationErrors {
-        /// m2 of the navigated pose over the points of its object (m).
+        /// The TRE of the navigated pose over the points of its object (m).
         pub tre_rms: Option<f64>,
-        /// m3, position (m).
+        /// The position error (m).
         pub position_error: Option<f64>,
-        /// m3, attitude (rad).
+        /// The attitude error (rad).
         pub attitude_error: Option<f64>,
         /// Normalised estimation error squared, six degrees of freedom.
         pub nees: Option<f64>,
-        /// m3 of the first fix carried by odometry alone: position (m).
+        /// The position error (m) of the first fix carried by odometry alone.
         pub odometry_only_position_error: Option<f64>,
         /// Likewise, attitude (rad).
         pub odometry_only_attitude_error: Option<f64>,

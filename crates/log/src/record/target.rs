@@ -19,13 +19,12 @@ pub struct TargetRecord {
     pub solver: String,
     /// What came of it.
     pub outcome: Outcome,
-    /// Why not, in one word of the results' vocabulary (`too-few`, `nfa`, `budget`, …); empty when
-    /// referenced.
+    /// The reason of an outcome without a fix, in one word (`too-few`, `nfa`, `budget`, …); empty of a fix.
     pub reason: String,
     /// Why not, in a sentence with numbers; where a joint fix was asked for, what took part in it, what did not and why,
     /// or why there is none. Empty of any other fix.
     pub explanation: String,
-    /// The estimated pose, when referenced.
+    /// The estimated pose of a fix.
     pub object_from_camera: Option<Matrix4>,
     /// Its covariance, of ξ in `T_true = T_est · Exp(ξ)`, camera frame, rotation first.
     pub covariance: Option<Matrix6>,
@@ -55,7 +54,7 @@ pub struct TargetRecord {
     pub pair_tests: Option<u64>,
     /// Root mean square of C·H − P over the pairs (m).
     pub residual_rms: Option<f64>,
-    /// What supports the fix beyond its covariance, when referenced.
+    /// What supports a fix beyond its covariance.
     pub integrity: Option<Integrity>,
     /// How it compares with truth.
     pub evaluation: Evaluation,
@@ -213,7 +212,7 @@ mirror! {
     /// How an attempt compares with truth; `None` where truth or a pose is missing.
     #[derive(Debug, Clone, Copy, PartialEq, Default)]
     pub struct Evaluation {
-        /// Referenced, and m2 beyond the alert limit.
+        /// Whether this is a fix whose target registration error (TRE) exceeds the alert limit.
         pub wrong: Option<bool>,
         /// A false pair was used.
         pub wrong_pairs: Option<bool>,
@@ -223,23 +222,23 @@ mirror! {
         pub identified: Option<u32>,
         /// Pairs whose cloud point lies within 2 px of the true projections, in both images.
         pub correct_pairs: Option<u32>,
-        /// m1 over the correctly identified pairs, RMS (m): the residual C·H − P.
+        /// The fit RMS (m): the residual C·H − P over the correctly identified pairs.
         pub fit_rms: Option<f64>,
-        /// m1 without the points the solver used (m).
+        /// The fit RMS (m) without the points that the solver used.
         pub fit_rms_unused: Option<f64>,
-        /// m2 over all points of the target, RMS (m): the error of transferred model points.
+        /// The TRE (m): the RMS error of all model points that the pose transfers.
         pub tre_rms: Option<f64>,
-        /// m3: error of the left camera's position in the object frame (m).
+        /// The error of the left camera's position in the object frame (m).
         pub position_error: Option<f64>,
-        /// m3: error of its attitude (rad).
+        /// The error of its attitude (rad).
         pub attitude_error: Option<f64>,
         /// Normalised estimation error squared, six degrees of freedom.
         pub nees: Option<f64>,
-        /// The Cramér–Rao bound on m2 (m), where it is known.
+        /// The Cramér–Rao bound of the TRE (m), where it is known.
         pub tre_crlb: Option<f64>,
         /// The Cramér–Rao bound on the position (m), where it is known.
         pub position_crlb: Option<f64>,
-        /// The alert limit (m): m2 beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
+        /// The alert limit (m): a TRE beyond it is wrong, a protection level beyond it leaves the fix unavailable. `None` in logs
         /// that are older than it, whose header has those of the targets.
         pub alert_limit: Option<f64>,
         /// The number of edges of the target that face the camera and lie in both images; `None` for a target without

@@ -25,17 +25,17 @@ pub struct Totals {
     pub wrong: u64,
     /// Fixes that no truth could judge.
     pub unjudged: u64,
-    /// Why attempts were refused, and how often.
+    /// The reasons of attempts without a fix, and their numbers.
     pub reasons: BTreeMap<String, u64>,
     /// Fixes that truth could judge, wrong ones included.
     pub judged: u64,
-    /// Over them: sum of m2² (m²).
+    /// The sum of the squared TRE over them (m²).
     pub tre_squares: f64,
     /// Sum of the squared errors of the position (m²).
     pub position_squares: f64,
     /// Those of them that have a bound.
     pub bounded: u64,
-    /// Over those: sum of the squared bounds on m2 (m²).
+    /// The sum of the squared bounds of the TRE over those (m²).
     pub tre_crlb_squares: f64,
     /// Sum of the squared bounds on the position (m²).
     pub position_crlb_squares: f64,

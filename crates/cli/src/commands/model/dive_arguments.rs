@@ -26,7 +26,7 @@ pub(super) struct DiveArguments {
     /// Compare the models from every second pair of a dive.
     #[arg(long)]
     pub(super) half: bool,
-    /// Propose so many features instead, with marks in their best pairs; --out is then the table of marks.
+    /// Propose this number of features, with marks in their best pairs; --out is then the table of marks.
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) propose: Option<u32>,
     /// Write a page with the best views of each point, or with the proposals, to this file.

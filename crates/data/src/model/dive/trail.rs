@@ -19,7 +19,7 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// A dive of so many pairs without any motion.
+    /// A dive of this number of pairs without any known motion.
     pub(super) fn unknown(pairs: usize) -> Self {
         Self { segments: vec![None; pairs], steps: vec![None; pairs] }
     }
