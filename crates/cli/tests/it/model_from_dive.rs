@@ -6,7 +6,7 @@ use std::{
     sync::OnceLock,
 };
 
-use seafix_data::dataset::Dataset;
+use seafix_data::dataset::{Dataset, write_png};
 use seafix_geometry::Pixel;
 use tempfile::TempDir;
 
@@ -106,6 +106,58 @@ fn one_mark_of_each_point_gives_the_model() {
     assert!(rms < 1.5e-3 && (scale - 1.0).abs() < 4e-3, "{text}");
     let people = ended_with(0, program().arg("eval").arg(source.join("site.toml")).arg(here.join("a.toml"))).out;
     assert!(people.contains("mm a coordinate, worst") && people.contains("χ²"), "{people}");
+}
+
+/// Marks in one pair, and no odometry: the other pairs are found by their own corners.
+#[test]
+fn pairs_are_found_without_an_odometry() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let source = dive().join("dive");
+    let dataset = Dataset::open(&source).unwrap();
+    let object = dataset.site.as_ref().unwrap().object("manifold").unwrap();
+    let frame = &dataset.frames[2];
+    let mark = |point: &seafix_referencing::ModelPoint| {
+        frame.visible.iter().find(|(object, id)| object == "manifold" && *id == point.id)?;
+        let here = frame.truth?.inverse() * (object.world_from_object? * point.at);
+        let left = dataset.rig.project(&here)?.left;
+        Some(format!("{},{},{:.1},{:.1},,", frame.stamp_ns, point.id, left.u, left.v))
+    };
+    let lines: Vec<String> = object.points.iter().filter_map(mark).collect();
+    let text = model(here, &source, &table(&lines), &["--odometry", "none", "--out", "a.toml"], 0).out;
+    assert!(text.contains("from 6 of 6 pairs") || text.contains("from 5 of 6 pairs"), "{text}");
+    let text = ended_with(0, program().arg("eval").arg(source.join("site.toml")).arg(here.join("a.toml"))).out;
+    let rms: f64 = text.split("RMS ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(rms < 1.0, "{text}");
+}
+
+/// A feature without a match in the pair of its mark is found by the corners of other pairs on its line of sight.
+#[test]
+fn a_mark_without_a_match_is_found_in_other_pairs() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let source = here.join("dive");
+    fs::create_dir(&source).unwrap();
+    for file in fs::read_dir(dive().join("dive")).unwrap() {
+        let file = file.unwrap().path();
+        fs::copy(&file, source.join(file.file_name().unwrap())).unwrap();
+    }
+    let lines = marks();
+    let (dataset, cells) = (Dataset::open(&source).unwrap(), lines[0].split(',').collect::<Vec<_>>());
+    let index = dataset.frames.iter().position(|frame| frame.stamp_ns.to_string() == cells[0]).unwrap();
+    let row: usize = cells[3].parse::<f64>().unwrap() as usize;
+    // The right image has lost the rows about the mark.
+    let (_, mut right) = dataset.pair(&dataset.frames[index]).unwrap();
+    let width = right.width();
+    right.pixels_mut()[(row - 12) * width..(row + 12) * width].fill(60.0);
+    let name = fs::read_to_string(source.join("frames.csv")).unwrap();
+    let name = name.lines().nth(index + 1).unwrap().split(',').nth(2).unwrap();
+    write_png(&source.join(name), &right, 8).unwrap();
+    let json = model(here, &source, &table(&lines), &["--out", "a.toml", "--json"], 0).out;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let point = json["points"].as_array().unwrap().iter().find(|point| point["id"] == cells[1]).expect("the feature");
+    assert_eq!(point["corner"], true);
+    assert!(point["observations"].as_array().unwrap().len() >= 3, "{point}");
 }
 
 /// A dive of one pair gives the bytes of the command for one pair.

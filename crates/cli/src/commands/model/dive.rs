@@ -49,7 +49,9 @@ pub(super) fn execute(model: &Model, marks: &Path, by_hand: ModelByHand<'_>, cal
     let text = read_text(marks).map_err(|fault| Failure::new(INPUT, fault))?;
     let inputs = [&*model.left, marks];
     let (halves, pictures) = (arguments.half, arguments.page.is_some());
-    let from_dive = ModelFromDive { by_hand, calibration, odometry: odometry.as_deref(), halves, pictures };
+    let corner_sigma = arguments.corner_sigma;
+    let from_dive =
+        ModelFromDive { by_hand, calibration, corner_sigma, odometry: odometry.as_deref(), halves, pictures };
     if dataset.frames.len() == 1 {
         let built = from_dive.of_only_pair(&dataset, &text, marks).map_err(faults)?;
         return model.finish(&pair::printed(&built), &inputs);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use seafix_component::{Choice, Fault};
-use seafix_data::{CalibrationSigma, dataset::Dataset};
+use seafix_data::{CalibrationSigma, ModelFromDive, dataset::Dataset};
 use seafix_navigation::{ODOMETRIES, Odometry};
 
 use crate::exit::{Failure, INPUT, OUTPUT, USAGE};
@@ -20,6 +20,9 @@ pub(super) struct DiveArguments {
     /// Relative standard deviation of the baseline: that of the scale of a model from a dive.
     #[arg(long, default_value_t = CalibrationSigma::default().baseline, value_name = "FRACTION")]
     pub(super) baseline_sigma: f64,
+    /// Standard deviation of the place that the locator calls a corner (px), in common to all pairs of a dive.
+    #[arg(long, default_value_t = ModelFromDive::CORNER_SIGMA, value_name = "PX")]
+    pub(super) corner_sigma: f64,
     /// Do not correct the rotation of the right camera, even if the images of a dive contradict the rig.
     #[arg(long)]
     pub(super) keep_rig: bool,
@@ -38,9 +41,13 @@ pub(super) struct DiveArguments {
 }
 
 impl DiveArguments {
-    /// The uncertainty of the rig.
+    /// The uncertainty of the rig; checks that of corners too.
     pub(super) fn calibration(&self) -> Result<CalibrationSigma, Failure> {
-        let given = [("principal-sigma", self.principal_sigma, 10.0), ("baseline-sigma", self.baseline_sigma, 0.1)];
+        let given = [
+            ("principal-sigma", self.principal_sigma, 10.0),
+            ("baseline-sigma", self.baseline_sigma, 0.1),
+            ("corner-sigma", self.corner_sigma, 10.0),
+        ];
         for (name, value, max) in given {
             if !(0.0..=max).contains(&value) {
                 return Err(Failure::new(USAGE, format!("invalid --{name} {value}: give a number from 0 to {max}")));

@@ -1,7 +1,7 @@
 //! The search for a feature where it is expected in a pair.
 
 use nalgebra::{Matrix4, Vector2};
-use seafix_geometry::{Camera, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels};
+use seafix_geometry::{Camera, Pixel, Point, StereoPixels, StereoRig, Transform, UncertainPixels, UncertainPoint};
 use seafix_vision::{Direct, Expected, FrontEnd, Image, Keypoint, Pair, UncertainPixel, Workspace};
 
 use super::template::Template;
@@ -136,6 +136,27 @@ impl Finder<'_> {
             Some(seen.1)
         });
         Ok(Found { correlation, ..found })
+    }
+
+    /// The corners near `places`, each once, in the camera of the pair.
+    pub(super) fn corners_along(
+        &self,
+        [left, right]: [&Image; 2],
+        places: impl Iterator<Item = Point<Camera>>,
+    ) -> Vec<UncertainPoint<Camera>> {
+        let mut corners: Vec<UncertainPixel> = Vec::new();
+        let (mut pixels, mut cloud) = (Vec::new(), Vec::new());
+        for place in places {
+            let Some(expected) = self.rig.project(&place) else { continue };
+            for corner in self.corners_near(left, expected.left, SPACING) {
+                if corners.iter().all(|other| other.at.distance(&corner.at) >= SAME) {
+                    corners.push(corner);
+                    pixels.extend(self.matched([left, right], &expected, &corner));
+                }
+            }
+        }
+        self.front_end.triangulator.triangulate_into(&pixels, self.rig, &mut cloud);
+        cloud.into_iter().map(|measured| measured.position).collect()
     }
 
     /// Finds a feature that is no corner: its template's window, forward and backward.

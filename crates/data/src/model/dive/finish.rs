@@ -1,17 +1,20 @@
 //! The site and the report of an adjusted dive.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use seafix_component::{Fault, nearest};
-use seafix_geometry::{Object, Point, Transform, World};
+use seafix_geometry::{Camera, Object, Point, Transform, World};
 use seafix_referencing::{ModelPoint, Site, SiteObject};
 
 use super::{
     best_views::{Shown, pictures},
     built::{DiveModel, DivePoint},
     find::Found,
-    gather::Gathered,
+    gather::{Feature, Gathered},
     halves::halves,
     settle::{Key, Scene, Settled},
     start::Marked,
@@ -30,12 +33,17 @@ use crate::{
 pub(super) struct Finish<'a> {
     pub(super) by_hand: &'a ModelByHand<'a>,
     pub(super) calibration: &'a CalibrationSigma,
+    pub(super) corner_sigma: f64,
     pub(super) dataset: &'a Dataset,
     pub(super) marked: &'a [Marked],
+    /// The features that were searched for, in the order of `marked`.
+    pub(super) features: &'a [Feature],
     pub(super) trail: &'a Trail,
     pub(super) scene: &'a Scene,
     pub(super) gathered: &'a Gathered,
     pub(super) settled: &'a Settled<'a>,
+    /// Features that only the pair of their mark observes.
+    pub(super) alone: &'a BTreeSet<usize>,
     pub(super) halves: bool,
     pub(super) pictures: bool,
     pub(super) file: &'a Path,
@@ -57,7 +65,7 @@ impl Finish<'_> {
         }
         let undetermined = |_| Fault::new("the marks determine no model", self.file).remedy("mark more features");
         let mut spread = adjustment.spread(excess, self.calibration).map_err(undetermined)?;
-        self.add_marks(&mut spread);
+        self.add_common(&mut spread);
         let points = &adjustment.points;
         let free = inner(points, &spread.total());
         let base = self.base(&free)?;
@@ -118,20 +126,30 @@ impl Finish<'_> {
         self.dataset.frames[pair].stamp_ns
     }
 
-    /// Adds the operator's error to the points that marks define.
+    /// Adds the errors that all observations of a point have in common: more pairs do not reduce them.
     ///
-    /// It displaces the point on its surface, taken as parallel to the image: σ z/f in both directions across the view.
-    fn add_marks(&self, spread: &mut PointSpread) {
+    /// A mark without a corner displaces the point on its surface, taken as parallel to the image: σ z/f in both
+    /// directions across the view. The place that a locator calls a corner differs from the physical one by σ z/f in all
+    /// directions, with the mean depth z of the observations.
+    fn add_common(&self, spread: &mut PointSpread) {
         let focal = self.dataset.rig.mean_focal();
         for (k, feature) in self.settled.features.iter().enumerate() {
-            let mark = &self.marked[*feature].marks[0];
-            let Some(pose) = self.scene.poses[mark.pair].filter(|_| !mark.corner) else { continue };
-            let here = pose.inverse() * self.settled.adjustment.points[k];
-            let axis = pose.rotation_matrix() * Vector3::z();
-            let sigma = self.by_hand.mark_sigma * here.coords.z / focal;
-            let across = (Matrix3::identity() - axis * axis.transpose()) * (sigma * sigma);
+            let at = self.settled.adjustment.points[k];
+            let depth = |pose: &Transform<World, Camera>| (pose.inverse() * at).coords.z;
+            let added = if self.features[*feature].corner {
+                let observations = self.settled.adjustment.observations.iter().filter(|seen| seen.point == k);
+                let depths: Vec<f64> =
+                    observations.map(|seen| depth(&self.settled.adjustment.poses[seen.view])).collect();
+                let mean = depths.iter().sum::<f64>() / depths.len() as f64;
+                Matrix3::identity() * (self.corner_sigma * mean / focal).powi(2)
+            } else {
+                let Some(pose) = self.scene.poses[self.marked[*feature].marks[0].pair] else { continue };
+                let axis = pose.rotation_matrix() * Vector3::z();
+                let sigma = self.by_hand.mark_sigma * depth(&pose) / focal;
+                (Matrix3::identity() - axis * axis.transpose()) * (sigma * sigma)
+            };
             let mut own = spread.noise.fixed_view_mut::<3, 3>(3 * k, 3 * k);
-            own += across;
+            own += added;
         }
     }
 
@@ -200,7 +218,7 @@ impl Finish<'_> {
         });
         DivePoint {
             id: marked.id.clone(),
-            corner: marked.marks[0].corner,
+            corner: self.features[feature].corner,
             lines,
             at,
             covariance,
@@ -228,6 +246,12 @@ impl Finish<'_> {
         let reason = |index: usize| {
             if self.settled.given_up.contains(&index) {
                 return "most of its observations contradict each other: it moves, or several features were taken for it";
+            }
+            if self.alone.contains(&index) {
+                return "few of the pairs where it was expected show it, all from one direction: mark it in another pair";
+            }
+            if self.marked[index].marks[0].measured.is_none() {
+                return "its mark has no match in the right image, and no corner of other pairs lies on its line of sight";
             }
             "no pair with enough other points shows it"
         };
@@ -299,7 +323,7 @@ fn rounded(sigma: f64) -> f64 {
 }
 
 /// The largest angle between two of the rays (rad).
-fn largest_angle(rays: &[Vector3<f64>]) -> f64 {
+pub(super) fn largest_angle(rays: &[Vector3<f64>]) -> f64 {
     let pairs = rays.iter().enumerate().flat_map(|(k, a)| rays[..k].iter().map(move |b| a.angle(b)));
     pairs.fold(0.0, f64::max)
 }

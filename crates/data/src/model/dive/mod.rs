@@ -18,6 +18,7 @@ mod method;
 mod picture;
 mod plane;
 mod propose;
+mod recover;
 mod relocate;
 mod settle;
 mod start;

@@ -26,10 +26,9 @@ pub(super) struct Located {
     pub(super) mark: DiveMark,
     /// Whether a corner was found at the mark.
     pub(super) corner: bool,
-    /// The pixels with their own errors.
-    pub(super) found: Found,
-    /// The point in the camera of the pair.
-    pub(super) point: UncertainPoint<Camera>,
+    /// The pixels with their own errors, and the point in the camera of the pair; `None` without a match in the right
+    /// image.
+    pub(super) measured: Option<(Found, UncertainPoint<Camera>)>,
     /// Its surroundings.
     pub(super) template: Template,
 }
@@ -39,6 +38,15 @@ pub(super) struct Located {
 pub(super) struct Marked {
     pub(super) id: String,
     pub(super) marks: Vec<Located>,
+}
+
+/// The marked features, and the marks without a match in the right image of their pair.
+#[derive(Debug, Default)]
+pub(super) struct Marks {
+    /// The features, in the order of their names.
+    pub(super) features: Vec<Marked>,
+    /// The faults of marks without a match in the right image.
+    pub(super) unmatched: Vec<Fault>,
 }
 
 /// The standard deviation (px) of the place that a mark defines: zero, but for the rounding of an alignment.
@@ -70,20 +78,17 @@ pub(super) fn pairs_of(dataset: &Dataset, marks: &[DiveMark], file: &Path) -> Re
 }
 
 impl ModelByHand<'_> {
-    /// Locates all marks in their pairs; the features are in the order of their names.
+    /// Locates all marks in their pairs.
+    ///
+    /// A left mark without a match has no point yet. A right mark that does not fit is the operator's error.
     ///
     /// # Errors
-    /// An image that cannot be read, and marks without a match.
-    pub(super) fn located(
-        &self,
-        dataset: &Dataset,
-        marks: Vec<DiveMark>,
-        file: &Path,
-    ) -> Result<Vec<Marked>, Vec<Fault>> {
+    /// An image that cannot be read, and pairs of marks that do not triangulate.
+    pub(super) fn located(&self, dataset: &Dataset, marks: Vec<DiveMark>, file: &Path) -> Result<Marks, Vec<Fault>> {
         let pairs = pairs_of(dataset, &marks, file)?;
         let mut all: Vec<(usize, DiveMark)> = pairs.into_iter().zip(marks).collect();
         all.sort_by_key(|(pair, mark)| (*pair, mark.mark.line));
-        let (mut faults, mut located) = (Vec::new(), Vec::new());
+        let (mut faults, mut located, mut unmatched) = (Vec::new(), Vec::new(), Vec::new());
         for same_pair in all.chunk_by(|a, b| a.0 == b.0) {
             let pair = same_pair[0].0;
             match dataset.pair(&dataset.frames[pair]) {
@@ -91,8 +96,18 @@ impl ModelByHand<'_> {
                 Ok((left, right)) => {
                     let keypoints = [&left, &right].map(|image| self.front_end.detector.detect(image));
                     for (_, mark) in same_pair {
-                        let seen = self.see(mark.mark.clone(), [&left, &right], &keypoints, &dataset.rig, file);
-                        match seen.and_then(|seen| self.located_mark(pair, mark, &seen, &left, file)) {
+                        let seen = match self.see(mark.mark.clone(), [&left, &right], &keypoints, &dataset.rig, file) {
+                            Ok(seen) => Some(seen),
+                            Err(fault) if mark.mark.right.is_none() => {
+                                unmatched.push(fault);
+                                None
+                            }
+                            Err(fault) => {
+                                faults.push(fault);
+                                continue;
+                            }
+                        };
+                        match self.located_mark(pair, mark, seen.as_ref(), &left, file) {
                             Ok(mark) => located.push(mark),
                             Err(fault) => faults.push(fault),
                         }
@@ -100,34 +115,32 @@ impl ModelByHand<'_> {
                 }
             }
         }
-        if faults.is_empty() { Ok(by_feature(located)) } else { Err(faults) }
+        if faults.is_empty() { Ok(Marks { features: by_feature(located), unmatched }) } else { Err(faults) }
     }
 
     fn located_mark(
         &self,
         pair: usize,
         mark: &DiveMark,
-        seen: &Seen,
+        seen: Option<&Seen>,
         left: &Image,
         file: &Path,
     ) -> Result<Located, Fault> {
         let calibration = self.front_end.triangulator.rules().calibration_px;
-        let measured = seen.measured;
-        let given = measured.pixels.expect("the triangulator keeps the pixels");
-        // All pairs have one calibration error, which is treated apart.
-        let own = given.covariance - Matrix4::identity() * (calibration * calibration);
-        let covariance = if seen.corner { own } else { by_definition(&own) };
-        let template = Template::cut(pair, left, given.at.left).ok_or_else(|| {
+        let measured = seen.map(|seen| {
+            let given = seen.measured.pixels.expect("the triangulator keeps the pixels");
+            // All pairs have one calibration error, which is treated apart.
+            let own = given.covariance - Matrix4::identity() * (calibration * calibration);
+            let covariance = if seen.corner { own } else { by_definition(&own) };
+            let found = Found { pixels: UncertainPixels { at: given.at, covariance }, correlation: None };
+            (found, seen.measured.position)
+        });
+        let place = measured.map_or(mark.mark.left, |(found, _)| found.pixels.at.left);
+        let template = Template::cut(pair, left, place).ok_or_else(|| {
             Fault::new("a mark outside the left image", file).on_line(mark.mark.line).remedy("move the mark inside")
         })?;
-        Ok(Located {
-            pair,
-            mark: mark.clone(),
-            corner: seen.corner,
-            found: Found { pixels: UncertainPixels { at: given.at, covariance }, correlation: None },
-            point: measured.position,
-            template,
-        })
+        let corner = seen.is_some_and(|seen| seen.corner);
+        Ok(Located { pair, mark: mark.clone(), corner, measured, template })
     }
 }
 
@@ -142,7 +155,7 @@ fn by_definition(own: &Matrix4<f64>) -> Matrix4<f64> {
     covariance
 }
 
-/// The marks by features, in the order of names; a corner comes before other marks of its feature.
+/// The marks by features, in the order of names; of one feature corners come first, and marks without a match last.
 fn by_feature(located: Vec<Located>) -> Vec<Marked> {
     let mut features: Vec<Marked> = Vec::new();
     for mark in located {
@@ -151,7 +164,9 @@ fn by_feature(located: Vec<Located>) -> Vec<Marked> {
             None => features.push(Marked { id: mark.mark.mark.id.clone(), marks: vec![mark] }),
         }
     }
-    features.iter_mut().for_each(|feature| feature.marks.sort_by_key(|mark| (!mark.corner, mark.pair)));
+    features
+        .iter_mut()
+        .for_each(|feature| feature.marks.sort_by_key(|mark| (!mark.corner, mark.measured.is_none(), mark.pair)));
     features.sort_by(|a, b| natural(&a.id, &b.id));
     features
 }

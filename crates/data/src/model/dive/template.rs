@@ -34,6 +34,7 @@ impl Template {
     /// The expected appearance in the left image of a pair at `there_from_here`, at the position `start`.
     ///
     /// `here` is the feature in the camera of the template. Its surface is taken as parallel to the template's image.
+    /// `None` if it is not in view, or is seen from behind: a surface does not show its mirror image.
     pub(super) fn expected(
         &self,
         rig: &StereoRig,
@@ -50,9 +51,37 @@ impl Template {
         let across = (seen(STEP, 0.0, depth)? - seen(-STEP, 0.0, depth)?) / (2.0 * STEP);
         let down = (seen(0.0, STEP, depth)? - seen(0.0, -STEP, depth)?) / (2.0 * STEP);
         let shape = Matrix2::from_columns(&[across, down]);
+        if shape.determinant() <= 0.0 {
+            return None;
+        }
         let deeper = seen(0.0, 0.0, 1.01 * depth)? - seen(0.0, 0.0, depth)?;
         // Without parallax depth moves nothing, and any direction serves.
         let along = (shape.try_inverse()? * deeper).try_normalize(1e-9).unwrap_or_else(Vector2::x);
         Some(Expected { place: self.place, start, shape, along })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::adjust::tests::rig;
+    use nalgebra::Vector3;
+
+    /// A surface that is turned by more than a quarter shows its back.
+    #[test]
+    fn a_surface_is_not_seen_from_behind() {
+        let rig = rig(0.2);
+        let [u, v] = rig.left().principal();
+        let at = Pixel { u, v };
+        let [width, height] = rig.left().size().map(|side| side as usize);
+        let template = Template::cut(0, &Image::new(width, height, vec![0.0; width * height]).unwrap(), at).unwrap();
+        let here = Point::<Camera>::new(0.0, 0.0, 2.0);
+        for (turn, seen) in [(0.0, true), (1.0, true), (2.2, false), (3.1, false)] {
+            // About the vertical through the feature.
+            let there_from_here = Transform::<Camera, Camera>::exp(&[0.0, turn, 0.0, 0.0, 0.0, 0.0].into());
+            let centre = there_from_here * here;
+            let moved = Transform::new(there_from_here.rotation(), Vector3::new(0.0, 0.0, 2.0) - centre.coords);
+            assert_eq!(template.expected(&rig, &here, &moved, at).is_some(), seen, "{turn}");
+        }
     }
 }
