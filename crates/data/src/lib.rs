@@ -31,5 +31,5 @@ pub mod trajectory;
 
 pub use model::{
     CalibrationSigma, DiveMark, DiveModel, DivePoint, HandModel, HandPoint, Mark, ModelByHand, ModelFromDive, Picture,
-    Proposal, Proposer,
+    Proposal, Proposer, SimulatedOperator,
 };

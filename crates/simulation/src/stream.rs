@@ -58,6 +58,8 @@ pub enum Purpose {
     Mismatches,
     /// Errors of the ends of edges.
     Edges,
+    /// Marks of an operator.
+    Marks,
 }
 
 /// A stream of random numbers, a function of (seed, dive, frame, purpose) alone.

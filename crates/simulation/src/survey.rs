@@ -51,7 +51,7 @@ fn survey_object(
         .points
         .iter()
         .zip(&body.points)
-        .map(|(plan, corner)| Mark { id: &plan.id, at: corner.at, normal: Some(corner.normal) })
+        .map(|(plan, corner)| Mark { id: &plan.id, at: corner.at, normal: Some(corner.normal), given: None })
         .collect();
     survey_marks(&plan.id, base, &marks, errors, stream)
 }
@@ -62,6 +62,8 @@ pub(crate) struct Mark<'a> {
     pub(crate) at: Vector3<f64>,
     /// Outward normal of the side from which the point is visible.
     pub(crate) normal: Option<Vector3<f64>>,
+    /// The point of a given model, instead of a measurement with a random error.
+    pub(crate) given: Option<&'a ModelPoint>,
 }
 
 /// An object as surveyed, and the true pose of its surveyed points.
@@ -73,19 +75,34 @@ pub(crate) fn survey_marks(
     stream: &mut Stream,
 ) -> (SiteObject, Transform<World, Object>) {
     let truth: Vec<Vector3<f64>> = marks.iter().map(|mark| mark.at).collect();
-    // The model is measured on the object itself, with an independent error of each point.
-    let measured: Vec<Point<World>> = truth.iter().map(|p| Point::from(p + stream.normal3(errors.model))).collect();
+    // The model is measured on the object itself, with an independent error of each point. A given model has a frame of
+    // its own, in which the measurement takes place.
+    let measured: Vec<Point<World>> = marks
+        .iter()
+        .map(|mark| match mark.given {
+            Some(point) => Point::from(point.at.coords),
+            None => Point::from(mark.at + stream.normal3(errors.model)),
+        })
+        .collect();
     let [p1, p2, p3] = base.map(|k| measured[k]);
     let object_from_world =
         triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; sites are checked").inverse();
+    let given = marks.iter().any(|mark| mark.given.is_some());
+    let start = if given {
+        let [p1, p2, p3] = base.map(|k| Point::from(truth[k]));
+        triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; sites are checked")
+    } else {
+        object_from_world.inverse()
+    };
+    let turn = start.inverse().rotation();
     let points: Vec<ModelPoint> = marks
         .iter()
         .zip(&measured)
         .map(|(mark, at)| ModelPoint {
             id: mark.id.to_owned(),
             at: Point::from((object_from_world * *at).coords.map(micrometres)),
-            sigma: errors.model,
-            normal: mark.normal.map(|normal| (object_from_world.rotation() * normal).map(micrometres).normalize()),
+            sigma: mark.given.map_or(errors.model, |point| point.sigma),
+            normal: mark.normal.map(|normal| (turn * normal).map(micrometres).normalize()),
         })
         .collect();
     let base_in_world = surveyed_base(base.map(|k| truth[k]), base.map(|k| points[k].at), errors, stream);
@@ -100,7 +117,6 @@ pub(crate) fn survey_marks(
         edges: Vec::new(),
         interest: Vec::new(),
     };
-    let start = object_from_world.inverse();
     let world_from_object = best_fit(start, object.points.iter().map(|p| p.at).zip(truth));
     (object, world_from_object)
 }

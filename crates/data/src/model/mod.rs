@@ -8,5 +8,5 @@ mod marks;
 
 pub use adjust::CalibrationSigma;
 pub use by_hand::{HandModel, HandPoint, ModelByHand};
-pub use dive::{DiveMark, DiveModel, DivePoint, ModelFromDive, Picture, Proposal, Proposer};
+pub use dive::{DiveMark, DiveModel, DivePoint, ModelFromDive, Picture, Proposal, Proposer, SimulatedOperator};
 pub use marks::Mark;

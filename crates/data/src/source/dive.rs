@@ -1,6 +1,6 @@
 //! Simulated dives with vehicle, lamps and water.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
 use seafix_component::{Component, Fault, Settings};
@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::readings;
 use crate::{
+    dataset::sha256,
     ports::CalibratedPort,
     sensor_buffer::SensorBuffer,
     sequence::{Sequence, Source, Truth},
@@ -39,7 +40,8 @@ impl Source for Dive {
         let settings = mission.settings();
         let name = format!("dive over {}, seed {seed}, c = {} 1/m", settings.site, settings.water.c());
         let sensor_buffer = readings::sensor_buffer(&mission);
-        Ok(Box::new(Dived { mission, sensor_buffer, name }))
+        let models = self.0.model_files(folder)?;
+        Ok(Box::new(Dived { mission, sensor_buffer, name, models }))
     }
 
     fn may_have_readings(&self) -> bool {
@@ -51,6 +53,8 @@ struct Dived {
     mission: PlannedMission,
     sensor_buffer: SensorBuffer,
     name: String,
+    /// The files of given models, by the names that the settings give them.
+    models: Vec<(String, PathBuf)>,
 }
 
 impl Sequence for Dived {
@@ -132,6 +136,6 @@ impl Sequence for Dived {
     }
 
     fn inputs(&self) -> Result<Vec<(String, String)>, Fault> {
-        Ok(Vec::new())
+        self.models.iter().map(|(name, file)| Ok((name.clone(), sha256(file)?))).collect()
     }
 }

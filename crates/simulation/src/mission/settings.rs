@@ -1,6 +1,6 @@
 //! The settings of a mission.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use seafix_component::{Fault, Settings, in_range};
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,11 @@ pub struct Mission {
     pub prior_attitude_deg: f64,
     /// Standard deviation of each coordinate of a model point (m), from 0 to 0.05.
     pub model_sigma: f64,
+    /// Files of object models that methods receive instead of surveyed ones, such as those of `seafix model`: sites whose
+    /// objects and points have the ids of the simulated ones. A folder stands for its `*.toml` files. An object keeps the
+    /// points that its model has.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub models: Vec<String>,
     /// Fraction of the straight edges of the objects that the site lists, from 0 to 1.
     pub model_edges: f64,
     /// Standard deviation of each surveyed world coordinate of a base point (m), from 0 to 1.
@@ -100,6 +105,7 @@ impl Default for Mission {
             prior_position: 0.1,
             prior_attitude_deg: 0.5,
             model_sigma: 0.001,
+            models: Vec::new(),
             model_edges: 1.0,
             survey_sigma: 0.01,
             clearance: 0.3,
@@ -158,8 +164,40 @@ impl Mission {
         self.faults.iter().enumerate().try_for_each(|(k, fault)| fault.check(k))
     }
 
-    /// Loads the site; a relative path starts at `folder`.
+    /// The files of the given models with their names in the settings; a relative path starts at `folder`, and a folder
+    /// stands for its `*.toml` files.
+    ///
+    /// # Errors
+    /// A folder that cannot be read, or without such files.
+    pub fn model_files(&self, folder: &Path) -> Result<Vec<(String, PathBuf)>, Vec<Fault>> {
+        let mut files = Vec::new();
+        for name in &self.models {
+            let path = folder.join(name);
+            if !path.is_dir() {
+                files.push((name.clone(), path));
+                continue;
+            }
+            let fault = |what: &str| vec![Fault::new(what, &path).remedy("give a folder with sites, NAME.toml")];
+            let entries =
+                path.read_dir().map_err(|error| fault(&format!("cannot read the folder of models ({error})")))?;
+            let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+            let mut names: Vec<String> = names.filter(|name| name.ends_with(".toml")).collect();
+            if names.is_empty() {
+                return Err(fault("a folder without models"));
+            }
+            names.sort_unstable();
+            files.extend(names.into_iter().map(|file| (format!("{name}/{file}"), path.join(file))));
+        }
+        Ok(files)
+    }
+
+    /// Loads the site with its given models; a relative path starts at `folder`.
     pub(super) fn site_plan(&self, folder: &Path) -> Result<SitePlan, Vec<Fault>> {
+        let files: Vec<PathBuf> = self.model_files(folder)?.into_iter().map(|(_, path)| path).collect();
+        self.site_without_models(folder)?.with_models(&files)
+    }
+
+    fn site_without_models(&self, folder: &Path) -> Result<SitePlan, Vec<Fault>> {
         if let Some(plan) = built_in(&self.site) {
             return Ok(plan);
         }

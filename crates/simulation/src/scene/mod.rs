@@ -88,6 +88,7 @@ impl Scene {
                     id: &p.id,
                     at: (before * p.at).coords,
                     normal: p.normal.map(|normal| before.rotation() * normal),
+                    given: plan.given(&object.id).and_then(|given| given.points.iter().find(|own| own.id == p.id)),
                 })
                 .collect();
             let mut stream = Stream::new(seed, 0, number, Purpose::Survey);

@@ -76,6 +76,7 @@ impl RandomSite {
         let material = |name: &str, albedo, texture| MaterialPlan { name: name.to_owned(), albedo, texture };
         let name = format!("random-{}", self.number);
         SitePlan {
+            given: Vec::new(),
             site: Site { name: name.clone(), frame: 0, objects, warnings: Vec::new() },
             geometry: Geometry {
                 format: GEOMETRY_FORMAT.to_owned(),

@@ -13,21 +13,21 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Model {
-    /// The left image, or with --marks or --propose the folder of a dive: a data set.
+    /// The left image, or with --marks, --propose or --true-marks the folder of a dive: a data set.
     #[arg(value_name = "LEFT or DIVE")]
     pub(super) left: PathBuf,
     /// The right image.
-    #[arg(required_unless_present_any = ["marks", "propose"], conflicts_with_all = ["marks", "propose"])]
+    #[arg(required_unless_present_any = ["marks", "propose", "true_marks"], conflicts_with_all = ["marks", "propose", "true_marks"])]
     pub(super) right: Option<PathBuf>,
     /// The stereo rig: a dataset.toml, of which only the rig and `bits` are read.
-    #[arg(long, value_name = "DATASET.toml", required_unless_present_any = ["marks", "propose"], conflicts_with_all = ["marks", "propose"])]
+    #[arg(long, value_name = "DATASET.toml", required_unless_present_any = ["marks", "propose", "true_marks"], conflicts_with_all = ["marks", "propose", "true_marks"])]
     pub(super) rig: Option<PathBuf>,
     /// The marks (px): lines id,left_u,left_v,right_u,right_v below that header; empty right coordinates are estimated.
-    #[arg(long, value_name = "CLICKS.csv", required_unless_present_any = ["marks", "propose"], conflicts_with_all = ["marks", "propose"])]
+    #[arg(long, value_name = "CLICKS.csv", required_unless_present_any = ["marks", "propose", "true_marks"], conflicts_with_all = ["marks", "propose", "true_marks"])]
     pub(super) points: Option<PathBuf>,
     /// The marks in pairs of a dive: lines stamp_ns,id,left_u,left_v,right_u,right_v below that header. One mark of a
     /// feature in any one pair suffices.
-    #[arg(long, value_name = "MARKS.csv", conflicts_with = "propose")]
+    #[arg(long, value_name = "MARKS.csv", conflicts_with_all = ["propose", "true_marks"])]
     pub(super) marks: Option<PathBuf>,
     #[command(flatten)]
     pub(super) dive: DiveArguments,

@@ -32,6 +32,13 @@ pub(super) struct DiveArguments {
     /// Propose this number of features, with marks in their best pairs; --out is then the table of marks.
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub(super) propose: Option<u32>,
+    /// Write the marks of a simulated operator with this error (px), for studies: the points of the object --id that the
+    /// truth of the data set shows; --out is then the table of marks.
+    #[arg(long, value_name = "PX", conflicts_with = "propose")]
+    pub(super) true_marks: Option<f64>,
+    /// The seed of --true-marks.
+    #[arg(long, default_value_t = 1, value_name = "SEED", requires = "true_marks")]
+    pub(super) marks_seed: u64,
     /// Write a page with the best views of each point, or with the proposals, to this file.
     #[arg(long, value_name = "PAGE.html")]
     pub(super) page: Option<PathBuf>,

@@ -6,6 +6,7 @@ mod dive_arguments;
 mod page;
 mod pair;
 mod propose;
+mod true_marks;
 
 use seafix::Pipeline;
 use seafix_data::ModelByHand;
@@ -41,6 +42,9 @@ impl Model {
         let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
         let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
         let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };
+        if let Some(error) = self.dive.true_marks {
+            return true_marks::execute(self, error);
+        }
         if let Some(count) = self.dive.propose {
             return propose::execute(self, count as usize, &front_end);
         }

@@ -55,8 +55,8 @@ const LITTLE_PARALLAX: f64 = 0.035;
 const SIDE: f64 = std::f64::consts::FRAC_PI_4;
 
 impl Finish<'_> {
-    /// The model; `unread` are the faults of pairs that could not be read.
-    pub(super) fn model(&self, unread: Vec<Fault>) -> Result<DiveModel, Fault> {
+    /// The model; `warnings` are those of its search.
+    pub(super) fn model(&self, mut warnings: Vec<Fault>) -> Result<DiveModel, Fault> {
         let Settled { adjustment, pairs, features, excess, .. } = self.settled;
         if features.len() < 3 {
             return Err(Fault::new("fewer than three points remain", self.file)
@@ -101,7 +101,6 @@ impl Finish<'_> {
             interest: Vec::new(),
         };
         let site = Site { name: self.by_hand.object.clone(), frame: 0, objects: vec![object], warnings: Vec::new() };
-        let mut warnings = unread;
         warnings.extend(self.warnings(&made));
         let disagreements = adjustment.disagreements(excess).map_err(undetermined)?;
         let of_motions = adjustment.disagreement_of_motions().map_err(undetermined)?;
@@ -253,7 +252,7 @@ impl Finish<'_> {
             if self.marked[index].marks[0].measured.is_none() {
                 return "its mark has no match in the right image, and no corner of other pairs lies on its line of sight";
             }
-            "no pair with enough other points shows it"
+            "nothing connects the pair of its mark with those of the others"
         };
         let gone = (0..self.marked.len()).filter(|index| self.settled.features.binary_search(index).is_err());
         gone.map(|index| (self.marked[index].id.clone(), reason(index).to_owned())).collect()

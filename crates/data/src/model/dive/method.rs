@@ -71,7 +71,8 @@ struct Progress<'a> {
     /// Whether the position of each feature is known.
     known: Vec<bool>,
     finder: Finder<'a>,
-    unread: Vec<Fault>,
+    /// Pairs that cannot be read, and marks that nothing connects.
+    warnings: Vec<Fault>,
 }
 
 impl ModelFromDive<'_> {
@@ -141,7 +142,7 @@ impl ModelFromDive<'_> {
             pictures: self.pictures,
             file,
         }
-        .model(state.unread)
+        .model(state.warnings)
         .map_err(|fault| vec![fault])
     }
 }
@@ -179,7 +180,7 @@ impl<'a> Progress<'a> {
         }
         let known = vec![false; marked.len()];
         let features = features.collect();
-        let mut state = Self { trail, scene, features, gathered, known, finder, unread };
+        let mut state = Self { trail, scene, features, gathered, known, finder, warnings: unread };
         state.place(marked);
         state
     }
@@ -204,7 +205,7 @@ impl<'a> Progress<'a> {
         for round in 1.. {
             self.place(marked);
             let (found, unread) = self.gather(dataset);
-            self.unread.extend(unread);
+            self.warnings.extend(unread);
             let settled = self.settle(dataset, file)?;
             let located = self.relocate(dataset, &mut tried);
             if (found == 0 && located == 0) || round >= ROUNDS {
@@ -342,8 +343,11 @@ impl<'a> Progress<'a> {
         self.settle(dataset, file)
     }
 
-    /// The adjustment, if it connects all marked features.
-    fn complete(&self, settled: Settled<'a>, marked: &[Marked], file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
+    /// The adjustment, with the faults of the marks that nothing connects with it.
+    ///
+    /// # Errors
+    /// These faults, if they are as many as the other features: then it is open which ones are the object.
+    fn complete(&mut self, settled: Settled<'a>, marked: &[Marked], file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
         let measured = |feature: &Marked| feature.marks[0].measured.is_some();
         let apart = marked.iter().enumerate().filter(|(index, feature)| !self.known[*index] && measured(feature));
         let faults: Vec<Fault> = apart
@@ -359,6 +363,10 @@ impl<'a> Progress<'a> {
                     .remedy("mark three features of the others in this pair as well")
             })
             .collect();
-        if faults.is_empty() { Ok(settled) } else { Err(faults) }
+        if 2 * faults.len() >= marked.len() {
+            return Err(faults);
+        }
+        self.warnings.extend(faults);
+        Ok(settled)
     }
 }
