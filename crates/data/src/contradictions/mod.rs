@@ -1,6 +1,8 @@
 //! Contradictions between poses, images, rig and site, and the known mistakes that explain them.
 
 mod evidence;
+#[cfg(test)]
+mod margins;
 mod pixels;
 mod poses;
 mod trajectories;

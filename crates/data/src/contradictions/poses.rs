@@ -97,24 +97,10 @@ pub(crate) fn poses_faults(
 /// The fault of measured depths that differ from those of the site at the true poses: a focal length or a baseline that
 /// is off. `pairs` are the true pose and the matches of a pair each.
 pub(crate) fn scale_fault(view: &View<'_>, pairs: &[(Pose, Vec<StereoPixels>)], file: &Path) -> Option<Fault> {
-    /// The maximum distance (px) of a match from the projection of its point.
-    const NEAR: f64 = 3.0;
     /// The minimum number of points, and the minimum error.
     const FEW: usize = 8;
     const LARGE: f64 = 0.03;
-    let mut ratios = Vec::new();
-    for (pose, seen) in pairs {
-        let camera_from_world = pose.inverse();
-        for point in view.objects.iter().flatten() {
-            let point = camera_from_world * *point;
-            let Some(pixel) = view.rig.left().project(&point).filter(|_| point.coords.z < MAX_DEPTH) else { continue };
-            let mut near = seen.iter().filter(|seen| seen.left.distance(&pixel) < NEAR);
-            let (Some(only), None) = (near.next(), near.next()) else { continue };
-            let measured = view.rig.triangulate(&UncertainPixels::independent(*only, 1.0));
-            ratios.extend(measured.ok().map(|measured| measured.point.coords.z / point.coords.z));
-        }
-    }
-    ratios.sort_by(f64::total_cmp);
+    let ratios = distance_ratios(view, pairs);
     let at = |part: usize| ratios.get(ratios.len() * part / 4).copied();
     let (low, middle, high) = (at(1)?, at(2)?, at(3)?);
     // Hidden points and wrong matches scatter the ratios; an error of the rig moves them together.
@@ -129,6 +115,26 @@ pub(crate) fn scale_fault(view: &View<'_>, pairs: &[(Pose, Vec<StereoPixels>)], 
         let fault = Fault::new("measured distances that differ from the site's", file).value(value);
         fault.remedy("the baseline or the focal length is off, or the survey: calibrate again, in water")
     })
+}
+
+/// The ratios of measured and predicted depths of the points with one match near their projection, in order.
+pub(super) fn distance_ratios(view: &View<'_>, pairs: &[(Pose, Vec<StereoPixels>)]) -> Vec<f64> {
+    /// The maximum distance (px) of a match from the projection of its point.
+    const NEAR: f64 = 3.0;
+    let mut ratios = Vec::new();
+    for (pose, seen) in pairs {
+        let camera_from_world = pose.inverse();
+        for point in view.objects.iter().flatten() {
+            let point = camera_from_world * *point;
+            let Some(pixel) = view.rig.left().project(&point).filter(|_| point.coords.z < MAX_DEPTH) else { continue };
+            let mut near = seen.iter().filter(|seen| seen.left.distance(&pixel) < NEAR);
+            let (Some(only), None) = (near.next(), near.next()) else { continue };
+            let measured = view.rig.triangulate(&UncertainPixels::independent(*only, 1.0));
+            ratios.extend(measured.ok().map(|measured| measured.point.coords.z / point.coords.z));
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    ratios
 }
 
 /// At most [`JUDGED`] of the items, evenly spread.

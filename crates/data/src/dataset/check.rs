@@ -80,7 +80,8 @@ impl Dataset {
 /// The contradictions between the poses, the images, the rig and the site of a data set.
 pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
     let file = dataset.folder.join("dataset.toml");
-    let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
+    // More pairs than for a swap: feature points are few among matches.
+    let step = dataset.frames.len().div_ceil(ASKED).max(1);
     let (mut seen, mut mosaics, mut inspected) = (Vec::new(), Vec::new(), Vec::new());
     for (index, frame) in dataset.frames.iter().enumerate().step_by(step) {
         let Ok((left, right)) = dataset.pair(frame) else { continue };
@@ -160,7 +161,7 @@ impl IdenticalImages {
 
 /// The number of frames for the swap check.
 pub const INSPECTED_PAIRS: usize = 3;
-/// The number of pairs for the estimate of the right camera's rotation.
+/// The number of pairs for the estimate of the right camera's rotation, and for comparisons with poses.
 const ASKED: usize = 8;
 
 /// The fault of exchanged left and right images, by a swap check on three frames over the complete data set.
