@@ -9,6 +9,8 @@ use seafix_geometry::{Camera, StereoPixels, Transform, UncertainPixels, World};
 
 use super::poses::View;
 
+type Pose = Transform<World, Camera>;
+
 /// The matches of one pair: its index, and each match with its depth (m).
 #[derive(Debug, Clone)]
 pub(crate) struct MeasuredPair {
@@ -42,8 +44,8 @@ impl MeasuredPair {
 pub(crate) fn confirmed(
     view: &View<'_>,
     measured: &[MeasuredPair],
-    poses: &[Option<Transform<World, Camera>>],
-    undo: &dyn Fn(&Transform<World, Camera>) -> Transform<World, Camera>,
+    poses: &[Option<Pose>],
+    undo: &dyn Fn(&Pose) -> Pose,
     reach: f64,
 ) -> f64 {
     let of = |measured: &MeasuredPair| {
@@ -54,7 +56,7 @@ pub(crate) fn confirmed(
 }
 
 /// The number of points of a pair with a match at one displacement of at most `reach` px.
-fn confirmed_in(view: &View<'_>, measured: &MeasuredPair, pose: &Transform<World, Camera>, reach: f64) -> usize {
+fn confirmed_in(view: &View<'_>, measured: &MeasuredPair, pose: &Pose, reach: f64) -> usize {
     let camera_from_world = pose.inverse();
     // Displacements in cells of twice the distance, with the number of points in each; the middle one is about zero.
     let cell = |off: f64| (off / (2.0 * NEAR)).round() as i64;

@@ -15,6 +15,9 @@ use super::poses::{Mistake, mistakes};
 
 type Placed = Transform<World, Camera>;
 
+/// The difference of an estimate from the reference.
+type Measure<'a> = &'a dyn Fn(&[Placed]) -> Option<f64>;
+
 /// The maximum number of compared motions.
 const COMPARED: usize = 200;
 /// The number of motions in a row that a trajectory is divided into: longer ones than noise, shorter ones than drift.
@@ -35,7 +38,7 @@ pub fn trajectory_fault(reference: &[Pose], estimate: &[Pose], has_attitude: boo
         poses.iter().map(|pose| Transform::new(rotation(pose), pose.position)).collect()
     };
     let (reference, estimate) = (placed(reference), placed(estimate));
-    let measures: [&dyn Fn(&[Placed]) -> Option<f64>; 2] =
+    let measures: [Measure<'_>; 2] =
         [&|other| motions_apart(&reference, other, has_attitude), &|other| positions_apart(&reference, other)];
     for measure in measures {
         let Some(given) = measure(&estimate).filter(|given| *given > LARGE) else { continue };
