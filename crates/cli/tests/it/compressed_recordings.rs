@@ -65,8 +65,8 @@ fn a_bomb_and_a_piece_are_refused_and_the_piece_is_recovered() {
     fs::write(folder.path().join("bomb.mcap.zstd"), packed(&bomb)).unwrap();
     let said = check(&folder, "bomb.mcap.zstd", 1);
     assert!(said.contains("exceeds a limit") && said.contains("`zstd -d` it"), "{said}");
-    let whole = packed(&fs::read(folder.path().join("bag.mcap")).unwrap());
-    fs::write(folder.path().join("cut.mcap.zstd"), &whole[..whole.len() * 3 / 4]).unwrap();
+    let complete = packed(&fs::read(folder.path().join("bag.mcap")).unwrap());
+    fs::write(folder.path().join("cut.mcap.zstd"), &complete[..complete.len() * 3 / 4]).unwrap();
     let said = check(&folder, "cut.mcap.zstd", 1);
     assert!(said.contains("is damaged: zstd: ") && said.contains("seafix recover"), "{said}");
     let saved = ended_with(0, program().current_dir(folder.path()).args(["recover", "cut.mcap.zstd"])).out;
