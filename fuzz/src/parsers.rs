@@ -5,18 +5,26 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use seafix::{Pipeline, Rig};
 use seafix_component::{Choice, Marker, Ownership, read_text};
 use seafix_data::{
+    ModelByHand,
     dataset::{Cameras, Dataset},
     source::{SOURCES, check_recording},
     trajectory::Trajectory,
 };
 use seafix_experiment::{Options, Plan, Replay, Silent, check_run, merge};
-use seafix_io::{ImageLimits, image::declared_size, read_image};
+use seafix_io::{
+    ImageLimits,
+    calibration::{self, Given},
+    image::declared_size,
+    read_image,
+};
 use seafix_log::{Reader, Recording, recover};
 use seafix_navigation::{PoseGraph, Recognition};
 use seafix_referencing::{Site, TargetKind, problem_file};
 use seafix_simulation::scene::SitePlan;
+use seafix_vision::Image;
 
 /// A parser with its corpus.
 #[derive(Debug, Clone, Copy)]
@@ -70,6 +78,7 @@ fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
 
 /// All parsers, sorted by name.
 pub const PARSERS: &[Parser] = &[
+    Parser { name: "calibration", file: "a.yaml", parse: foreign_calibration },
     Parser { name: "dataset", file: "dataset.toml", parse: check_dataset },
     Parser { name: "dataset-frames", file: "frames.csv", parse: check_dataset },
     Parser { name: "dataset-visibility", file: "visibility.csv", parse: check_dataset },
@@ -83,10 +92,12 @@ pub const PARSERS: &[Parser] = &[
     Parser { name: "log", file: "a.mcap", parse: log },
     Parser { name: "manifest", file: "manifest.json", parse: manifest },
     Parser { name: "marker", file: ".seafix-run", parse: marker },
+    Parser { name: "marks", file: "marks.csv", parse: marks },
     Parser { name: "piece", file: "pieces/000000/seal.json", parse: manifest },
     Parser { name: "pose-graph", file: "a.pose-graph", parse: pose_graph },
     Parser { name: "problem", file: "a.json", parse: problem },
     Parser { name: "recording", file: "a.mcap", parse: recording },
+    Parser { name: "recording-folder", file: "metadata.yaml", parse: recording_folder },
     Parser { name: "recover", file: "a.mcap", parse: recovered },
     Parser { name: "site", file: "a.site.toml", parse: site },
     Parser { name: "trajectory", file: "a.tum", parse: trajectory },
@@ -94,6 +105,26 @@ pub const PARSERS: &[Parser] = &[
 
 fn limits() -> ImageLimits {
     ImageLimits { pixels: 1 << 20, bytes: 16 << 20 }
+}
+
+/// Any calibration of another program, alone and beside its partner. The end of its name decides whether it is YAML.
+fn foreign_calibration(folder: &Path) {
+    let given = Given { size: Some([64, 48]), unit: 1.0 };
+    let yaml = folder.join("a.yaml");
+    let text = folder.join("a.txt");
+    if fs::copy(&yaml, &text).is_err() {
+        return;
+    }
+    let beside = |name: &str| folder.join(name);
+    for files in [
+        vec![yaml.clone()],
+        vec![yaml, beside("ros.yaml")],
+        vec![text.clone()],
+        vec![text.clone(), beside("rigs.txt")],
+        vec![beside("cameras.txt"), text],
+    ] {
+        let _ = calibration::read(&files, given);
+    }
 }
 
 fn check_dataset(folder: &Path) {
@@ -151,6 +182,24 @@ fn marker(folder: &Path) {
     }
 }
 
+fn marks(folder: &Path) {
+    const SIZE: [usize; 2] = [8, 6];
+    let file = folder.join("marks.csv");
+    let image = |turn: usize| {
+        let pixels = (0..SIZE[0] * SIZE[1]).map(|k| ((k * 37 + turn) % 256) as f32 / 255.0).collect();
+        Image::new(SIZE[0], SIZE[1], pixels)
+    };
+    if let (Ok(left), Ok(right)) = (image(0), image(11))
+        && let Ok(rig) = Rig::from_file(folder)
+        && let Ok(front_end) = Pipeline::default().front_end()
+        && let Ok(text) = read_text(&file)
+    {
+        let object = "marked".to_owned();
+        let by_hand = ModelByHand { front_end: &front_end, reach: 4.0, mark_sigma: 1.0, object, base: None };
+        let _ = by_hand.model([&left, &right], &rig.stereo, &text, &file);
+    }
+}
+
 fn pose_graph(folder: &Path) {
     let path = folder.join("a.pose-graph");
     if let Ok(text) = read_text(&path) {
@@ -179,6 +228,10 @@ fn recording(folder: &Path) {
     if let Some(sequence) = source {
         (0..sequence.frames().min(3)).for_each(|index| drop(sequence.sensor_frame(index)));
     }
+}
+
+fn recording_folder(folder: &Path) {
+    let _ = check_recording(folder, limits());
 }
 
 fn recovered(folder: &Path) {

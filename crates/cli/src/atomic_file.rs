@@ -27,7 +27,14 @@ pub(crate) struct AtomicFile<'a> {
 }
 
 /// Writes a new file.
+///
+/// # Errors
+/// A file that exists: the commands that write by this function replace nothing.
 pub(crate) fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Failure> {
+    if fs::symlink_metadata(path).is_ok() {
+        let fault = Fault::new("the output file exists", path);
+        return Err(Failure::new(OUTPUT, fault.remedy("name a new file with --out, or move this one away")));
+    }
     AtomicFile::begin(path, Replacing { overwrite: false }, &[])?.finish(content)
 }
 

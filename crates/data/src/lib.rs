@@ -29,6 +29,7 @@ mod sequence;
 pub mod source;
 pub mod trajectory;
 
+pub use contradictions::trajectory_fault;
 pub use model::{
     CalibrationSigma, DiveMark, DiveModel, DivePoint, HandModel, HandPoint, Mark, ModelByHand, ModelFromDive, Picture,
     Proposal, Proposer, SimulatedOperator,

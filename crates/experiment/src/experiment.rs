@@ -472,6 +472,10 @@ fn another_kind(path: &Path) -> Option<Fault> {
             format!("`seafix replay` runs a log again; a recording of ROS 2 needs an experiment file with {source}");
         return Some(fault.value("an MCAP file").remedy(remedy));
     }
+    if start.starts_with(b"\x28\xb5\x2f\xfd") {
+        let remedy = format!("a compressed recording of ROS 2 needs an experiment file with {source}");
+        return Some(fault.value("a file compressed with zstd").remedy(remedy));
+    }
     let bag = start.starts_with(b"SQLite format 3") || start.starts_with(b"#ROSBAG");
     bag.then(|| fault.value(looks_like(&start)).remedy(format!("then write an experiment file with {source}")))
 }

@@ -72,6 +72,7 @@ mod recording;
 mod recover;
 mod topic;
 mod unchanged;
+mod unpacked;
 mod view;
 mod write;
 

@@ -17,6 +17,7 @@ use crate::{
     parse::parse_record,
     read::looks_like,
     topic,
+    unpacked::{Unpacked, unpacked_message},
 };
 
 /// A channel of a recording: its topic, and what its messages are said to be.
@@ -57,6 +58,8 @@ type Chunk = Arc<Vec<Vec<u8>>>;
 /// In memory are the places of the messages and one chunk.
 pub struct Recording {
     path: PathBuf,
+    /// The content of a compressed file; `None` where the file itself is read.
+    unpacked: Option<Mutex<File>>,
     size: u64,
     topics: Vec<Topic>,
     entries: Vec<Entry>,
@@ -78,8 +81,7 @@ impl Recording {
     /// [`LogError`] when it is no MCAP file, cut off, damaged, or claims more than it can hold.
     pub fn open(path: &Path, wanted: impl Fn(&Topic) -> bool) -> Result<Self, LogError> {
         let io = |source| LogError::Io { doing: "read", path: path.to_owned(), source, remedy: "is the name right?" };
-        let file = File::open(path).map_err(io)?;
-        let size = file.metadata().map_err(io)?.len();
+        let Unpacked { file, size, temporary, lost } = Unpacked::open(path)?;
         let mut input = BufReader::new(file);
         let mut start = Vec::new();
         input.by_ref().take(16).read_to_end(&mut start).map_err(io)?;
@@ -101,10 +103,15 @@ impl Recording {
             is_protected: true,
             recovered: None,
         };
-        walk.through(&mut input)?;
+        let damaged = |what| LogError::Damaged { path: path.to_owned(), what };
+        walk.through(&mut input).map_err(|error| lost.clone().map_or(error, damaged))?;
+        if let Some(what) = lost {
+            return Err(damaged(what));
+        }
         let Walk { topics, entries, is_protected, recovered, .. } = walk;
         let path = path.to_owned();
-        Ok(Self { path, size, topics, entries, is_protected, recovered, last_chunk: Mutex::new(None) })
+        let unpacked = temporary.then(|| Mutex::new(input.into_inner()));
+        Ok(Self { path, unpacked, size, topics, entries, is_protected, recovered, last_chunk: Mutex::new(None) })
     }
 
     /// The file.
@@ -149,10 +156,13 @@ impl Recording {
                 messages
             }
         };
-        messages.get(entry.place as usize).cloned().ok_or_else(|| LogError::Damaged {
-            path: self.path.clone(),
-            what: format!("the record at byte {} changed", entry.offset),
-        })
+        let damaged = |what| LogError::Damaged { path: self.path.clone(), what };
+        let message = messages.get(entry.place as usize).cloned();
+        let message = message.ok_or_else(|| damaged(format!("the record at byte {} changed", entry.offset)))?;
+        match self.topics[entry.topic].encoding.as_str() {
+            "cdr" => unpacked_message(message, self.size).map_err(damaged),
+            _ => Ok(message),
+        }
     }
 
     /// The messages of the record at `offset`: those of a chunk, or one that stands by itself.
@@ -163,17 +173,11 @@ impl Recording {
             source,
             remedy: "is the disk still there?",
         };
-        let mut file = File::open(&self.path).map_err(io)?;
-        file.seek(SeekFrom::Start(offset)).map_err(io)?;
-        let mut head = [0; 9];
-        file.read_exact(&mut head).map_err(io)?;
-        let length = length_of(&head);
-        if length > self.size {
-            let what = format!("the record at byte {offset} changed while it was read");
-            return Err(LogError::Damaged { path: self.path.clone(), what });
+        let (head, body) = match &self.unpacked {
+            Some(file) => record_at(&file.lock().unwrap_or_else(std::sync::PoisonError::into_inner), offset, self.size),
+            None => File::open(&self.path).and_then(|file| record_at(&file, offset, self.size)),
         }
-        let mut body = Vec::new();
-        file.take(length).read_to_end(&mut body).map_err(io)?;
+        .map_err(io)?;
         records_of(&self.path, self.size, offset, &head, &body).map(|records| {
             let data = |record| match record {
                 Record::Message { data, .. } => Some(data.into_owned()),
@@ -182,6 +186,20 @@ impl Recording {
             records.into_iter().filter_map(data).collect()
         })
     }
+}
+
+/// The head and the body of the record at `offset` in a file of `size` bytes.
+fn record_at(mut file: &File, offset: u64, size: u64) -> std::io::Result<([u8; 9], Vec<u8>)> {
+    file.seek(SeekFrom::Start(offset))?;
+    let mut head = [0; 9];
+    file.read_exact(&mut head)?;
+    let length = length_of(&head);
+    if length > size {
+        return Err(std::io::Error::other(format!("the record at byte {offset} changed while it was read")));
+    }
+    let mut body = Vec::new();
+    file.take(length).read_to_end(&mut body)?;
+    Ok((head, body))
 }
 
 fn length_of(head: &[u8; 9]) -> u64 {

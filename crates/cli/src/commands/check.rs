@@ -1,6 +1,9 @@
 //! `seafix check`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::Read as _,
+    path::{Path, PathBuf},
+};
 
 use seafix_component::{Fault, decoded, read_text, undecodable};
 use seafix_data::{
@@ -71,7 +74,8 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) {
     }
     for entry in entries {
         let name = entry.to_string_lossy();
-        let known = [".toml", ".json", ".mcap"].iter().any(|end| name.ends_with(end)) && !name.ends_with(".truth.json");
+        let known = [".toml", ".json", ".mcap", ".mcap.zstd", ".mcap.zst"].iter().any(|end| name.ends_with(end))
+            && !name.ends_with(".truth.json");
         // Links are not followed: they may be circular.
         let is_link = entry.is_symlink();
         match entry.is_dir() {
@@ -112,11 +116,13 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
     if is_recording(path) {
         return recording();
     }
-    if path.extension().is_some_and(|extension| extension == "mcap") {
+    if is_mcap(path) {
         return match log(path) {
             Ok(warning) => Examined { warnings: warning.into_iter().collect(), ..Examined::default() },
             // An intact file without a trial header is a recording.
             Err(LogError::Foreign { .. }) if !is_of_a_trial(path) => recording(),
+            // A compressed recording is read, a compressed log is not.
+            Err(LogError::NotMcap { .. }) if begins_with(path, &[ZSTD]) && !is_of_a_trial(path) => recording(),
             Err(error) => Examined { faults: vec![error.to_string()], ..Examined::default() },
         };
     }
@@ -128,6 +134,24 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
     }
     let (faults, warnings) = read(path, limits);
     Examined { faults: lines(faults), warnings, note: String::new() }
+}
+
+/// The first bytes of MCAP and of Zstandard.
+const MCAP: &[u8] = b"\x89MCAP";
+const ZSTD: &[u8] = b"\x28\xb5\x2f\xfd";
+
+/// Whether a file begins with one of some byte sequences of at most eight bytes.
+fn begins_with(path: &Path, known: &[&[u8]]) -> bool {
+    let mut start = Vec::new();
+    // Reading a pipe would consume its beginning.
+    let file = path.is_file().then(|| std::fs::File::open(path).ok()).flatten();
+    let read = file.is_some_and(|file| file.take(8).read_to_end(&mut start).is_ok());
+    read && known.iter().any(|known| start.starts_with(known))
+}
+
+/// Whether a file is MCAP, by its name or its first bytes; it may be compressed.
+fn is_mcap(path: &Path) -> bool {
+    begins_with(path, &[MCAP, ZSTD]) || path.extension().is_some_and(|extension| extension == "mcap")
 }
 
 /// Reads all frames of a log; the result is a warning for a log that `seafix recover` saved.
@@ -144,7 +168,11 @@ fn log(path: &Path) -> Result<Option<Fault>, LogError> {
 /// Whether an MCAP file has the header of a trial.
 fn is_of_a_trial(path: &Path) -> bool {
     let own = |topic: &seafix_log::Topic| topic.schema == "seafix.v2.TrialHeader";
-    Recording::open(path, |_| false).map_or(true, |recording| recording.topics().iter().any(own))
+    match Recording::open(path, |_| false) {
+        Ok(recording) => recording.topics().iter().any(own),
+        // What is compressed and damaged is more probably a recording.
+        Err(_) => !begins_with(path, &[ZSTD]),
+    }
 }
 
 fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
@@ -161,7 +189,8 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
             Err(fault) => (vec![fault], Vec::new()),
         },
         _ => match read_text(path) {
-            Err(fault) => (vec![fault], Vec::new()),
+            // What is no text may still be a known file at the wrong place.
+            Err(fault) => (Plan::read(path, &[]).err().unwrap_or_else(|| vec![fault]), Vec::new()),
             Ok(text) => match format(&text).as_deref() {
                 Some(format) if format.starts_with("seafix-site/") => match Site::parse(&text, path) {
                     Ok(site) => (Vec::new(), site.warnings),

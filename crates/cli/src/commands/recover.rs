@@ -31,7 +31,8 @@ impl Recover {
         }
         let out = self.out.clone().unwrap_or_else(|| {
             let name = self.log.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-            let name = name.trim_end_matches(".partial").trim_end_matches(".mcap");
+            let name =
+                [".partial", ".zstd", ".zst", ".mcap"].iter().fold(&*name, |name, end| name.trim_end_matches(end));
             self.log.with_file_name(format!("{name}-recovered.mcap"))
         });
         if out.exists() {

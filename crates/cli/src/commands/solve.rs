@@ -164,12 +164,13 @@ fn people(answer: &Answer) -> String {
             ", measured distances {by:.1} ± {sigma:.1} % {longer} than the model's: rig or survey has a scale error"
         );
     }
-    if let Some(why) = &answer.explanation {
-        text += &format!(": {why}; {}", answer.remedy.as_deref().unwrap_or_default());
-    }
-    if let Some(cause) = &answer.diagnosis {
-        text += &format!("; {cause}");
-    }
+    // A known cause has a remedy of its own, which that of the search would contradict.
+    text += &match (&answer.explanation, &answer.diagnosis) {
+        (Some(why), Some(cause)) => format!(": {cause} ({why})"),
+        (Some(why), None) => format!(": {why}; {}", answer.remedy.as_deref().unwrap_or_default()),
+        (None, Some(cause)) => format!("; {cause}"),
+        (None, None) => String::new(),
+    };
     text += &match (&answer.runner_up, answer.margin) {
         (Some(other), Some(margin)) => {
             format!("; score {margin:.1} above the next pose, {}", apart(answer.t_cam_obj.as_ref(), &other.t_cam_obj))

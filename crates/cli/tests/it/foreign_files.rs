@@ -182,6 +182,27 @@ fn positions_without_attitude_give_errors_of_position() {
     }
 }
 
+/// Poses in the notation of TUM that mean something else. Fails if errors are computed without a word.
+#[test]
+fn an_estimate_that_contradicts_the_reference_is_named() {
+    let inverse = |k: usize, ns: u64, place: [f64; 3], [a, b, c, d]: [f64; 4]| {
+        let q = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(d, a, b, c)).inverse();
+        let t = -(q * nalgebra::Vector3::from(place));
+        tum(k, ns, t.into(), [q.i, q.j, q.k, q.w])
+    };
+    let millimetres = |k: usize, ns: u64, place: [f64; 3], turn: [f64; 4]| tum(k, ns, place.map(|x| 1e3 * x), turn);
+    for (folder, part) in
+        [(walk(inverse, ""), "if the inverse is taken"), (walk(millimetres, ""), "if positions are in millimetres")]
+    {
+        let said = angle(&folder).1;
+        assert!(
+            said.contains("warning: poses that contradict the reference in estimate") && said.contains(part),
+            "{said}"
+        );
+    }
+    assert_eq!(angle(&walk(tum, "")).1, "");
+}
+
 #[test]
 fn colmap_s_images_are_a_trajectory() {
     let image = |k: usize, ns: u64, [x, y, z]: [f64; 3], [a, b, c, d]: [f64; 4]| {
@@ -242,6 +263,32 @@ fn inverted_poses_are_named_by_check_and_run() {
     let ran = ended_with(0, program().current_dir(folder.path()).args(["run", ".", "--out", "out"]));
     assert!(ran.error.contains(explained), "{}", ran.error);
     assert!(ran.out.contains("no fix in 5 frames: ") && ran.out.contains("are `"), "{}", ran.out);
+}
+
+/// Poses that put objects in view, but not where the images show them. Fails if only counts in view are compared, which
+/// the vehicle's poses and centimetres pass.
+#[test]
+fn poses_are_compared_with_the_images() {
+    let mounted = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, -std::f64::consts::FRAC_PI_2);
+    for (scale, turn, explained) in [
+        (100.0, nalgebra::UnitQuaternion::identity(), "in 5 if positions are in centimetres"),
+        (1.0, mounted, "if they are poses of the vehicle (body_from_camera is applied)"),
+    ] {
+        let folder = copied();
+        for name in ["prior.tum", "truth.tum"] {
+            edit(&folder, name, |text| {
+                let line = |line: &str| {
+                    let n: Vec<f64> = line.split_whitespace().skip(1).map(|word| word.parse().unwrap()).collect();
+                    let q = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(n[6], n[3], n[4], n[5]));
+                    let (q, stamp) = (q * turn, line.split_whitespace().next().unwrap());
+                    let [x, y, z] = [n[0], n[1], n[2]].map(|length| length * scale);
+                    format!("{stamp} {x} {y} {z} {} {} {} {}\n", q.i, q.j, q.k, q.w)
+                };
+                text.lines().filter(|line| !line.starts_with('#')).map(line).collect()
+            });
+        }
+        checked(&folder, 1, &["poses of the truth", explained]);
+    }
 }
 
 #[test]

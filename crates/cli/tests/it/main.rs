@@ -7,6 +7,7 @@ use std::process::Command;
 mod bad_input;
 mod circles;
 mod cloud;
+mod compressed_recordings;
 mod documentation;
 mod eval;
 mod fixes;

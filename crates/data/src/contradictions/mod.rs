@@ -1,7 +1,13 @@
 //! Contradictions between poses, images, rig and site, and the known mistakes that explain them.
 
+mod evidence;
+#[cfg(test)]
+mod margins;
 mod pixels;
 mod poses;
+mod trajectories;
 
+pub(crate) use evidence::MeasuredPair;
 pub(crate) use pixels::{images_fault, mosaic_fault, residual};
 pub(crate) use poses::{View, poses_faults, scale_fault};
+pub use trajectories::trajectory_fault;

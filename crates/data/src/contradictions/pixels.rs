@@ -74,10 +74,9 @@ fn upside_down(rig: &StereoRig) -> StereoRig {
     StereoRig::new(camera(rig.left()), camera(rig.right()), turned).unwrap_or(*rig)
 }
 
-/// The fault of a Bayer mosaic that was stored as a grey image: the means of the four pixels of its cells differ.
-pub(crate) fn mosaic_fault(image: &Image, file: &Path) -> Option<Fault> {
-    /// Grey images stay below a hundredth, mosaics of grey scenes with the response of a usual sensor above a tenth.
-    const DIFFERENT: f64 = 0.04;
+/// The largest difference of the means of the four pixels of an image's cells, and the smaller one of those of its
+/// diagonals, as parts of the mean; zeros for a black image.
+pub(super) fn cell_difference(image: &Image) -> (f64, f64) {
     let (width, height) = (image.width() / 2 * 2, image.height() / 2 * 2);
     let mut sums = [0.0_f64; 4];
     for v in 0..height {
@@ -86,10 +85,21 @@ pub(crate) fn mosaic_fault(image: &Image, file: &Path) -> Option<Fault> {
         }
     }
     let mean = sums.iter().sum::<f64>() / 4.0;
+    if mean <= 0.0 {
+        return (0.0, 0.0);
+    }
     let spread = (sums.iter().copied().fold(0.0, f64::max) - sums.iter().copied().fold(f64::INFINITY, f64::min)) / mean;
     // Two cells of the mosaic are green: the diagonal ones have one mean.
     let diagonal = ((sums[0] - sums[3]).abs().min((sums[1] - sums[2]).abs())) / mean;
-    (mean > 0.0 && spread > DIFFERENT && diagonal < 0.5 * spread).then(|| {
+    (spread, diagonal)
+}
+
+/// The fault of a Bayer mosaic that was stored as a grey image: the means of the four pixels of its cells differ.
+pub(crate) fn mosaic_fault(image: &Image, file: &Path) -> Option<Fault> {
+    /// Grey images stay below a hundredth, mosaics of grey scenes with the response of a usual sensor above a tenth.
+    const DIFFERENT: f64 = 0.04;
+    let (spread, diagonal) = cell_difference(image);
+    (spread > DIFFERENT && diagonal < 0.5 * spread).then(|| {
         let fault = Fault::new("a Bayer mosaic stored as a grey image", file);
         let fault = fault.value(format!("the four pixels of its cells differ by {:.0} % in the mean", 100.0 * spread));
         fault.remedy("convert it to grey or colour first, for example with OpenCV's COLOR_BayerBG2GRAY")

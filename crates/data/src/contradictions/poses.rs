@@ -3,12 +3,14 @@
 //! A pose is judged by what it predicts: the feature points in view of both cameras. If the given poses put no object in
 //! view, the known mistakes are undone one by one; the one that puts objects in view in most pairs explains them.
 
-use std::path::Path;
+use std::{cmp::Ordering, path::Path};
 
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Object, Point, StereoPixels, StereoRig, Transform, UncertainPixels, World};
 use seafix_referencing::Site;
+
+use super::evidence::{MeasuredPair, confirmed, is_clearly_more, median_depth};
 
 type Pose = Transform<World, Camera>;
 
@@ -16,14 +18,15 @@ type Pose = Transform<World, Camera>;
 pub(crate) struct View<'a> {
     pub(crate) rig: &'a StereoRig,
     pub(crate) body_from_camera: Transform<Body, Camera>,
-    objects: Vec<Vec<Point<World>>>,
+    /// The points of each object with a pose.
+    pub(super) objects: Vec<Vec<Point<World>>>,
 }
 
 /// A mistake, how to undo it, and the remedy.
-struct Mistake {
-    name: String,
-    remedy: &'static str,
-    undo: Box<dyn Fn(&Pose) -> Pose>,
+pub(super) struct Mistake {
+    pub(super) name: String,
+    pub(super) remedy: &'static str,
+    pub(super) undo: Box<dyn Fn(&Pose) -> Pose>,
 }
 
 /// The minimum number of points of an object in view.
@@ -67,18 +70,21 @@ impl<'a> View<'a> {
 }
 
 /// The faults of the prior and of the true poses, each of one pair; `sigma` are the standard deviations (m, rad) of the
-/// prior. The poses of `file` are named as the fault's place.
+/// prior, `measured` the matches of some pairs. The poses of `file` are named as the fault's place.
 pub(crate) fn poses_faults(
     view: &View<'_>,
     priors: &[Option<Pose>],
     truths: &[Option<Pose>],
     sigma: Option<(f64, f64)>,
+    measured: &[MeasuredPair],
     file: &Path,
 ) -> Vec<Fault> {
     let mut faults = Vec::new();
     if !view.objects.is_empty() {
-        for (name, poses) in [("prior", priors), ("truth", truths)] {
-            faults.extend(out_of_view(view, name, &sample(poses.iter().flatten()), file));
+        for (name, poses, sigma) in [("prior", priors, sigma), ("truth", truths, None)] {
+            let images = Images { measured, poses, reach: sigma.map_or(0.0, |sigma| reach(view, measured, sigma)) };
+            let fault = out_of_view(view, name, &sample(poses.iter().flatten()), &images, file);
+            faults.extend(fault.or_else(|| beside(view, name, &images, file)));
         }
     }
     if faults.is_empty() {
@@ -91,24 +97,10 @@ pub(crate) fn poses_faults(
 /// The fault of measured depths that differ from those of the site at the true poses: a focal length or a baseline that
 /// is off. `pairs` are the true pose and the matches of a pair each.
 pub(crate) fn scale_fault(view: &View<'_>, pairs: &[(Pose, Vec<StereoPixels>)], file: &Path) -> Option<Fault> {
-    /// The maximum distance (px) of a match from the projection of its point.
-    const NEAR: f64 = 3.0;
     /// The minimum number of points, and the minimum error.
     const FEW: usize = 8;
     const LARGE: f64 = 0.03;
-    let mut ratios = Vec::new();
-    for (pose, seen) in pairs {
-        let camera_from_world = pose.inverse();
-        for point in view.objects.iter().flatten() {
-            let point = camera_from_world * *point;
-            let Some(pixel) = view.rig.left().project(&point).filter(|_| point.coords.z < MAX_DEPTH) else { continue };
-            let mut near = seen.iter().filter(|seen| seen.left.distance(&pixel) < NEAR);
-            let (Some(only), None) = (near.next(), near.next()) else { continue };
-            let measured = view.rig.triangulate(&UncertainPixels::independent(*only, 1.0));
-            ratios.extend(measured.ok().map(|measured| measured.point.coords.z / point.coords.z));
-        }
-    }
-    ratios.sort_by(f64::total_cmp);
+    let ratios = distance_ratios(view, pairs);
     let at = |part: usize| ratios.get(ratios.len() * part / 4).copied();
     let (low, middle, high) = (at(1)?, at(2)?, at(3)?);
     // Hidden points and wrong matches scatter the ratios; an error of the rig moves them together.
@@ -125,14 +117,72 @@ pub(crate) fn scale_fault(view: &View<'_>, pairs: &[(Pose, Vec<StereoPixels>)], 
     })
 }
 
+/// The ratios of measured and predicted depths of the points with one match near their projection, in order.
+pub(super) fn distance_ratios(view: &View<'_>, pairs: &[(Pose, Vec<StereoPixels>)]) -> Vec<f64> {
+    /// The maximum distance (px) of a match from the projection of its point.
+    const NEAR: f64 = 3.0;
+    let mut ratios = Vec::new();
+    for (pose, seen) in pairs {
+        let camera_from_world = pose.inverse();
+        for point in view.objects.iter().flatten() {
+            let point = camera_from_world * *point;
+            let Some(pixel) = view.rig.left().project(&point).filter(|_| point.coords.z < MAX_DEPTH) else { continue };
+            let mut near = seen.iter().filter(|seen| seen.left.distance(&pixel) < NEAR);
+            let (Some(only), None) = (near.next(), near.next()) else { continue };
+            let measured = view.rig.triangulate(&UncertainPixels::independent(*only, 1.0));
+            ratios.extend(measured.ok().map(|measured| measured.point.coords.z / point.coords.z));
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    ratios
+}
+
 /// At most [`JUDGED`] of the items, evenly spread.
 fn sample<'i, T: Copy + 'i>(items: impl Iterator<Item = &'i T>) -> Vec<T> {
     let all: Vec<T> = items.copied().collect();
     all.iter().step_by(all.len().div_ceil(JUDGED).max(1)).copied().collect()
 }
 
+/// The matches of some pairs, with the poses that are compared with them.
+struct Images<'a> {
+    measured: &'a [MeasuredPair],
+    poses: &'a [Option<Pose>],
+    /// The largest displacement (px) of a prediction by the error of the pose.
+    reach: f64,
+}
+
+impl Images<'_> {
+    fn confirmed(&self, view: &View<'_>, undo: &dyn Fn(&Pose) -> Pose) -> f64 {
+        confirmed(view, self.measured, self.poses, undo, self.reach)
+    }
+
+    /// Whether the images confirm more points if `one` is undone than if `other` is.
+    fn prefer(&self, view: &View<'_>, one: &Mistake, other: &Mistake) -> bool {
+        self.confirmed(view, &*one.undo) > self.confirmed(view, &*other.undo)
+    }
+}
+
+/// The fault of poses that put objects in view where the images do not show them, with the mistake that explains it.
+fn beside(view: &View<'_>, name: &str, images: &Images<'_>, file: &Path) -> Option<Fault> {
+    let given = images.confirmed(view, &|pose| *pose);
+    let all = mistakes(&view.body_from_camera).into_iter();
+    let counts = all.map(|mistake| (images.confirmed(view, &*mistake.undo), mistake));
+    let (count, mistake) = counts.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
+    is_clearly_more(count, given).then(|| {
+        let what = format!("poses of the {name} that contradict the images");
+        let value = format!("matches lie at {given} predicted feature points as given, at {count} {}", mistake.name);
+        Fault::new(what, file).value(value).remedy(mistake.remedy)
+    })
+}
+
+/// The displacement (px) of predictions by three standard deviations (m, rad) of a prior, at the depth of the matches.
+fn reach(view: &View<'_>, measured: &[MeasuredPair], (position, attitude): (f64, f64)) -> f64 {
+    let depth = median_depth(measured).unwrap_or(f64::INFINITY);
+    3.0 * view.rig.mean_focal() * (position / depth).hypot(attitude)
+}
+
 /// The fault of poses that put no object in view, with the mistake that explains them if one does.
-fn out_of_view(view: &View<'_>, name: &str, poses: &[Pose], file: &Path) -> Option<Fault> {
+fn out_of_view(view: &View<'_>, name: &str, poses: &[Pose], images: &Images<'_>, file: &Path) -> Option<Fault> {
     let n = poses.len();
     let given = view.count(poses, &|pose| *pose);
     /// Fewer pairs may lie beside the objects by chance.
@@ -143,8 +193,12 @@ fn out_of_view(view: &View<'_>, name: &str, poses: &[Pose], file: &Path) -> Opti
     }
     let counts =
         mistakes(&view.body_from_camera).into_iter().map(|mistake| (view.count(poses, &*mistake.undo), mistake));
-    // Of equal counts the first, the more usual mistake.
-    let best = counts.reduce(|best, next| if next.0 > best.0 { next } else { best });
+    // Of equal counts the one that the images confirm, else the first, the more usual mistake.
+    let best = counts.reduce(|best, next| match next.0.cmp(&best.0) {
+        Ordering::Greater => next,
+        Ordering::Equal if next.0 > 0 && images.prefer(view, &next.1, &best.1) => next,
+        _ => best,
+    });
     let what = format!("poses of the {name} that put no object in view");
     let fault = Fault::new(what, file);
     // A wrong pose may show an object by chance, in few pairs.
@@ -199,7 +253,7 @@ fn apart(view: &View<'_>, both: &[(Pose, Pose)], sigma: Option<(f64, f64)>, file
 }
 
 /// The known mistakes, the usual ones first.
-fn mistakes(body_from_camera: &Transform<Body, Camera>) -> Vec<Mistake> {
+pub(super) fn mistakes(body_from_camera: &Transform<Body, Camera>) -> Vec<Mistake> {
     let mut all: Vec<Mistake> = Vec::new();
     let mut add = |name: &str, remedy: &'static str, undo: Box<dyn Fn(&Pose) -> Pose>| {
         all.push(Mistake { name: name.to_owned(), remedy, undo });
@@ -314,7 +368,7 @@ mod tests {
         let rig = rig();
         let view = View { rig: &rig, body_from_camera: mounted, objects };
         let wrong: Vec<Option<Pose>> = poses.iter().map(|pose| Some(undo(pose))).collect();
-        let faults = poses_faults(&view, &wrong, &[], None, Path::new("prior.tum"));
+        let faults = poses_faults(&view, &wrong, &[], None, &[], Path::new("prior.tum"));
         faults.first().map(ToString::to_string)
     }
 
@@ -373,7 +427,7 @@ mod tests {
             let moved =
                 |pose: &Pose| Transform::new(pose.rotation(), pose.translation() + Vector3::new(step, 0.0, 0.0));
             let priors: Vec<Option<Pose>> = truth.iter().map(|pose| Some(moved(pose))).collect();
-            poses_faults(&view, &priors, &truths, Some((0.1, 0.01)), Path::new("prior.tum"))
+            poses_faults(&view, &priors, &truths, Some((0.1, 0.01)), &[], Path::new("prior.tum"))
         };
         assert!(faults(0.2).is_empty());
         assert!(

@@ -18,7 +18,7 @@ use seafix_io::{
 };
 
 use super::{contents::Dataset, folder::inside, pairing::SAME_INSTANT_NS};
-use crate::contradictions::{View, images_fault, mosaic_fault, poses_faults, scale_fault};
+use crate::contradictions::{MeasuredPair, View, images_fault, mosaic_fault, poses_faults, scale_fault};
 
 /// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
 /// calibration, and compares every file with its hash if there is one.
@@ -80,6 +80,16 @@ impl Dataset {
 /// The contradictions between the poses, the images, the rig and the site of a data set.
 pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
     let file = dataset.folder.join("dataset.toml");
+    // More pairs than for a swap: feature points are few among matches.
+    let step = dataset.frames.len().div_ceil(ASKED).max(1);
+    let (mut seen, mut mosaics, mut inspected) = (Vec::new(), Vec::new(), Vec::new());
+    for (index, frame) in dataset.frames.iter().enumerate().step_by(step) {
+        let Ok((left, right)) = dataset.pair(frame) else { continue };
+        mosaics.extend(mosaic_fault(&left, &frame.left));
+        let matches = repeated_patterns(&left, &right, &dataset.rig);
+        inspected.push((index, matches.clone()));
+        seen.extend(matches);
+    }
     let mut faults = Vec::new();
     if let Some(site) = &dataset.site {
         let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
@@ -88,20 +98,13 @@ pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
         let sigma = dataset.frames.iter().find_map(|frame| frame.prior).map(|(_, covariance)| {
             (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
         });
-        faults.extend(poses_faults(&view, &priors, &truths, sigma, &file));
-    }
-    let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
-    let (mut seen, mut mosaics, mut posed) = (Vec::new(), Vec::new(), Vec::new());
-    for frame in dataset.frames.iter().step_by(step) {
-        let Ok((left, right)) = dataset.pair(frame) else { continue };
-        mosaics.extend(mosaic_fault(&left, &frame.left));
-        let matches = repeated_patterns(&left, &right, &dataset.rig);
-        posed.extend(frame.truth.map(|truth| (truth, matches.clone())));
-        seen.extend(matches);
+        let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
+        faults.extend(poses_faults(&view, &priors, &truths, sigma, &measured, &file));
     }
     if let Some(site) = dataset.site.as_ref().filter(|_| faults.is_empty()) {
         let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
-        faults.extend(scale_fault(&view, &posed, &file));
+        let posed = inspected.into_iter().filter_map(|(index, seen)| Some((dataset.frames[index].truth?, seen)));
+        faults.extend(scale_fault(&view, &posed.collect::<Vec<_>>(), &file));
     }
     faults.extend(mosaics.into_iter().next());
     faults.extend(images_fault(&seen, &dataset.rig, &file));
@@ -158,7 +161,7 @@ impl IdenticalImages {
 
 /// The number of frames for the swap check.
 pub const INSPECTED_PAIRS: usize = 3;
-/// The number of pairs for the estimate of the right camera's rotation.
+/// The number of pairs for the estimate of the right camera's rotation, and for comparisons with poses.
 const ASKED: usize = 8;
 
 /// The fault of exchanged left and right images, by a swap check on three frames over the complete data set.

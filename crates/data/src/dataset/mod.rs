@@ -23,7 +23,7 @@ pub use check::{
 pub use contents::{Dataset, DatasetFrame};
 pub use kitti::Cameras;
 pub use open::is_one;
-pub use pairing::{SAME_INSTANT_NS, constant_offset, left_out, pairs};
+pub use pairing::{SAME_INSTANT_NS, clock_offset, constant_offset, left_out, pairs};
 pub use png::{grey, write_png};
 pub use write::write;
 

@@ -19,6 +19,7 @@ use super::{
     euroc,
     folder::{inside, is_absent},
     kitti::{self, Cameras},
+    pairing::clock_offset,
     tables, tum,
 };
 use crate::{ports, sensor_buffer::SensorBuffer};
@@ -123,27 +124,6 @@ pub fn is_one(folder: &Path) -> bool {
     folder.join("dataset.toml").exists() || euroc::home(folder).is_some() || kitti::is_one(folder)
 }
 
-/// The middle difference of the pairs' stamps to the nearest pose, in words; `None` without poses or pairs.
-fn clock_offset(frames: &[DatasetFrame], poses: &[tum::Stamped<World, Camera>]) -> Option<String> {
-    let nearest = |stamp: u64| {
-        let after = poses.partition_point(|(time, _)| *time < stamp);
-        let around = &poses[after.saturating_sub(1)..poses.len().min(after + 1)];
-        around.iter().map(|(time, _)| *time as f64 - stamp as f64).min_by(|a, b| a.abs().total_cmp(&b.abs()))
-    };
-    let mut offsets: Vec<f64> = frames.iter().filter_map(|frame| nearest(frame.stamp_ns)).collect();
-    offsets.sort_by(f64::total_cmp);
-    let middle = *offsets.get(offsets.len() / 2)? * 1e-9;
-    let known = match middle.abs().round() as i64 {
-        18 => " (GPS time is 18 s ahead of UTC)",
-        19 => " (TAI is 19 s ahead of GPS time)",
-        37 => " (TAI is 37 s ahead of UTC)",
-        3600..86_400 if (middle.abs() / 900.0).fract() < 0.01 => " (a time zone?)",
-        _ => "",
-    };
-    let side = if middle > 0.0 { "after" } else { "before" };
-    Some(format!("the nearest pose is {:.3} s {side} its pair{known}", middle.abs()))
-}
-
 /// A reader of one description that collects its faults.
 struct Reader<'a> {
     folder: &'a Path,
@@ -230,7 +210,8 @@ impl Reader<'_> {
         ] {
             if given
                 && found == 0
-                && let Some(offset) = clock_offset(&frames, poses)
+                && let Some(offset) =
+                    clock_offset(frames.iter().map(|frame| frame.stamp_ns), poses.iter().map(|pose| pose.0))
             {
                 let what = format!("clocks of pairs and {name} that differ");
                 let fault = Fault::new(what, self.file).on_line(line_of(self.source, &[name]));

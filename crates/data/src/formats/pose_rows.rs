@@ -103,7 +103,8 @@ pub(crate) fn read(lines: &[(usize, &str)], file: &Path, reading: Reading) -> Re
         let text = found.rows.iter().find(|row| row.line == pair[1].line);
         let stamp = text.and_then(|row| row.cells.get(stamp_column(&found.layout))).cloned().unwrap_or_default();
         let fault = Fault::new("a stamp not later than the previous one", file).on_line(pair[1].line).value(stamp);
-        return Err(fault.remedy("sort the lines by time"));
+        let remedy = "sort the lines by time, or keep the first of each stamp: `--sort-stamps` of eval, `sort-stamps` of a data set";
+        return Err(fault.remedy(remedy));
     }
     Ok(PoseRows { rows, warnings, normalised })
 }

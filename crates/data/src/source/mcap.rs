@@ -19,7 +19,7 @@ pub enum LoggedInput {
     Clouds,
 }
 
-/// The stamps of images.
+/// The stamps of images and poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stamps {
@@ -51,7 +51,7 @@ pub struct Mcap {
     pub right_info: String,
     /// The kind of the images, `rectified` or `raw`; `auto` decides by the calibration and by the matches of the images.
     pub images: Views,
-    /// The stamps of the images: `header`, or `log` for the times of recording where a driver sets none.
+    /// The stamps of images and poses: `header`, or `log` for the times of recording where a driver sets none.
     pub stamps: Stamps,
     /// The prior pose: a topic of Odometry, PoseStamped or PoseWithCovarianceStamped, or `tf:FRAME` for the pose of the
     /// camera in that frame; no prior if empty.

@@ -4,6 +4,7 @@ use seafix_component::{Registry, entry};
 use seafix_referencing::Site;
 
 mod bag;
+mod bag_messages;
 mod dataset;
 mod dive;
 mod euroc;

@@ -10,9 +10,9 @@ use seafix_referencing::Site;
 
 use super::{bag::Bag, mcap::Mcap};
 use crate::{
-    contradictions::{View, poses_faults},
+    contradictions::{MeasuredPair, View, poses_faults, scale_fault},
     dataset::{
-        sha256,
+        clock_offset, sha256,
         tum::{Stamped, between},
     },
     sequence::{Sequence, Truth},
@@ -65,7 +65,18 @@ impl Recorded {
         for (name, given, poses) in [("prior", &settings.prior, &prior), ("truth", &settings.truth, &truth)] {
             let lacks = |stamp: u64| between(poses, stamp, settings.gap_ns()).is_none();
             let without = bag.pairs.iter().filter(|(stamp, _)| lacks(*stamp)).count();
-            if !given.is_empty() && without > 0 {
+            let all = bag.pairs.len();
+            let stamps = || bag.pairs.iter().map(|(stamp, _)| *stamp);
+            if !given.is_empty()
+                && without == all
+                && let Some(offset) = clock_offset(stamps(), poses.iter().map(|pose| pose.0))
+            {
+                let fault = Fault::new(format!("clocks of pairs and {name} that differ"), path);
+                let value = format!("{given}: {offset}, in the median of {all} pairs");
+                warnings.push(
+                    fault.value(value).remedy("no pair has a pose: stamp both by one clock, or enlarge `max-gap`"),
+                );
+            } else if !given.is_empty() && without > 0 {
                 let fault = Fault::new(format!("stereo pairs without a {name}"), path);
                 let value = format!("{without} of {}, {given}", bag.pairs.len());
                 warnings.push(fault.value(value).remedy("poses farther apart than `max-gap` are not interpolated"));
@@ -79,7 +90,15 @@ impl Recorded {
         let sigma = covariances.first().map(|covariance: &Covariance6<World, Camera>| {
             (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
         });
-        warnings.extend(poses_faults(&view, &of(&prior), &of(&truth), sigma, path));
+        let inspected = &bag.inspected;
+        let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
+        let (priors, truths) = (of(&prior), of(&truth));
+        let faults = poses_faults(&view, &priors, &truths, sigma, &measured, path);
+        if faults.is_empty() {
+            let posed = inspected.iter().filter_map(|(index, seen)| Some((truths[*index]?, seen.clone())));
+            warnings.extend(scale_fault(&view, &posed.collect::<Vec<_>>(), path));
+        }
+        warnings.extend(faults);
         let (path, gap_ns) = (path.to_owned(), settings.gap_ns());
         Ok(Self { path, bag, gap_ns, site, prior, covariances, truth, warnings })
     }

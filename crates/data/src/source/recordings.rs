@@ -60,8 +60,7 @@ pub(super) fn files(path: &Path) -> Result<Vec<PathBuf>, Fault> {
     }
     let unreadable = |error: std::io::Error| Fault::new(format!("cannot read ({error})"), path);
     let entries = std::fs::read_dir(path).map_err(unreadable)?.filter_map(Result::ok).map(|entry| entry.path());
-    let mut found: Vec<PathBuf> =
-        entries.filter(|file| file.extension().is_some_and(|end| end == "mcap") && file.is_file()).collect();
+    let mut found: Vec<PathBuf> = entries.filter(|file| is_named_mcap(file) && file.is_file()).collect();
     found.sort();
     match found.len() {
         1 => Ok(found),
@@ -95,12 +94,28 @@ fn listed(file: &Path) -> Result<Vec<PathBuf>, Fault> {
         return Err(bad("a file outside the recording's folder", "give paths below the folder").value(outside));
     }
     // Older versions of rosbag2 wrote the folder's own name before that of the file.
+    // A file that was compressed afterwards has a longer name than the listed one.
     let place = |name: &&str| {
         let full = folder.join(name);
         let short = Path::new(name).file_name().map(|name| folder.join(name));
-        if full.exists() { full } else { short.filter(|short| short.exists()).unwrap_or(full) }
+        let candidates = || std::iter::once(&full).chain(&short);
+        let named = |file: &Path, end: &str| {
+            let mut name = file.as_os_str().to_owned();
+            name.push(end);
+            PathBuf::from(name)
+        };
+        let packed = |end: &str| candidates().map(|file| named(file, end)).find(|file| file.exists());
+        let found = candidates().find(|file| file.exists()).cloned();
+        found.or_else(|| packed(".zstd")).or_else(|| packed(".zst")).unwrap_or(full)
     };
     Ok(names.iter().map(place).collect())
+}
+
+/// Whether a file's name is that of an MCAP file, compressed or not.
+fn is_named_mcap(file: &Path) -> bool {
+    file.file_name()
+        .and_then(|name| name.to_str())
+        .is_some_and(|name| [".mcap", ".mcap.zstd", ".mcap.zst"].iter().any(|end| name.ends_with(end)))
 }
 
 impl Recordings {

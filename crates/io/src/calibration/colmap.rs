@@ -13,8 +13,7 @@ use super::{
 use crate::dataset::{CameraNumbers, Model, RigNumbers};
 
 pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fault> {
-    let is_cameras = |source: &&Source| source.text.contains("CAMERA_ID") && source.text.contains("MODEL");
-    let Some(cameras) = sources.iter().find(is_cameras) else { return Ok(None) };
+    let Some(cameras) = sources.iter().find(|source| is_cameras(&source.text)) else { return Ok(None) };
     let Some(rigs) = sources.iter().find(|source| source.text.contains("RIG_ID") || source.file.ends_with("rigs.txt"))
     else {
         let fault = cameras.fault("CAMERA_ID", "cameras without their rig");
@@ -46,6 +45,24 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
     let mut found = Found::new("COLMAP cameras and rigs", numbers);
     found.notes.push(format!("camera {reference} is the left one; lengths are in the unit of the reconstruction"));
     Ok(Some(found))
+}
+
+/// Whether a text is that of COLMAP's cameras, with or without the comment that heads it.
+pub(super) fn is_cameras(text: &str) -> bool {
+    const MODELS: [&str; 9] = [
+        "SIMPLE_PINHOLE",
+        "PINHOLE",
+        "SIMPLE_RADIAL",
+        "RADIAL",
+        "OPENCV",
+        "FULL_OPENCV",
+        "OPENCV_FISHEYE",
+        "SIMPLE_RADIAL_FISHEYE",
+        "RADIAL_FISHEYE",
+    ];
+    let first = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
+    let is_model = first.and_then(|line| line.split_whitespace().nth(1)).is_some_and(|word| MODELS.contains(&word));
+    is_model || text.contains("CAMERA_ID") && text.contains("MODEL")
 }
 
 fn read_cameras(source: &Source) -> Result<BTreeMap<String, CameraNumbers>, Fault> {

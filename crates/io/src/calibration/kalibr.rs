@@ -1,4 +1,4 @@
-//! Kalibr's `camchain.yaml`: `cam0`, `cam1`, with `T_cn_cnm1` = cam1_from_cam0.
+//! Kalibr's `camchain.yaml`: `cam0`, `cam1`, with `T_cn_cnm1` = cam1_from_cam0 or `T_cam_imu` of both.
 
 use seafix_component::Fault;
 use yaml_rust2::Yaml;
@@ -23,16 +23,35 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
             .fault("cam0", "one camera only")
             .remedy("give the camchain of a stereo calibration, with `cam1`"));
     }
-    let pose = source.numbers::<16>("T_cn_cnm1", &other["T_cn_cnm1"])?;
-    let turn = Matrix3::new(pose[0], pose[1], pose[2], pose[4], pose[5], pose[6], pose[8], pose[9], pose[10]);
-    let step = Vector3::new(pose[3], pose[7], pose[11]) * given.unit;
+    let (turn, step) = pose(source, &content["cam0"], other)?;
     let numbers = RigNumbers {
-        right_from_left: rows(&rotation(source, "T_cn_cnm1", &turn)?, &step),
+        right_from_left: rows(&turn, &(step * given.unit)),
         rectified: false,
         left: camera(source, "cam0", &content["cam0"])?,
         right: camera(source, "cam1", other)?,
     };
     Ok(Some(Found::new("Kalibr camchain", numbers)))
+}
+
+/// The rotation and the translation of cam1_from_cam0: `T_cn_cnm1`, or by way of the IMU, `T_cam_imu` of both cameras.
+fn pose(source: &Source, left: &Yaml, right: &Yaml) -> Result<(Matrix3<f64>, Vector3<f64>), Fault> {
+    let of = |key: &str, value: &Yaml| {
+        let n = source.numbers::<16>(key, value)?;
+        let turn = Matrix3::new(n[0], n[1], n[2], n[4], n[5], n[6], n[8], n[9], n[10]);
+        Ok::<_, Fault>((rotation(source, key, &turn)?, Vector3::new(n[3], n[7], n[11])))
+    };
+    if !right["T_cn_cnm1"].is_badvalue() {
+        return of("T_cn_cnm1", &right["T_cn_cnm1"]);
+    }
+    let [from_left, from_right] = [left, right].map(|camera| &camera["T_cam_imu"]);
+    if from_left.is_badvalue() || from_right.is_badvalue() {
+        let fault = source.fault("cam1", "no pose of the second camera");
+        return Err(fault.remedy("give `T_cn_cnm1` of cam1 (cam1_from_cam0), or `T_cam_imu` of both cameras"));
+    }
+    let ((left_turn, left_step), (right_turn, right_step)) =
+        (of("T_cam_imu", from_left)?, of("T_cam_imu", from_right)?);
+    let turn = right_turn * left_turn.transpose();
+    Ok((turn, right_step - turn * left_step))
 }
 
 fn camera(source: &Source, name: &str, camera: &Yaml) -> Result<CameraNumbers, Fault> {

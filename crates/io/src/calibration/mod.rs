@@ -97,12 +97,19 @@ fn partner(file: &Path) -> Option<PathBuf> {
 }
 
 fn checked(found: Found, file: &Path) -> Result<Calibration, Fault> {
-    let Found { numbers, format, notes } = found;
+    let Found { numbers, format, mut notes } = found;
     let invalid = |(path, message): (Vec<&'static str>, String)| {
         let (what, remedy) = message.split_once("; ").unwrap_or((&message, "correct the calibration"));
         Fault::new(what, file).value(path.join(".")).remedy(remedy)
     };
     let rig = numbers.build().map_err(invalid)?;
+    // The centre of the left camera in the right camera's frame; a positive x puts the right camera on the left.
+    let step = rig.right_from_left().translation();
+    if step.x > 0.5 * step.norm() {
+        notes.push(
+            "the right camera is to the left of the left one: exchange the files unless this is intended".to_owned(),
+        );
+    }
     Ok(Calibration { numbers, rig, format, notes })
 }
 
@@ -115,24 +122,25 @@ pub fn is_foreign(file: &Path) -> bool {
 pub fn is_calibration(file: &Path) -> bool {
     is_foreign(file)
         && read_text(file).is_ok_and(|text| {
-            [
-                "cam0",
-                "camera_matrix",
-                "opencv_storage",
-                "%YAML",
-                "camera_model",
-                "distortion_model",
-                "<calibration",
-                "<sensors",
-                "CAMERA_ID",
-                "fc_left",
-                "RotationOfCamera2",
-                "PoseCamera2",
-                "P_rect_00",
-                "P0:",
-            ]
-            .iter()
-            .any(|word| text.contains(word))
+            colmap::is_cameras(&text)
+                || [
+                    "cam0",
+                    "camera_matrix",
+                    "opencv_storage",
+                    "%YAML",
+                    "camera_model",
+                    "distortion_model",
+                    "<calibration",
+                    "<sensors",
+                    "CAMERA_ID",
+                    "fc_left",
+                    "RotationOfCamera2",
+                    "PoseCamera2",
+                    "P_rect_00",
+                    "P0:",
+                ]
+                .iter()
+                .any(|word| text.contains(word))
         })
 }
 

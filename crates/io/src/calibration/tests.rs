@@ -87,6 +87,30 @@ fn kalibr_s_camchain() {
     );
 }
 
+/// A camchain of cameras and IMU may have no `T_cn_cnm1`. Fails if that is required, or if the poses are chained wrongly.
+#[test]
+fn kalibr_s_cameras_are_related_by_the_imu() {
+    let body = Rotation3::from_scaled_axis(Vector3::new(0.3, 0.5, -0.2)).into_inner();
+    let place = Vector3::new(0.1, -0.4, 0.2);
+    let key = |r: &Matrix3<f64>, t: &Vector3<f64>| {
+        let rows: String =
+            (0..3).map(|i| format!("  - [{}]\n", list(&[r[(i, 0)], r[(i, 1)], r[(i, 2)], t[i]]))).collect();
+        format!("  T_cam_imu:\n{rows}  - [0.0, 0.0, 0.0, 1.0]\n")
+    };
+    let text = kalibr("radtan", &D);
+    let (before, after) = text.split_once("  T_cn_cnm1:\n").unwrap();
+    let rest = after.split_once("0.0, 1.0]\n").unwrap().1;
+    let without = format!("{before}{rest}");
+    assert!(
+        found(&[("camchain.yaml", without)], Given::default())
+            .unwrap_err()
+            .starts_with("no pose of the second camera in")
+    );
+    let right = key(&(turn() * body), &(turn() * place + step()));
+    let text = format!("{before}{right}{rest}").replacen("cam0:\n", &format!("cam0:\n{}", key(&body, &place)), 1);
+    same(&[("camchain.yaml", text)], Given::default(), "Kalibr camchain", 1e-12);
+}
+
 fn matrix_yaml(name: &str, rows: usize, numbers: &[f64]) -> String {
     format!("{name}:\n  rows: {rows}\n  cols: {}\n  data: [{}]\n", numbers.len() / rows, list(numbers))
 }
@@ -232,6 +256,11 @@ fn colmap_s_cameras_and_rigs() {
         1e-12,
     );
     assert!(found(&[("cameras.txt", cameras.to_owned())], Given::default()).unwrap_err().contains("give rigs.txt too"));
+    // The comment may be missing, and the cameras exchanged.
+    let bare: String = cameras.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect();
+    let rigs = "1 2 CAMERA 7 CAMERA 9 1 1 0 0 0 0.25 0 0\n".to_owned();
+    let other = found(&[("cameras.txt", bare), ("rigs.txt", rigs)], Given::default()).unwrap();
+    assert!(other.notes.iter().any(|note| note.contains("exchange the files")), "{:?}", other.notes);
 }
 
 #[test]

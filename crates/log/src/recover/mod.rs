@@ -5,8 +5,7 @@ mod recovered;
 mod summary;
 
 use std::{
-    fs::File,
-    io::{BufReader, Read},
+    io::{BufReader, Read, Seek as _, SeekFrom},
     path::Path,
 };
 
@@ -17,6 +16,7 @@ use crate::{
     error::LogError,
     parse::parse_record,
     read::looks_like,
+    unpacked::Unpacked,
 };
 use output::Output;
 pub use recovered::Recovered;
@@ -35,21 +35,23 @@ use summary::Summary;
 /// be written. Nothing is written then.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovered, LogError> {
     let io = |source| LogError::Io { doing: "read", path: from.to_owned(), source, remedy: "is the name right?" };
-    let file = File::open(from).map_err(io)?;
-    let size = file.metadata().map_err(io)?.len();
+    let Unpacked { mut file, size, lost, .. } = Unpacked::open(from)?;
+    let summary = Summary::read(&file, size);
+    let spare = summary.as_ref().and_then(|summary| summary.spare_header(&file, size));
+    file.seek(SeekFrom::Start(0)).map_err(io)?;
     let mut input = BufReader::new(file);
     let mut start = [0; 8];
     let read = read_up_to(&mut input, &mut start).map_err(io)?;
-    let summary = Summary::read(from, size);
     if start != mcap::MAGIC && summary.is_none() {
         return Err(LogError::NotMcap { path: from.to_owned(), looks_like: looks_like(&start[..read]) });
     }
     let summary = summary.unwrap_or_default();
-    let (places, spare) = (summary.places.clone(), summary.spare_header(from, size));
+    let places = summary.places.clone();
     let mut output = Output::create(to, summary, spare, limit(size))?;
     if start != mcap::MAGIC {
         output.found.lost.push("the first bytes of the file".to_owned());
     }
+    output.found.lost.extend(lost);
     let mut at = 8;
     let mut sum = crc32fast::Hasher::new();
     sum.update(&start);

@@ -4,7 +4,6 @@ use std::{
     collections::{BTreeMap, HashMap},
     fs::File,
     io::{Read as _, Seek as _, SeekFrom},
-    path::Path,
 };
 
 use mcap::records::{self, Record, op};
@@ -35,9 +34,8 @@ pub(super) struct Summary {
 const END: u64 = 9 + 20 + 8;
 
 impl Summary {
-    /// The summary of the file at `path`; `None` if it is damaged or absent.
-    pub(super) fn read(path: &Path, size: u64) -> Option<Self> {
-        let mut file = File::open(path).ok()?;
+    /// The summary of a file of `size` bytes; `None` if it is damaged or absent.
+    pub(super) fn read(mut file: &File, size: u64) -> Option<Self> {
         let mut end = [0; END as usize];
         file.seek(SeekFrom::Start(size.checked_sub(END)?)).ok()?;
         file.read_exact(&mut end).ok()?;
@@ -88,10 +86,9 @@ impl Summary {
     }
 
     /// The spare header of a trial in the last chunk.
-    pub(super) fn spare_header(&self, path: &Path, size: u64) -> Option<TrialHeader> {
+    pub(super) fn spare_header(&self, mut file: &File, size: u64) -> Option<TrialHeader> {
         let own = |id: &u16| self.channels.get(id).is_some_and(|channel| channel.topic == topic::HEADER);
         let (at, place) = self.places.iter().rev().find(|(_, place)| place.opcode == op::CHUNK)?;
-        let mut file = File::open(path).ok()?;
         file.seek(SeekFrom::Start(*at)).ok()?;
         let mut bytes = vec![0; usize::try_from(place.length.min(size)).ok()?];
         file.read_exact(&mut bytes).ok()?;

@@ -9,7 +9,10 @@ use matched::Matched;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use seafix_data::trajectory::{Format, LoggedTrajectory, Trajectory};
+use seafix_data::{
+    trajectory::{Format, LoggedTrajectory, Trajectory},
+    trajectory_fault,
+};
 use seafix_evaluation::trajectory::{
     Alignment, Delta, DriftSegment, Plane, Relation, Summary, ape, drift, drift_of_positions, pairs, path_lengths, rpe,
 };
@@ -210,6 +213,11 @@ impl Eval {
         let delta = self.delta()?;
         let mut matched = self.matched()?;
         let measures = self.measures(&matched)?;
+        if let [0] = matched.stretches[..] {
+            let has_attitude = matched.without_attitude.is_none();
+            let fault = trajectory_fault(&matched.reference, &matched.estimate, has_attitude, self.estimate());
+            fault.iter().for_each(|fault| notify(&format!("warning: {fault}")));
+        }
         let alignment = self.alignment(&matched)?;
         if let Some(alignment) = &alignment {
             matched.estimate.iter_mut().for_each(|pose| *pose = alignment.apply(pose));
