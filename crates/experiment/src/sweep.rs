@@ -210,11 +210,13 @@ pub fn changed<T: Serialize + DeserializeOwned>(
         set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
     }
     table.try_into().map_err(|error: toml::de::Error| {
-        let fault = Fault::in_toml(Path::new(flag), "", &error);
         // The first change after which the settings are wrong.
-        let wrong = (1..settings.len()).find(|&count| changed(full, flag, &settings[..count], example).is_err());
-        let setting = settings.get(wrong.unwrap_or(settings.len()) - 1).filter(|_| fault.value.is_empty());
-        vec![setting.map_or_else(|| fault.clone(), |setting| fault.clone().value(setting))]
+        let earlier = (1..settings.len()).find_map(|count| changed(full, flag, &settings[..count], example).err());
+        earlier.unwrap_or_else(|| {
+            let fault = Fault::in_toml(Path::new(flag), "", &error);
+            let setting = settings.last().filter(|_| fault.value.is_empty());
+            vec![setting.map_or_else(|| fault.clone(), |setting| fault.clone().value(setting))]
+        })
     })
 }
 

@@ -14,16 +14,16 @@ pub(crate) fn built<S, T, E: ToString>(
     build: impl Fn(&S) -> Result<T, E>,
 ) -> Result<(S, T), Failure> {
     let changed = change(settings).map_err(|faults| Failure::faults(USAGE, &faults))?;
-    let what = match build(&changed) {
+    let full = match build(&changed) {
         Ok(made) => return Ok((changed, made)),
         Err(error) => error.to_string(),
     };
-    let is_wrong = |count: usize| change(&settings[..count]).is_ok_and(|changed| build(&changed).is_err());
+    let wrong = |count: usize| change(&settings[..count]).ok().and_then(|changed| build(&changed).err());
     // Without a change the fault is another flag's.
-    match (0..=settings.len()).find(|&count| is_wrong(count)) {
-        Some(count) if count > 0 => {
-            Err(Failure::new(USAGE, Fault::new(what, Path::new("--set")).value(&settings[count - 1])))
+    match (0..=settings.len()).find_map(|count| Some((count, wrong(count)?))) {
+        Some((count, error)) if count > 0 => {
+            Err(Failure::new(USAGE, Fault::new(error.to_string(), Path::new("--set")).value(&settings[count - 1])))
         }
-        _ => Err(Failure::new(USAGE, what)),
+        _ => Err(Failure::new(USAGE, full)),
     }
 }

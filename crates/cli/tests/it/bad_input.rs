@@ -799,9 +799,9 @@ fn a_rejected_change_is_attributed_to_the_flag() {
     let odometry = ["odometry", &name("")].map(str::to_owned);
     let solve = ["solve", problem.to_str().unwrap()].map(str::to_owned);
     let cases: [(&[String], [&str; 2], &str); 6] = [
-        (&cloud, ["detector.sigma=-1", "detector.window=5"], "give a number from 0.3 to 100"),
-        (&cloud, ["detector.sigam=2", "detector.window=5"], "did you mean `sigma`?"),
-        (&cloud, ["matcher=foo", "detector.window=5"], "no matcher is called `foo`"),
+        (&cloud, ["detector.sigma=-1", "detector.k=0.05"], "give a number from 0.3 to 100"),
+        (&cloud, ["detector.sigam=2", "detector.k=0.05"], "did you mean `sigma`?"),
+        (&cloud, ["matcher=foo", "detector.k=0.05"], "no matcher is called `foo`"),
         (&odometry, ["detector.sigma=-1", "window=5"], "give a number from 0.3 to 100"),
         (&solve, ["search.budget=-1", "acceptance.min-points=4"], "not a whole number"),
         (&solve, ["acceptance.max-p-wrong=7", "search.budget=9"], "at most 1"),

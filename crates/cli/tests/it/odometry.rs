@@ -475,10 +475,12 @@ fn a_recording_and_a_log_give_the_trajectory_of_their_images() {
     let images = |pair: usize| ["l", "r"].map(|side| fs::read(walls.path(&format!("{side}{pair}.pgm"))).unwrap());
     let size = SIZE.map(|pixels| pixels as u32);
     recording_of((0..PAIRS).map(images).collect(), size, FOCAL, BASELINE, &walls.path("walls.mcap"));
-    assert_eq!(poses("walls.mcap", &[]), expected);
+    // P makes the rig a rectified one, whose matches are sought along rows: a thousandth of a step is no other motion.
+    let recorded = poses("walls.mcap", &[]);
+    assert!(recorded.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-3 * STEP), "{recorded:?}");
     // Topics are named like in an experiment, and errors name the flag.
     let named = ["left=/cam/left/image_rect/compressed", "right=/cam/right/image_rect/compressed"];
-    assert_eq!(poses("walls.mcap", &["--source", named[0], "--source", named[1]]), expected);
+    assert_eq!(poses("walls.mcap", &["--source", named[0], "--source", named[1]]), recorded);
     for (setting, reported) in [("letf=/a", "did you mean `left`"), ("left=/a", "`/a`"), ("bits=9", "8, 12 or 16")] {
         let mut command = program();
         command.arg("odometry").arg(walls.path("walls.mcap")).args(["--source", setting, "--source", named[1]]);
@@ -493,7 +495,7 @@ fn a_recording_and_a_log_give_the_trajectory_of_their_images() {
     let listing =
         "rosbag2_bagfile_information:\n  storage_identifier: mcap\n  relative_file_paths:\n    - bag_0.mcap\n";
     walls.put("bag/metadata.yaml", listing);
-    assert_eq!(poses("bag", &[]), expected);
+    assert_eq!(poses("bag", &[]), recorded);
     // The log of a run.
     let site = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample/site.toml");
     fs::copy(site, walls.path("site.toml")).unwrap();
