@@ -102,7 +102,6 @@ mod tests {
         holds("docs/commands.md", begin, "<!-- end of commands -->", &crate::reference::markdown(&program));
     }
 
-    /// Seen to fail with a figure of another run in `docs/gallery`.
     #[test]
     fn the_documentation_has_a_gallery_of_the_reports() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

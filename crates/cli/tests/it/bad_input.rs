@@ -781,8 +781,6 @@ fn check_lists_everything_at_once() {
 }
 
 /// A setting that a component rejects is attributed to the change on the command line that made it so.
-///
-/// Seen to fail when the error of a component is passed on as it is, and when the last change is named always.
 #[test]
 fn a_rejected_change_is_attributed_to_the_flag() {
     let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample");

@@ -200,8 +200,6 @@ fn what_cannot_be_is_refused_in_one_line() {
 }
 
 /// The first pair of a recording, of a data set and of a log has the cloud of its two images.
-///
-/// Seen to fail when the pair after the one that is asked for is read.
 #[test]
 fn a_recording_has_the_clouds_of_its_images() {
     let folder = tempfile::tempdir().unwrap();

@@ -459,8 +459,6 @@ fn a_vehicle_that_starts_is_followed_from_where_it_stood() {
 }
 
 /// A recording of ROS 2, the log of a run and a data set with the same images have the same trajectory.
-///
-/// Seen to fail when a recording's rig loses its baseline, and when the log's frames are read in reverse.
 #[test]
 fn a_recording_and_a_log_give_the_trajectory_of_their_images() {
     let walls = Sequence::new();

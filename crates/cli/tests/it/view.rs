@@ -25,8 +25,6 @@ fn log(folder: &Path) -> std::path::PathBuf {
 
 /// The log becomes a recording of the blueprint's application, joined with the blueprint: Rerun applies a blueprint to
 /// its own application only. Nothing is left behind.
-///
-/// Seen to fail when the blueprint is passed beside the log.
 #[test]
 fn the_blueprint_is_applied_to_the_log() {
     let folder = prepared(

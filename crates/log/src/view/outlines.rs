@@ -154,8 +154,6 @@ mod tests {
     use super::*;
 
     /// Every dot is on the contour of its covariance.
-    ///
-    /// Seen to fail with variances in place of standard deviations.
     #[test]
     fn an_ellipsoid_is_a_contour_of_its_covariance() {
         let root = Matrix3::new(0.3, 0.1, 0.0, 0.0, 0.2, 0.05, 0.1, 0.0, 0.1);
@@ -170,8 +168,6 @@ mod tests {
     }
 
     /// A rotation about the vertical axis moves a point sideways, by its distance, and hardly in depth.
-    ///
-    /// Seen to fail with the columns of rotation and translation exchanged.
     #[test]
     fn a_gate_holds_the_error_of_a_prediction() {
         let mut covariance = Matrix6::zeros();

@@ -46,8 +46,6 @@ fn page(folder: &Path) -> String {
 
 /// Methods that tolerate the same are named together, and a lower end that says nothing new is left out; one method
 /// without fixes is named as such.
-///
-/// Seen to fail when every method has a clause of its own.
 #[test]
 fn methods_that_tolerate_the_same_share_a_clause() {
     let folder = tempfile::tempdir().unwrap();
@@ -69,8 +67,6 @@ fn methods_that_tolerate_the_same_share_a_clause() {
 }
 
 /// A question about limits of acceptance has the fixes and the wrong ones at each limit.
-///
-/// Seen to fail when the axis is taken for named cases.
 #[test]
 fn every_limit_of_acceptance_has_its_fixes() {
     let folder = tempfile::tempdir().unwrap();
