@@ -54,9 +54,12 @@ struct Settings {
     acceptance: Acceptance,
 }
 
+/// A search and a solver.
+type Built = (Box<dyn Search>, Box<dyn Solver>);
+
 impl Solve {
     /// The settings with their search and solver.
-    fn settings(&self) -> Result<(Settings, (Box<dyn Search>, Box<dyn Solver>)), Failure> {
+    fn settings(&self) -> Result<(Settings, Built), Failure> {
         let usage = |error| Failure::new(USAGE, error);
         let named = Settings {
             search: SEARCHES.resolve(&Choice::named(&self.search)).map_err(usage)?,
