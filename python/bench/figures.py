@@ -95,8 +95,8 @@ def registration(sf):
             return rotation, b - rotation.apply(a)
 
         calls["SciPy, Rotation.align_vectors with centroids"] = scipy
-    except ImportError:
-        print("SciPy is not installed")
+    except ImportError as error:
+        print(f"no SciPy: {error}")
     try:
         import open3d
 
@@ -104,8 +104,8 @@ def registration(sf):
         pairs = open3d.utility.Vector2iVector(np.column_stack([np.arange(13)] * 2).astype(np.int32))
         estimation = open3d.pipelines.registration.TransformationEstimationPointToPoint()
         calls["Open3D, point to point on prepared clouds"] = lambda: estimation.compute_transformation(*clouds, pairs)
-    except ImportError:
-        print("Open3D is not installed")
+    except ImportError as error:
+        print(f"no Open3D: {error}")
     try:
         import small_gicp
 
@@ -117,8 +117,8 @@ def registration(sf):
         calls["small_gicp, one iteration of ICP on prepared clouds"] = lambda: small_gicp.align(
             *prepared, tree, guess, registration_type="ICP", num_threads=1, max_iterations=1
         )
-    except ImportError:
-        print("small_gicp is not installed")
+    except ImportError as error:
+        print(f"no small_gicp: {error}")
     for name, call in calls.items():
         print(f"13 points, {name}: {1e6 * per_call(call):.2f} µs")
 

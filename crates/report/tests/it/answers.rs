@@ -47,7 +47,7 @@ fn page(folder: &Path) -> String {
 /// Methods that tolerate the same are named together, and a lower end that says nothing new is left out; one method
 /// without fixes is named as such.
 #[test]
-fn methods_that_tolerate_the_same_share_a_clause() {
+fn methods_that_tolerate_the_same_have_one_clause() {
     let folder = tempfile::tempdir().unwrap();
     let question = "How many wrong pairs does each robust method tolerate?";
     let rejected = [("kabsch", [0, 0]), ("horn", [0, 0]), ("triad", [0, 30]), ("umeyama", [30, 30])];
