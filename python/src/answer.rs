@@ -131,6 +131,12 @@ impl Answer {
         self.fix().map(|fix| pair_table(py, &fix.pairs))
     }
 
+    /// ndarray of int, shape (k, 2), or None: the identified pairs (edge, line) of a fix; no rows without edges.
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<i64>>> {
+        self.fix().map(|fix| pair_table(py, &fix.edges))
+    }
+
     /// ndarray, shape (k, 3), or None: the residual ``T @ cloud − model`` of each pair of a fix, object frame (m).
     #[getter]
     fn residuals<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray2<f64>>> {

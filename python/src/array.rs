@@ -11,7 +11,7 @@ use seafix::geometry::{Frame, Transform};
 use crate::invalid::invalid;
 
 /// An argument as an array of doubles: a numpy array of that type itself, else a conversion.
-fn doubles<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+pub(crate) fn doubles<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
         return Ok(array.readonly());
     }
@@ -22,7 +22,8 @@ fn doubles<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArr
     Ok(array.cast_into::<PyArrayDyn<f64>>().map_err(|_| wrong())?.readonly())
 }
 
-fn shape_error(py: Python<'_>, name: &str, shape: &[usize], expected: &str) -> PyErr {
+/// The error of an array of another shape than `expected`, which states it in words.
+pub(crate) fn shape_error(py: Python<'_>, name: &str, shape: &[usize], expected: &str) -> PyErr {
     let sizes: Vec<String> = shape.iter().map(ToString::to_string).collect();
     let comma = if sizes.len() == 1 { "," } else { "" };
     let found = format!("`{name}` has the shape ({}{comma})", sizes.join(", "));
@@ -147,4 +148,13 @@ pub(crate) fn covariance_table<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let rows: Vec<[f64; 9]> = covariances.map(|it| std::array::from_fn(|k| it[(k / 3, k % 3)])).collect();
     PyArray2::from_array(py, &aview2(&rows)).reshape([rows.len(), 3, 3])
+}
+
+/// Pairs of places as a numpy array (n, 2, 3).
+pub(crate) fn end_table<'py>(
+    py: Python<'py>,
+    ends: impl Iterator<Item = [[f64; 3]; 2]>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let rows: Vec<[f64; 6]> = ends.map(|it| std::array::from_fn(|k| it[k / 3][k % 3])).collect();
+    PyArray2::from_array(py, &aview2(&rows)).reshape([rows.len(), 2, 3])
 }

@@ -6,6 +6,7 @@
 mod answer;
 mod array;
 mod choice;
+mod edges;
 mod failure;
 mod image;
 mod interpreter;

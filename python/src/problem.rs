@@ -13,7 +13,8 @@ use seafix::referencing::{
 };
 
 use crate::{
-    array::{covariance_table, covariances, dimensions, index_pairs, rows, table, vector},
+    array::{covariance_table, covariances, dimensions, end_table, index_pairs, rows, table, vector},
+    edges::EdgeArguments,
     interpreter::detached,
     invalid::{in_file, invalid, with_attributes},
     prior::of_problem,
@@ -41,6 +42,17 @@ const TOLERANCE: Tolerance = Tolerance::Sigmas(3.0);
 ///     Pairs (model, cloud), counted from 0; no other pairs are considered.
 /// sigma : float or array_like, shape (m, 3), optional
 ///     Standard deviation of a measured point along each axis (m), in place of `covariances`.
+/// edges : sequence of pairs of ends, or array_like, shape (e, 2, 3), optional
+///     The two ends of each straight edge of the object. An end is a place in the object frame (m), or the index of a
+///     model point, from 0, whose error the edge then has.
+/// lines : array_like, shape (l, 2, 3), optional
+///     Two places on each measured line, camera frame (m), as far apart as it was seen.
+/// line_covariances : array_like, shape (l, 4, 4) or (4, 4), optional
+///     Covariance of four offsets of each line (m²): of the first end along n₁ and n₂, and of the second end along both.
+///     With the unit direction d of the line and the coordinate axis e of the smallest ``abs(d @ e)``, n₁ is
+///     ``e - d * (d @ e)``, normalised, and n₂ = d × n₁. Required with `lines`.
+/// putative_edges : array_like of int, shape (k, 2), optional
+///     Pairs (edge, line), counted from 0; no other pairs of them are considered.
 ///
 /// Raises
 /// ------
@@ -52,6 +64,8 @@ const TOLERANCE: Tolerance = Tolerance::Sigmas(3.0);
 /// -----
 /// With `delta` but neither `covariances` nor `sigma`, the standard deviation is Δ / (3 √2): at that noise nearly all
 /// true pairs agree.
+///
+/// The search ``rigid-consensus`` identifies edges and the solver ``mahalanobis`` uses them; others use points alone.
 ///
 /// References
 /// ----------
@@ -66,7 +80,10 @@ pub(crate) struct Problem {
 #[pymethods]
 impl Problem {
     #[new]
-    #[pyo3(signature = (model, cloud, covariances=None, prior=None, delta=None, putative=None, *, sigma=None))]
+    #[pyo3(signature = (
+        model, cloud, covariances=None, prior=None, delta=None, putative=None, *, sigma=None, edges=None, lines=None,
+        line_covariances=None, putative_edges=None
+    ))]
     #[expect(clippy::too_many_arguments, reason = "they are the parts of a problem, named in Python")]
     fn new(
         py: Python<'_>,
@@ -77,7 +94,12 @@ impl Problem {
         delta: Option<f64>,
         putative: Option<&Bound<'_, PyAny>>,
         sigma: Option<&Bound<'_, PyAny>>,
+        edges: Option<&Bound<'_, PyAny>>,
+        lines: Option<&Bound<'_, PyAny>>,
+        line_covariances: Option<&Bound<'_, PyAny>>,
+        putative_edges: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let edges = EdgeArguments { edges, lines, line_covariances, putative: putative_edges }.parts(py)?;
         let model = rows::<3>(model, "model", "(n, 3)")?;
         let cloud = rows::<3>(cloud, "cloud", "(m, 3)")?;
         let parts = Parts {
@@ -88,7 +110,7 @@ impl Problem {
             delta,
             prior: prior.map(of_problem).transpose()?,
             putative: putative.map(|given| index_pairs(given, "putative")).transpose()?,
-            edges: Default::default(),
+            edges,
         };
         let inner = detached(py, || parts.checked())?.map_err(|fault| {
             let error = pyo3::exceptions::PyValueError::new_err(fault.to_string());
@@ -144,6 +166,19 @@ impl Problem {
         covariance_table(py, self.inner.cloud.iter().map(|point| point.position.covariance))
     }
 
+    /// ndarray, shape (e, 2, 3): the ends of the straight edges, object frame (m).
+    #[getter]
+    fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let edges = self.inner.edges.model.iter();
+        end_table(py, edges.map(|edge| edge.places(&self.inner.model).map(|place| place.coords.into())))
+    }
+
+    /// ndarray, shape (l, 2, 3): two places on each measured line, camera frame (m).
+    #[getter]
+    fn lines<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        end_table(py, self.inner.edges.lines.iter().map(|line| line.ends.map(|end| end.coords.into())))
+    }
+
     /// float or None: the distance tolerance Δ (m); None for three standard deviations of the distances.
     #[getter]
     fn delta(&self) -> Option<f64> {
@@ -156,7 +191,9 @@ impl Problem {
     fn __repr__(&self) -> String {
         let inner = &self.inner;
         let prior = if inner.prior.is_some() { "a prior" } else { "no prior" };
-        format!("Problem({} model points, {} cloud points, {prior})", inner.model.len(), inner.cloud.len())
+        let (edges, lines) = (inner.edges.model.len(), inner.edges.lines.len());
+        let edges = if edges + lines > 0 { format!("{edges} edges, {lines} lines, ") } else { String::new() };
+        format!("Problem({} model points, {} cloud points, {edges}{prior})", inner.model.len(), inner.cloud.len())
     }
 }
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import seafix as sf
 
-from conftest import motion
+from conftest import motion, moved
 
 
 def test_a_fix_has_the_true_pose_and_its_covariance(scene):
@@ -93,6 +93,101 @@ def test_a_problem_from_a_file_answers_as_the_program_prints(scene, tmp_path):
     assert printed["covariance"] == answer.covariance.tolist()
     same = sf.Problem(scene.model, scene.cloud, sigma=scene.sigma, delta=written["delta"])
     np.testing.assert_array_equal(sf.solve(same).object_from_camera, answer.object_from_camera)
+
+
+class Edged:
+    """The object's first three points and four of its edges, measured as lines with clutter before them."""
+
+    def __init__(self, scene):
+        self.ends = [[0, 1], [1, scene.model[2].tolist()], [2, 0], [scene.model[0].tolist(), scene.model[3].tolist()]]
+        self.places = np.array([[scene.model[[0, 1, 2, 0][k]], scene.model[[1, 2, 0, 3][k]]] for k in range(4)])
+        self.arguments = {
+            "model": scene.model[:3],
+            "cloud": scene.cloud[12:15],
+            "sigma": scene.sigma,
+            "prior": sf.BoxPrior(scene.object_from_camera, half=0.1),
+        }
+        seen = [moved(np.linalg.inv(scene.object_from_camera), ends) for ends in self.places]
+        # Micrometres, which a file holds to the last bit.
+        self.lines = np.round([[[2.0, 2.0, 4.0], [2.0, 1.0, 4.5]], *seen], 6)
+        self.covariance = np.eye(4) * 1e-6
+        self.pairs = np.column_stack([np.arange(4), np.arange(1, 5)])
+
+
+@pytest.fixture(scope="module")
+def edged(scene):
+    return Edged(scene)
+
+
+def test_edges_sharpen_a_fix(scene, edged):
+    alone = sf.solve(sf.Problem(**edged.arguments))
+    assert alone.is_fix and alone.edges.shape == (0, 2)
+    problem = sf.Problem(**edged.arguments, edges=edged.ends, lines=edged.lines, line_covariances=edged.covariance)
+    np.testing.assert_array_equal(problem.edges, edged.places)
+    np.testing.assert_array_equal(problem.lines, edged.lines)
+    assert "4 edges, 5 lines" in repr(problem)
+    answer = sf.solve(problem)
+    assert answer.is_fix, answer.explanation
+    np.testing.assert_array_equal(answer.edges, edged.pairs)
+    error = answer.object_from_camera[:3, 3] - scene.object_from_camera[:3, 3]
+    assert np.linalg.norm(error) < 5 * answer.position_sigma
+    assert 5 * answer.position_sigma < alone.position_sigma
+
+
+def test_putative_edges_are_the_only_candidates(edged):
+    noise = {"line_covariances": edged.covariance, "putative_edges": edged.pairs[:3]}
+    answer = sf.solve(sf.Problem(**edged.arguments, edges=edged.places, lines=edged.lines, **noise))
+    np.testing.assert_array_equal(answer.edges, edged.pairs[:3])
+
+
+def test_edges_from_a_file_give_the_same_answer(scene, edged, tmp_path):
+    delta = 3 * 2**0.5 * scene.sigma
+    written = {
+        "format": "coherence-problem/1.1",
+        "id": "edges",
+        "model": edged.arguments["model"].tolist(),
+        "cloud": edged.arguments["cloud"].tolist(),
+        "sigma": scene.sigma,
+        "delta": delta,
+        "edges": edged.ends,
+        "lines": [{"ends": ends, "covariance": edged.covariance.tolist()} for ends in edged.lines.tolist()],
+    }
+    path = tmp_path / "edges.json"
+    path.write_text(json.dumps(written))
+    each = np.tile(edged.covariance, (5, 1, 1))
+    given = {key: edged.arguments[key] for key in ["model", "cloud", "sigma"]}
+    same = sf.Problem(**given, delta=delta, edges=edged.ends, lines=edged.lines, line_covariances=each)
+    for search in ["rigid-consensus", "complete-enumeration"]:
+        loaded, made = (sf.solve(problem, search=search).to_dict() for problem in [sf.Problem.load(path), same])
+        assert {key: loaded[key] for key in loaded if key not in ["id", "file", "time_ms"]} == {
+            key: made[key] for key in made if key not in ["id", "file", "time_ms"]
+        }
+
+
+@pytest.mark.parametrize(
+    ("field", "arguments"),
+    [
+        ("edges", {"edges": [[0, 3]]}),
+        ("edges", {"edges": [[0]]}),
+        ("edges", {"edges": [[0, [1.0, 2.0]]]}),
+        ("edges", {"edges": 3}),
+        ("edges", {"edges": [[[0.0, 0.0, 0.0], [0.001, 0.0, 0.0]]]}),
+        ("edges", {"edges": [[-1, 0]]}),
+        ("lines", {"lines": np.zeros((1, 2, 2))}),
+        ("lines", {"lines": np.zeros((1, 2, 3))}),
+        ("line_covariances", {"line_covariances": None}),
+        ("line_covariances", {"line_covariances": np.zeros((2, 4, 4))}),
+        ("lines", {"line_covariances": -np.eye(4)}),
+        ("putative_edges", {"putative_edges": [[4, 0]]}),
+        ("putative_edges", {"putative_edges": [[0.5, 0]]}),
+    ],
+)
+def test_bad_edges_name_their_field_and_the_remedy(edged, field, arguments):
+    given = {"edges": edged.ends, "lines": edged.lines, "line_covariances": edged.covariance}
+    with pytest.raises(ValueError, match=";") as raised:
+        sf.Problem(**edged.arguments, **{**given, **arguments})
+    assert raised.value.field == field and raised.value.remedy
+    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(

@@ -103,6 +103,25 @@ mod tests {
     }
 
     #[test]
+    fn the_documentation_has_a_gallery_of_the_reports() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let fresh = crate::gallery::markdown(&root.join("reports")).unwrap();
+        assert!(fresh.matches("\n## ").count() > 20, "{fresh}");
+        holds("docs/gallery.md", "<!-- reports: reports/README.md -->\n", "<!-- end of reports -->", &fresh);
+        let figures = crate::gallery::figures(&root.join("reports")).unwrap();
+        for (name, figure) in &figures {
+            let copy = root.join("docs/gallery").join(name);
+            if std::env::var_os("SEAFIX_UPDATE").is_some() {
+                fs::write(&copy, figure).unwrap();
+            }
+            let same = fs::read_to_string(&copy).is_ok_and(|text| text == *figure);
+            assert!(same, "{}: run the tests once with SEAFIX_UPDATE=1", copy.display());
+        }
+        // No figure of a report that is no longer published.
+        assert_eq!(fs::read_dir(root.join("docs/gallery")).unwrap().count(), figures.len());
+    }
+
+    #[test]
     fn the_readme_has_the_published_table() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/virtual-direct");
         let summary = fs::read_to_string(folder.join("summary.txt")).unwrap();

@@ -9,6 +9,8 @@ mod catalogue;
 mod commands;
 mod executor;
 mod exit;
+#[cfg(test)]
+mod gallery;
 mod ply;
 mod publication;
 #[cfg(test)]

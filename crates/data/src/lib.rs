@@ -27,9 +27,12 @@ mod ros;
 mod sensor_buffer;
 mod sequence;
 pub mod source;
+mod stereo_pairs;
 pub mod trajectory;
 
 pub use contradictions::trajectory_fault;
+pub use stereo_pairs::StereoPairs;
+
 pub use model::{
     CalibrationSigma, DiveMark, DiveModel, DivePoint, HandModel, HandPoint, Mark, ModelByHand, ModelFromDive, Picture,
     Proposal, Proposer, SimulatedOperator,

@@ -486,7 +486,7 @@ fn changed(experiment: Experiment, settings: &[String]) -> Result<Experiment, Ve
         return Ok(experiment);
     }
     // Defaults are written out first, so that a setting of a default component can be changed.
-    sweep::changed(&experiment.resolved().unwrap_or(experiment), settings, "pipeline.solver=triad")
+    sweep::changed(&experiment.resolved().unwrap_or(experiment), "--set", settings, "pipeline.solver=triad")
 }
 
 #[cfg(test)]

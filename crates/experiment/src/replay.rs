@@ -71,7 +71,8 @@ impl Replay {
         }
         let logged: Experiment = toml::from_str(&header.configuration)
             .map_err(|error| fault(&format!("its configuration is of another version ({})", error.message())))?;
-        let mut changed: Experiment = sweep::changed(&logged, &self.settings, "pipeline.acceptance.confidence=0.999")?;
+        let mut changed: Experiment =
+            sweep::changed(&logged, "--set", &self.settings, "pipeline.acceptance.confidence=0.999")?;
         if changed.source != logged.source || changed.seed != logged.seed {
             let fault = Fault::new("a change of the logged inputs", Path::new("--set"));
             return Err(vec![fault.remedy("change the pipeline; to change source or seed, run the experiment again")]);

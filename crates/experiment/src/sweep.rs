@@ -190,9 +190,14 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
 ///
 /// # Errors
 /// The invalid setting, with `example` as a valid one.
-pub fn changed<T: Serialize + DeserializeOwned>(full: &T, settings: &[String], example: &str) -> Result<T, Vec<Fault>> {
+pub fn changed<T: Serialize + DeserializeOwned>(
+    full: &T,
+    flag: &str,
+    settings: &[String],
+    example: &str,
+) -> Result<T, Vec<Fault>> {
     let fault = |what: String, setting: &str| {
-        let fault = Fault::new(what, Path::new("--set")).value(setting);
+        let fault = Fault::new(what, Path::new(flag)).value(setting);
         vec![fault.remedy(format!("write key=value, for instance {example}"))]
     };
     let mut table = toml::Table::try_from(full).expect("settings are a table of plain values");
@@ -204,7 +209,15 @@ pub fn changed<T: Serialize + DeserializeOwned>(full: &T, settings: &[String], e
             .unwrap_or_else(|| value.trim().into());
         set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
     }
-    table.try_into().map_err(|error: toml::de::Error| vec![Fault::in_toml(Path::new("--set"), "", &error)])
+    table.try_into().map_err(|error: toml::de::Error| {
+        // The first change after which the settings are wrong.
+        let earlier = (1..settings.len()).find_map(|count| changed(full, flag, &settings[..count], example).err());
+        earlier.unwrap_or_else(|| {
+            let fault = Fault::in_toml(Path::new(flag), "", &error);
+            let setting = settings.last().filter(|_| fault.value.is_empty());
+            vec![setting.map_or_else(|| fault.clone(), |setting| fault.clone().value(setting))]
+        })
+    })
 }
 
 /// Applies `settings` to a pipeline.
@@ -212,7 +225,7 @@ pub fn changed<T: Serialize + DeserializeOwned>(full: &T, settings: &[String], e
 /// # Errors
 /// The invalid setting.
 pub fn changed_pipeline(pipeline: &Pipeline, settings: &[String]) -> Result<Pipeline, Vec<Fault>> {
-    changed(&pipeline.resolved().unwrap_or_else(|_| pipeline.clone()), settings, "detector.sigma=1.5")
+    changed(&pipeline.resolved().unwrap_or_else(|_| pipeline.clone()), "--set", settings, "detector.sigma=1.5")
 }
 
 /// Sets `value` at the dotted path `key`. A component given by its bare name becomes a table first, so that one of its

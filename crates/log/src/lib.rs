@@ -40,7 +40,10 @@
 //! | `/camera/left/annotations`, `/camera/right/annotations` | `foxglove.ImageAnnotations` | key points, candidates, identified points |
 //! | `/tf` | `foxglove.FrameTransforms` | the tree of frames |
 //! | `/cloud`, `/cloud/candidates`, `/cloud/identified` | `foxglove.PointCloud` | coloured by target |
-//! | `/model`, `/scene/model` | `foxglove.PointCloud`, `foxglove.SceneUpdate` | once: the feature points |
+//! | `/model`, `/scene/model` | `foxglove.PointCloud`, `foxglove.SceneUpdate` | once: the feature points; the scene also has the straight edges |
+//! | `/model/edges` | `foxglove.PointCloud` | once: the straight edges, as dots |
+//! | `/cloud/lines`, `/cloud/gates`, `/pose/covariance` | `foxglove.PointCloud` | frames with images: measured lines, gates of the prior (99 %) and the 3σ ellipsoid of the position, as dots |
+//! | `/path/estimate`, `/path/truth` | `foxglove.PointCloud` | frames with images: the vehicle as one dot a frame |
 //! | `/pose/estimate`, `/pose/truth`, `/pose/prior` | `foxglove.PoseInFrame` | the vehicle |
 //!
 //! Attachments are `configuration.toml` and `site.toml`. The metadata record is `run`; a log that [`recover`] made from a

@@ -39,6 +39,16 @@ pub(crate) const CLOUD_IDENTIFIED: &str = "/cloud/identified";
 pub(crate) const SCENE_MODEL: &str = "/scene/model";
 /// The model's points, as a cloud in the site's frame.
 pub(crate) const MODEL: &str = "/model";
+/// The model's straight edges, as dots in the site's frame.
+pub(crate) const MODEL_EDGES: &str = "/model/edges";
+/// The measured lines, as dots.
+pub(crate) const CLOUD_LINES: &str = "/cloud/lines";
+/// The gates of the prior, as dots.
+pub(crate) const CLOUD_GATES: &str = "/cloud/gates";
+/// The ellipsoid of the estimated position, as dots.
+pub(crate) const POSE_COVARIANCE: &str = "/pose/covariance";
+/// The vehicle, as one dot a frame: as estimated and as it really was.
+pub(crate) const POSE_PATHS: [&str; 2] = ["/path/estimate", "/path/truth"];
 /// The vehicle, as estimated.
 pub(crate) const POSE_ESTIMATE: &str = "/pose/estimate";
 /// The vehicle, as it really was.
@@ -90,7 +100,7 @@ pub(crate) type Schema = (&'static str, &'static [u8]);
 pub(crate) type SchemaOf = fn() -> Schema;
 
 /// The topics of which every frame has its own messages, with their schemas: what is copied when logs are joined.
-pub(crate) const OF_FRAMES: [(&str, SchemaOf); 18] = [
+pub(crate) const OF_FRAMES: [(&str, SchemaOf); 23] = [
     (IMAGES[0], foxglove::CompressedImage::schema),
     (IMAGES[1], foxglove::CompressedImage::schema),
     (ANNOTATIONS[0], foxglove::ImageAnnotations::schema),
@@ -102,6 +112,11 @@ pub(crate) const OF_FRAMES: [(&str, SchemaOf); 18] = [
     (CLOUD, foxglove::PointCloud::schema),
     (CLOUD_CANDIDATES, foxglove::PointCloud::schema),
     (CLOUD_IDENTIFIED, foxglove::PointCloud::schema),
+    (CLOUD_LINES, foxglove::PointCloud::schema),
+    (CLOUD_GATES, foxglove::PointCloud::schema),
+    (POSE_COVARIANCE, foxglove::PointCloud::schema),
+    (POSE_PATHS[0], foxglove::PointCloud::schema),
+    (POSE_PATHS[1], foxglove::PointCloud::schema),
     (CANDIDATES, proto::Candidates::schema),
     (RESULT, proto::ReferencingResult::schema),
     (EVALUATION, proto::Evaluation::schema),

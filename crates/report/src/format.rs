@@ -20,7 +20,11 @@ pub(crate) fn placed(key: &str, value: &str) -> String {
 pub(crate) fn short(key: &str) -> &str {
     let kind = [".fixed", ".sigmas"].into_iter().find_map(|kind| key.strip_suffix(kind));
     let key = kind.filter(|key| key.ends_with("tolerance")).unwrap_or(key);
-    key.rsplit('.').next().unwrap_or(key)
+    match key.rsplit('.').next().unwrap_or(key) {
+        // The policy's name of the time between fixes, which is no name of a quantity.
+        "seconds" => "interval",
+        last => last,
+    }
 }
 
 /// The unit of an axis; `None` if it has no known unit.
@@ -30,7 +34,7 @@ pub(crate) fn unit(key: &str) -> Option<&'static str> {
         "distance" | "baseline" | "altitude" | "shift" => Some("m"),
         "attenuation" => Some("1/m"),
         "speed" => Some("m/s"),
-        "seconds" => Some("s"),
+        "interval" => Some("s"),
         "outliers" => Some("%"),
         "sigma-px" | "sigma_px" | "pixel-sigma" => Some("px"),
         _ => None,

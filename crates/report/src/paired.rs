@@ -136,7 +136,7 @@ pub(crate) fn names(run: &Run, members: &[usize]) -> (String, Vec<String>) {
     for (place, axis) in axes(members[0]).iter().enumerate() {
         // Common values form the condition, differing values the names.
         match constant(place) {
-            true => shared.push(format!("{} {}", format::short(&axis.key), axis.value)),
+            true => shared.push(format::placed(&axis.key, &axis.value)),
             false => differing.push(place),
         }
     }

@@ -4,16 +4,18 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
-use seafix::{Pipeline, Rig};
+use seafix::Pipeline;
 use seafix_component::{Choice, Fault};
-use seafix_data::dataset::{are_identical, identical_images_fault, partners_remedy, strangers, swap_fault};
+use seafix_data::dataset::{partners_remedy, strangers, swap_fault};
 use seafix_experiment::changed_pipeline;
 use seafix_geometry::StereoRig;
-use seafix_io::read_image;
 use seafix_vision::{EpipolarCheck, FrontEnd, FrontEndOutput, Image, Keypoint, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
-use super::limits::Limits;
+use super::{
+    cloud_input::{CloudInput, CloudPair},
+    set::built,
+};
 use crate::{
     atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
@@ -23,13 +25,8 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Cloud {
-    /// The left image.
-    left: PathBuf,
-    /// The right image.
-    right: PathBuf,
-    /// The stereo rig: a dataset.toml, of which only the rig and `bits` are read.
-    #[arg(long, value_name = "DATASET.toml")]
-    rig: PathBuf,
+    #[command(flatten)]
+    input: CloudInput,
     /// The detector [default: the pipeline's].
     #[arg(long)]
     detector: Option<String>,
@@ -51,8 +48,6 @@ pub(crate) struct Cloud {
     /// Number of threads; the cloud does not depend on it.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    #[command(flatten)]
-    limits: Limits,
     /// Print one JSON object with all points and the times of the stages.
     #[arg(long)]
     json: bool,
@@ -65,51 +60,40 @@ pub(crate) struct Cloud {
 
 impl Cloud {
     pub(crate) fn execute(&self) -> Ended {
-        let pipeline = self.pipeline()?;
-        let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
-        let input = |fault: Fault| Failure::new(INPUT, fault);
-        let Rig { stereo: rig, bits, file, warning, .. } = Rig::from_file(&self.rig).map_err(input)?;
-        let file = file.unwrap_or_default();
-        let limits = self.limits.of_images();
-        let left = read_image(&self.left, rig.left().size(), bits, limits).map_err(input)?;
-        let right = read_image(&self.right, rig.right().size(), bits, limits).map_err(input)?;
-        if are_identical(&left, &right) {
-            return Err(Failure::new(INPUT, identical_images_fault(&self.left, &self.right)));
-        }
+        let base = self.base()?;
+        let (pipeline, front_end) = built(&self.set, |set| changed_pipeline(&base, set), Pipeline::front_end)?;
+        let CloudPair { images: [left, right], names, rig, rig_file, warnings } = self.input.read()?;
         let sides = Sides::of_images(&left, &right, &rig);
-        if let Some(fault) = swap_fault(sides, &self.left) {
+        if let Some(fault) = swap_fault(sides, &names[0]) {
             return Err(Failure::new(INPUT, fault));
         }
-        let epipolar_check = epipolar_warning(EpipolarCheck::of_images(&left, &right, &rig), &rig, &file);
+        let epipolar_check = epipolar_warning(EpipolarCheck::of_images(&left, &right, &rig), &rig, &rig_file);
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
         let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
-        let warnings: Vec<Fault> = warning
+        let warnings: Vec<Fault> = warnings
             .into_iter()
             .chain(epipolar_check)
-            .chain(self.blind(&look, [&left, &right]))
-            .chain(
-                strangers(sides, &self.left).or_else(|| nothing(&front_end, &look, [&left, &right], &rig, &self.left)),
-            )
+            .chain(blind(&look, &names, [&left, &right]))
+            .chain(strangers(sides, &names[0]).or_else(|| nothing(&front_end, &look, [&left, &right], &rig, &names[0])))
             .collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         if let Some(path) = &self.out {
-            let inputs = [&*self.left, &*self.right, &*self.rig];
-            AtomicFile::begin(path, self.replacing, &inputs)?.finish(ply::ply(&look.cloud, &left))?;
+            AtomicFile::begin(path, self.replacing, &self.input.files())?.finish(ply::ply(&look.cloud, &left))?;
         }
         let pipeline = pipeline.resolved().map_err(|error| Failure::new(USAGE, error))?;
         print(&if self.json {
-            self.machines(&look, &times, &pipeline, &warnings)
+            self.machines(&names, &look, &times, &pipeline, &warnings)
         } else {
             self.people(&look, &times)
         })?;
         Ok(DONE)
     }
 
-    /// The default pipeline with the changes of the command line.
-    fn pipeline(&self) -> Result<Pipeline, Failure> {
+    /// The default pipeline with the components that flags name.
+    fn base(&self) -> Result<Pipeline, Failure> {
         let mut pipeline = Pipeline::default();
         let choose = |choice: &mut Choice, name: &Option<String>| {
             if let Some(name) = name {
@@ -124,7 +108,7 @@ impl Cloud {
         }
         // An unknown name is reported before an error of `--set`.
         pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
-        changed_pipeline(&pipeline, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))
+        Ok(pipeline)
     }
 
     fn make(
@@ -141,20 +125,6 @@ impl Cloud {
         });
         let times = times.collect();
         (look, times)
-    }
-
-    /// A warning for each image without key points.
-    fn blind(&self, look: &FrontEndOutput, images: [&Image; 2]) -> Vec<Fault> {
-        let of = |((file, image), found): ((&PathBuf, &Image), &[Keypoint])| {
-            let (min, max) = image.pixels().iter().fold((f32::MAX, f32::MIN), |(a, b), &p| (a.min(p), b.max(p)));
-            found.is_empty().then(|| {
-                let [width, height] = [image.width(), image.height()];
-                Fault::new("an image without a key point", file)
-                    .value(format!("{width} x {height} px, grey levels from {min} to {max}"))
-                    .remedy("check the image, and lower the threshold of the detector")
-            })
-        };
-        [&self.left, &self.right].into_iter().zip(images).zip(look.keypoints()).filter_map(of).collect()
     }
 
     /// The output for people: counts, and the times of the stages.
@@ -179,15 +149,22 @@ impl Cloud {
     }
 
     /// The output for programs: one JSON object.
-    fn machines(&self, look: &FrontEndOutput, times: &[StageTimes], pipeline: &Pipeline, warnings: &[Fault]) -> String {
+    fn machines(
+        &self,
+        names: &[PathBuf; 2],
+        look: &FrontEndOutput,
+        times: &[StageTimes],
+        pipeline: &Pipeline,
+        warnings: &[Fault],
+    ) -> String {
         let points: Vec<Value> = look.cloud.iter().map(point).collect();
         let times: serde_json::Map<String, Value> = summary(times)
             .into_iter()
             .map(|(stage, [min, median])| (stage.to_owned(), json!({ "min": min, "median": median })))
             .collect();
         let value = json!({
-            "left": name(&self.left),
-            "right": name(&self.right),
+            "left": name(&names[0]),
+            "right": name(&names[1]),
             "keypoints": look.keypoints().map(<[_]>::len),
             "matches": look.matches.len(),
             "points": points,
@@ -207,6 +184,20 @@ impl Cloud {
         });
         value.to_string() + "\n"
     }
+}
+
+/// A warning for each image without key points.
+fn blind(look: &FrontEndOutput, names: &[PathBuf; 2], images: [&Image; 2]) -> Vec<Fault> {
+    let of = |((file, image), found): ((&PathBuf, &Image), &[Keypoint])| {
+        let (min, max) = image.pixels().iter().fold((f32::MAX, f32::MIN), |(a, b), &p| (a.min(p), b.max(p)));
+        found.is_empty().then(|| {
+            let [width, height] = [image.width(), image.height()];
+            Fault::new("an image without a key point", file)
+                .value(format!("{width} x {height} px, grey levels from {min} to {max}"))
+                .remedy("check the image, and lower the threshold of the detector")
+        })
+    };
+    names.iter().zip(images).zip(look.keypoints()).filter_map(of).collect()
 }
 
 /// A warning for a rig that contradicts its images.

@@ -8,6 +8,7 @@ use crate::exit::Ended;
 
 mod check;
 mod cloud;
+mod cloud_input;
 mod compare;
 mod completions;
 mod convert;
@@ -23,12 +24,14 @@ mod merge;
 mod model;
 mod odometry;
 mod pairs;
+mod pairs_of;
 mod publish;
 mod recover;
 mod replay;
 mod report;
 mod run;
 mod schema;
+mod set;
 mod show;
 mod solve;
 mod sweep;
@@ -59,7 +62,7 @@ pub(crate) enum Command {
     Convert(convert::Convert),
     /// Build the model of an object from points marked by hand in one stereo pair, or in pairs of a dive.
     Model(model::Model),
-    /// Estimate the trajectory of a stereo rig through a data set, relative to the first pose.
+    /// Estimate the trajectory of a stereo rig through a data set, a recording or a log, relative to the first pose.
     Odometry(odometry::Odometer),
     /// Generate coherence problems with truth (coherence-problem/1).
     Generate(generate::Generate),

@@ -9,16 +9,16 @@ use std::{
 use clap::Args;
 use rayon::ThreadPoolBuilder;
 use seafix_component::{Choice, Fault};
-use seafix_data::dataset::{
-    Dataset, DatasetFrame, are_identical, identical_images_fault, right_camera_rotation, swapped_at_first, tum,
-};
+use seafix_data::{StereoPairs, dataset::tum};
 use seafix_experiment::changed;
+use seafix_io::ImageLimits;
 use seafix_navigation::{
     Lost, ODOMETRIES, Odometry, OdometryOutcome, OdometryTrajectory, RangeOffset, Segment, StereoPair,
 };
-use seafix_vision::{Image, RightCameraRotation, Threads};
+use seafix_vision::{RightCameraRotation, Threads};
 use serde_json::{Value, json};
 
+use super::{pairs_of::PairsOf, set::built};
 use crate::{
     atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
@@ -27,8 +27,11 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Odometer {
-    /// The folder of a data set; its site and truth are not used.
-    dataset: PathBuf,
+    /// The folder of a data set, a recording of ROS 2 (an MCAP file or a folder of rosbag2) or the log of a trial with
+    /// its images; site and truth are not used.
+    pairs: PathBuf,
+    #[command(flatten)]
+    pairs_of: PairsOf,
     /// Write the poses world_from_camera to this file in TUM's format; the world frame is the first left camera.
     #[arg(long, value_name = "FILE.tum")]
     out: Option<PathBuf>,
@@ -74,13 +77,12 @@ struct Trip {
 impl Odometer {
     pub(crate) fn execute(&self) -> Ended {
         let (odometry, settings) = self.build()?;
-        let mut dataset =
-            Dataset::open_pairs(&self.dataset, self.sort_stamps).map_err(|faults| Failure::faults(INPUT, &faults))?;
-        let odd = dataset.odd_times();
-        dataset.warnings.iter().chain(&odd).for_each(|warning| notify(&format!("warning: {warning}")));
-        if odometry.needs_readings() && !dataset.has_readings() {
+        let mut pairs = self.pairs_of.open(&self.pairs, self.sort_stamps, ImageLimits::default())?;
+        pairs.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
+        if odometry.needs_readings() && !pairs.has_readings() {
             let what = format!("no readings for odometry `{}`", self.odometry);
-            let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
+            let description = pairs.path().join("dataset.toml");
+            let fault = Fault::new(what, if description.exists() { &description } else { pairs.path() });
             let remedy =
                 "name the tables of the Doppler log and the gyro, `doppler = …` and `gyro = …`, or use `stereo`";
             return Err(Failure::new(INPUT, fault.remedy(remedy)));
@@ -90,24 +92,24 @@ impl Odometer {
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
         // An output that cannot be written is reported before the work.
-        let begin = |path| AtomicFile::begin(path, self.replacing, &[&self.dataset]);
+        let begin = |path| AtomicFile::begin(path, self.replacing, &[&self.pairs]);
         let out = self.out.as_deref().map(begin).transpose()?;
-        if let Some(fault) = swapped_at_first(&dataset) {
+        if let Some(fault) = pairs.swapped() {
             return Err(Failure::new(INPUT, fault));
         }
         let right_camera_rotation =
-            if self.keep_rig || odometry.needs_readings() { None } else { right_camera_rotation(&dataset) };
+            if self.keep_rig || odometry.needs_readings() { None } else { pairs.right_camera_rotation() };
         if let Some(found) = &right_camera_rotation {
-            dataset.rig = found.rig;
+            pairs.rig = found.rig;
         }
-        let mut trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+        let mut trip = pool.install(|| self.travel(&*odometry, &pairs))?;
         let range_offset = trip.range_offset;
         if let Some(found) = range_offset.filter(|found| found.corrected) {
             // The first pairs preceded the correction.
-            dataset.rig = dataset.rig.with_range_offset(found.pixels);
-            trip = pool.install(|| self.travel(&*odometry, &dataset))?;
+            pairs.rig = pairs.rig.with_range_offset(found.pixels);
+            trip = pool.install(|| self.travel(&*odometry, &pairs))?;
         }
-        if let Some(fault) = trip.motionless(&dataset.folder) {
+        if let Some(fault) = trip.motionless(pairs.path()) {
             return Err(Failure::new(INPUT, fault));
         }
         let reported = right_camera_rotation.as_ref().map(|found| turned(found).to_string());
@@ -132,39 +134,40 @@ impl Odometer {
         let kept = self.keep_rig && choice.settings.contains_key("correct-range-offset");
         let kept = kept.then(|| "correct-range-offset=false".to_owned());
         let set: Vec<String> = self.set.iter().cloned().chain(kept).collect();
-        let settings = changed(&choice.settings, &set, "detector.features=2000")
-            .map_err(|faults| Failure::faults(USAGE, &faults))?;
-        let choice = ODOMETRIES.resolve(&Choice { settings, ..choice }).map_err(usage)?;
-        Ok((ODOMETRIES.build(&choice).map_err(usage)?, choice))
+        let change = |set: &[String]| changed(&choice.settings, "--set", set, "detector.features=2000");
+        let (_, made) = built(&set, change, |settings| {
+            let choice = ODOMETRIES.resolve(&Choice { settings: settings.clone(), ..choice.clone() })?;
+            ODOMETRIES.build(&choice).map(|odometry| (odometry, choice))
+        })?;
+        Ok(made)
     }
 
     /// Processes all readable pairs.
-    fn travel(&self, odometry: &dyn Odometry, dataset: &Dataset) -> Result<Trip, Failure> {
+    fn travel(&self, odometry: &dyn Odometry, pairs: &StereoPairs) -> Result<Trip, Failure> {
         let threads = if self.threads > 1 { Threads::Pool } else { Threads::One };
-        let mut session = odometry.begin(&dataset.rig, dataset.body_from_camera, threads);
+        let mut session = odometry.begin(&pairs.rig, pairs.body_from_camera, threads);
         let progress = Progress::new();
-        progress.expect(dataset.frames.len());
+        progress.expect(pairs.stamps().len());
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
         let mut message = HashSet::new();
-        let mut before = None;
-        for frame in &dataset.frames {
-            let readings = dataset.readings(before.replace(frame.stamp_ns), frame.stamp_ns);
+        for (index, &stamp_ns) in pairs.stamps().iter().enumerate() {
+            let readings = pairs.readings(index).map_err(|fault| Failure::new(INPUT, fault))?;
             readings.iter().for_each(|reading| session.sense(reading));
-            match stereo_images(dataset, frame) {
+            match pairs.pair(index) {
                 Err(fault) => {
                     let warning = format!("warning: {fault}");
                     if !message.contains(&warning) {
                         notify(&warning);
                         message.insert(warning);
                     }
-                    unread.push((frame.stamp_ns, fault));
+                    unread.push((stamp_ns, fault));
                 }
                 Ok((left, right)) => {
-                    let pair = StereoPair { stamp_ns: frame.stamp_ns, left: &left, right: &right };
+                    let pair = StereoPair { stamp_ns, left: &left, right: &right };
                     let start = Instant::now();
                     session.advance(&pair).map_err(|error| Failure::new(INPUT, error))?;
                     odometry_ms += start.elapsed().as_secs_f64() * 1e3;
-                    given.push(frame.stamp_ns);
+                    given.push(stamp_ns);
                 }
             }
             progress.step("");
@@ -172,7 +175,7 @@ impl Odometer {
         progress.end();
         // A sequence with less than half of its pairs is not evaluated.
         if given.len() < unread.len() {
-            let fault = Fault::new("fewer than half of the stereo pairs can be read", &dataset.folder)
+            let fault = Fault::new("fewer than half of the stereo pairs can be read", pairs.path())
                 .value(format!("{} of {}", given.len(), given.len() + unread.len()))
                 .remedy("restore the images named above, or remove their lines");
             return Err(Failure::new(INPUT, fault));
@@ -204,16 +207,6 @@ fn offset(found: &RangeOffset) -> String {
         "the motion contradicts the rig: its disparities have an offset of {pixels:.2} ± {sigma:.2} px ({windows} windows of \
          key frames), which {done}; calibrate again, since other parameters may be wrong too"
     )
-}
-
-/// The two images of a frame; identical images are an error.
-fn stereo_images(dataset: &Dataset, frame: &DatasetFrame) -> Result<(Image, Image), Fault> {
-    let (left, right) = dataset.pair(frame)?;
-    if are_identical(&left, &right) {
-        Err(identical_images_fault(&frame.left, &frame.right))
-    } else {
-        Ok((left, right))
-    }
 }
 
 impl Trip {

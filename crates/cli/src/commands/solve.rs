@@ -7,12 +7,13 @@ use rayon::prelude::*;
 use seafix_component::{Choice, decoded, undecodable};
 use seafix_experiment::changed;
 use seafix_referencing::{
-    Acceptance, SEARCHES, SOLVERS,
+    Acceptance, SEARCHES, SOLVERS, Search, Solver,
     problem_file::{Answer, Line, Method, Support, solve_file},
 };
 use seafix_simulation::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
+use super::set::built;
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
     terminal::print,
@@ -53,25 +54,28 @@ struct Settings {
     acceptance: Acceptance,
 }
 
+/// A search and a solver.
+type Built = (Box<dyn Search>, Box<dyn Solver>);
+
 impl Solve {
-    fn settings(&self) -> Result<Settings, Failure> {
+    /// The settings with their search and solver.
+    fn settings(&self) -> Result<(Settings, Built), Failure> {
         let usage = |error| Failure::new(USAGE, error);
         let named = Settings {
             search: SEARCHES.resolve(&Choice::named(&self.search)).map_err(usage)?,
             solver: SOLVERS.resolve(&Choice::named(&self.solver)).map_err(usage)?,
             acceptance: Acceptance::default(),
         };
-        let settings: Settings =
-            changed(&named, &self.set, "search.budget=1000000").map_err(|faults| Failure::faults(USAGE, &faults))?;
-        settings.acceptance.check().map_err(|what| Failure::new(USAGE, what))?;
-        Ok(settings)
+        let change = |set: &[String]| changed(&named, "--set", set, "search.budget=1000000");
+        built(&self.set, change, |settings: &Settings| {
+            settings.acceptance.check()?;
+            let search = SEARCHES.build(&settings.search).map_err(|error| error.to_string())?;
+            Ok::<_, String>((search, SOLVERS.build(&settings.solver).map_err(|error| error.to_string())?))
+        })
     }
 
     pub(crate) fn execute(&self) -> Ended {
-        let usage = |error| Failure::new(USAGE, error);
-        let settings = self.settings()?;
-        let search = SEARCHES.build(&settings.search).map_err(usage)?;
-        let solver = SOLVERS.build(&settings.solver).map_err(usage)?;
+        let (settings, (search, solver)) = self.settings()?;
         if solver.needs_pixels() {
             let what = format!("cannot solve with `{}`: it needs pixels and a rig", settings.solver.name);
             return Err(Failure::new(USAGE, format!("{what}; use `mahalanobis`")));

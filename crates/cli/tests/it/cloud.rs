@@ -198,3 +198,30 @@ fn what_cannot_be_is_refused_in_one_line() {
     assert!(refused(&text).contains("an image that cannot be decoded"));
     assert!(refused(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));
 }
+
+/// The first pair of a recording, of a data set and of a log has the cloud of its two images.
+#[test]
+fn a_recording_has_the_clouds_of_its_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("bag.mcap");
+    crate::recordings::sample_recording(&bag);
+    let points = |arguments: &[&str]| {
+        let ended = ended_with(0, program().arg("cloud").args(arguments).arg("--json"));
+        let all: Value = serde_json::from_str(&ended.out).unwrap();
+        all["points"].clone()
+    };
+    let (sample, bag) = (sample(""), bag.to_str().unwrap());
+    let sample = sample.to_str().unwrap();
+    for pair in ["0", "3"] {
+        let of_dataset = points(&[sample, "--pair", pair]);
+        assert!(of_dataset.as_array().unwrap().len() > 8);
+        assert_eq!(points(&[bag, "--pair", pair]), of_dataset);
+    }
+    assert_eq!(points(&[bag]), json(&[])["points"]);
+    let refused = |arguments: &[&str], code: i32| ended_with(code, program().arg("cloud").args(arguments)).error;
+    let said = refused(&[bag, "--pair", "5"], 2);
+    assert!(said.lines().count() == 1 && said.contains("--pair is from 0 to 4"), "{said}");
+    let image = format!("{sample}/left000.png");
+    let said = refused(&[&image], 2);
+    assert!(said.lines().count() == 1 && said.contains("one image without the other"), "{said}");
+}

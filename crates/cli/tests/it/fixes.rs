@@ -68,24 +68,3 @@ fn a_varied_setting_is_a_column_of_the_results() {
     let said = String::from_utf8_lossy(&compared.stdout).into_owned() + &String::from_utf8_lossy(&compared.stderr);
     assert!([Some(0), Some(1)].contains(&compared.status.code()) && said.contains("n 3"), "{said}");
 }
-
-/// Fails if a missing Rerun is not named with its remedy, or if it does not get the log and the blueprint.
-#[cfg(unix)]
-#[test]
-fn a_log_is_opened_in_rerun() {
-    use std::os::unix::fs::PermissionsExt as _;
-    let folder = run();
-    let log = "run/001-solver-kabsch.mcap";
-    let missing = ended_with(4, program().current_dir(folder.path()).env("PATH", "").args(["view", log])).error;
-    assert!(missing.lines().count() == 1 && missing.contains("pip install rerun-sdk"), "{missing}");
-    let fake = folder.path().join("rerun");
-    fs::write(&fake, "#!/bin/sh\necho \"$1\"\ntest -s \"$2\" && echo \"$2\"\n").unwrap();
-    fs::set_permissions(&fake, fs::Permissions::from_mode(0o755)).unwrap();
-    let path = format!("{}:/bin:/usr/bin", folder.path().display());
-    let viewed = ended_with(0, program().current_dir(folder.path()).env("PATH", path).args(["view", log])).out;
-    let lines: Vec<&str> = viewed.lines().collect();
-    assert!(lines[0] == log && lines[1].ends_with(".rbl"), "{viewed}");
-    assert!(!std::path::Path::new(lines[1]).exists(), "the blueprint is temporary");
-    let folder_error = ended_with(3, program().current_dir(folder.path()).args(["view", "run"])).error;
-    assert!(folder_error.contains("a folder, not the log of a trial"), "{folder_error}");
-}

@@ -29,6 +29,8 @@ mod safety;
 mod slurm;
 mod solve;
 mod supply;
+#[cfg(unix)]
+mod view;
 
 /// The command of the program, without arguments.
 fn program() -> Command {

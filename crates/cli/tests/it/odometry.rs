@@ -5,7 +5,7 @@ use std::{fs, path::PathBuf};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::{Ended, ended_with, program};
+use crate::{Ended, ended_with, program, recordings::recording_of};
 
 const SIZE: [usize; 2] = [320, 240];
 const FOCAL: f64 = 250.0;
@@ -456,4 +456,70 @@ fn a_vehicle_that_starts_is_followed_from_where_it_stood() {
     assert_eq!((left_out, all["segments"].as_array().unwrap().len()), (PAIRS / 2, 1), "{all}");
     let right = |(at, pair): (&f64, usize)| (at - start(pair)).abs() < 0.005;
     assert!(paths[0] == 0.0 && paths[1..].iter().zip(PAIRS / 2 + 1..).all(right), "{paths:?}");
+}
+
+/// A recording of ROS 2, the log of a run and a data set with the same images have the same trajectory.
+#[test]
+fn a_recording_and_a_log_give_the_trajectory_of_their_images() {
+    let walls = Sequence::new();
+    let poses = |path: &str, more: &[&str]| {
+        let ended = ended_with(0, program().arg("odometry").arg(walls.path(path)).arg("--json").args(more));
+        let all: Value = serde_json::from_str(&ended.out).unwrap();
+        assert_eq!((all["pairs"].as_u64(), &all["left_out"]), (Some(PAIRS as u64), &serde_json::json!([])), "{all}");
+        Sequence::paths(&all)
+    };
+    let expected = poses("", &[]);
+    assert!((expected[PAIRS - 1] - STEP * (PAIRS - 1) as f64).abs() < 0.01, "{expected:?}");
+    let images = |pair: usize| ["l", "r"].map(|side| fs::read(walls.path(&format!("{side}{pair}.pgm"))).unwrap());
+    let size = SIZE.map(|pixels| pixels as u32);
+    recording_of((0..PAIRS).map(images).collect(), size, FOCAL, BASELINE, &walls.path("walls.mcap"));
+    // P makes the rig a rectified one, whose matches are sought along rows: a thousandth of a step is no other motion.
+    let recorded = poses("walls.mcap", &[]);
+    assert!(recorded.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-3 * STEP), "{recorded:?}");
+    // Topics are named like in an experiment, and errors name the flag.
+    let named = ["left=/cam/left/image_rect/compressed", "right=/cam/right/image_rect/compressed"];
+    assert_eq!(poses("walls.mcap", &["--source", named[0], "--source", named[1]]), recorded);
+    for (setting, reported) in [("letf=/a", "did you mean `left`"), ("left=/a", "`/a`"), ("bits=9", "8, 12 or 16")] {
+        let mut command = program();
+        command.arg("odometry").arg(walls.path("walls.mcap")).args(["--source", setting, "--source", named[1]]);
+        let code = if setting == "left=/a" { 3 } else { 2 };
+        let said = ended_with(code, &mut command).error;
+        assert!(said.lines().count() == 1 && said.contains(reported), "{said}");
+        assert_eq!(said.contains("--source"), code == 2, "{said}");
+    }
+    // A folder of rosbag2.
+    fs::create_dir(walls.path("bag")).unwrap();
+    fs::rename(walls.path("walls.mcap"), walls.path("bag/bag_0.mcap")).unwrap();
+    let listing =
+        "rosbag2_bagfile_information:\n  storage_identifier: mcap\n  relative_file_paths:\n    - bag_0.mcap\n";
+    walls.put("bag/metadata.yaml", listing);
+    assert_eq!(poses("bag", &[]), recorded);
+    // The log of a run.
+    let site = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample/site.toml");
+    fs::copy(site, walls.path("site.toml")).unwrap();
+    walls.put("e.toml", "question = 'Where?'\n[source]\nname = 'dataset'\npath = '.'\nsite = 'site.toml'\n");
+    let run = |out: &str, more: &[&str]| {
+        let out = walls.path(out);
+        let arguments = [walls.path("e.toml").as_os_str(), "--out".as_ref(), out.as_os_str()].map(ToOwned::to_owned);
+        ended_with(0, program().arg("run").args(arguments).args(more));
+        let logs = fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
+        let log = logs.into_iter().find(|path| path.extension().is_some_and(|end| end == "mcap")).unwrap();
+        log.strip_prefix(walls.folder.path()).unwrap().to_str().unwrap().to_owned()
+    };
+    assert_eq!(poses(&run("out", &[]), &[]), expected);
+    // Thumbnails and clouds have no images to track.
+    let bare = walls.path(&run("bare", &["--set", "log.images=none"]));
+    let said = ended_with(3, program().arg("odometry").arg(bare)).error;
+    assert!(said.lines().count() == 1 && said.contains("a log without images"), "{said}");
+}
+
+/// A file or folder without stereo pairs is named with what is accepted.
+#[test]
+fn what_has_no_pairs_is_refused() {
+    let walls = Sequence::new();
+    fs::create_dir(walls.path("empty")).unwrap();
+    for (path, reported) in [("missing.mcap", "no such file or folder"), ("empty", "a folder without stereo pairs")] {
+        let said = ended_with(3, program().arg("odometry").arg(walls.path(path))).error;
+        assert!(said.lines().count() == 1 && said.contains(reported) && said.contains("recording"), "{said}");
+    }
 }

@@ -51,6 +51,8 @@ impl Cdr {
 
 /// A stereo recording that tests change before it is written.
 struct Bag {
+    /// Columns and rows of the images; the principal point is their centre.
+    size: [u32; 2],
     /// Left and right images of each pair (PNG).
     images: Vec<[Vec<u8>; 2]>,
     /// Whether the topics' names call the images rectified.
@@ -67,6 +69,20 @@ struct Bag {
 /// Writes the sample as a recording of ROS 2.
 pub(crate) fn sample_recording(file: &Path) {
     fs::copy(Bag::sound().write().path().join("bag.mcap"), file).unwrap();
+}
+
+/// Writes image pairs as a recording of ROS 2, ten a second; the images have this size, the rig this focal length (px)
+/// and baseline (m).
+pub(crate) fn recording_of(images: Vec<[Vec<u8>; 2]>, size: [u32; 2], focal: f64, baseline: f64, file: &Path) {
+    let bag = Bag {
+        size,
+        p: vec![[[focal, 0.0], [focal, -focal * baseline]]; images.len()],
+        tf: Some([baseline, 0.0, 0.0]),
+        poses: vec![[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]; images.len()],
+        images,
+        ..Bag::sound()
+    };
+    fs::copy(bag.write().path().join("bag.mcap"), file).unwrap();
 }
 
 const START_NS: u64 = 1_700_000_000_000_000_000;
@@ -88,6 +104,7 @@ impl Bag {
             numbers.try_into().unwrap()
         });
         Self {
+            size: [1024, 768],
             images: (0..5).map(pair).collect(),
             rectified: true,
             model: "plumb_bob",
@@ -131,9 +148,11 @@ impl Bag {
                 let frame = ["left", "right"][side];
                 let [fx, tx] = self.p[k][side];
                 let eye = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-                let matrix = [fx, 0.0, 511.5, 0.0, fx, 383.5, 0.0, 0.0, 1.0];
-                let p = [fx, 0.0, 511.5, tx, 0.0, fx, 383.5, 0.0, 0.0, 0.0, 1.0, 0.0];
-                let message = Cdr::new(stamp, frame).u32(768).u32(1024).text(self.model).u32(4).f64s(&[0.0; 4]);
+                let [width, height] = self.size;
+                let [cx, cy] = self.size.map(|pixels| f64::from(pixels - 1) / 2.0);
+                let matrix = [fx, 0.0, cx, 0.0, fx, cy, 0.0, 0.0, 1.0];
+                let p = [fx, 0.0, cx, tx, 0.0, fx, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+                let message = Cdr::new(stamp, frame).u32(height).u32(width).text(self.model).u32(4).f64s(&[0.0; 4]);
                 let message = message.f64s(&matrix).f64s(&eye).f64s(&p);
                 put(info[side], stamp, (0..6).fold(message, |message, _| message.u32(0)).put(1, &[0]));
                 let data = &pair[side];

@@ -9,7 +9,7 @@ use std::{
 use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
 use seafix_component::Fault;
-use seafix_geometry::StereoPixels;
+use seafix_geometry::{StereoPixels, StereoRig};
 use seafix_vision::{Image, RightCameraRotation, Sides, repeated_patterns};
 
 use seafix_io::{
@@ -61,20 +61,26 @@ impl Dataset {
 
     /// Warnings about the stamps of the pairs: gaps of more than a year, and pairs closer than a camera can take them.
     pub fn odd_times(&self) -> Vec<Fault> {
-        const YEAR_NS: u64 = 31_557_600_000_000_000;
-        let table = self.folder.join(&self.table);
-        let steps = || self.frames.windows(2).map(|two| [two[0].stamp_ns, two[1].stamp_ns]);
-        let reported = |what: &str, odd: &dyn Fn(u64) -> bool, remedy: &str| {
-            let all: Vec<[u64; 2]> = steps().filter(|[before, after]| odd(after - before)).collect();
-            let [before, after] = all.first()?;
-            let value = format!("from {before} to {after} ns, one of {}", all.len());
-            Some(Fault::new(what, &table).value(value).remedy(remedy))
-        };
-        let leap =
-            reported("stamps with a gap of more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
-        let remedy = "two pairs within a millisecond; check that stamps are nanoseconds";
-        leap.into_iter().chain(reported("pairs too close in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
+        let stamps: Vec<u64> = self.frames.iter().map(|frame| frame.stamp_ns).collect();
+        odd_times(&stamps, &self.folder.join(&self.table))
     }
+}
+
+/// Warnings about the stamps (ns) of the pairs in `file`: gaps of more than a year, and pairs closer than a camera can
+/// take them.
+pub(crate) fn odd_times(stamps: &[u64], file: &Path) -> Vec<Fault> {
+    const YEAR_NS: u64 = 31_557_600_000_000_000;
+    let steps = || stamps.windows(2).map(|two| [two[0], two[1]]);
+    let reported = |what: &str, odd: &dyn Fn(u64) -> bool, remedy: &str| {
+        let all: Vec<[u64; 2]> = steps().filter(|[before, after]| odd(after.abs_diff(*before))).collect();
+        let [before, after] = all.first()?;
+        let value = format!("from {before} to {after} ns, one of {}", all.len());
+        Some(Fault::new(what, file).value(value).remedy(remedy))
+    };
+    let leap =
+        reported("stamps with a gap of more than a year", &|ns| ns > YEAR_NS, "are seconds and nanoseconds mixed?");
+    let remedy = "two pairs within a millisecond; check that stamps are nanoseconds";
+    leap.into_iter().chain(reported("pairs too close in time", &|ns| ns <= SAME_INSTANT_NS, remedy)).collect()
 }
 
 /// The contradictions between the poses, the images, the rig and the site of a data set.
@@ -179,27 +185,44 @@ fn sides(dataset: &Dataset) -> Sides {
 
 /// The swap check on the first conclusive pairs, for a data set with some bad images. One pair in favour of the order
 /// ends it; three pairs against it decide.
-/// their places ends the search, three that speak against it decide.
 pub fn swapped_at_first(dataset: &Dataset) -> Option<Fault> {
+    let pairs = dataset.frames.iter().filter_map(|frame| dataset.pair(frame).ok());
+    swap_of_first(pairs, &dataset.rig, &dataset.folder.join(&dataset.table))
+}
+
+/// The check of [`swapped_at_first`] on any pairs of `file`.
+pub(crate) fn swap_of_first(
+    pairs: impl Iterator<Item = (Image, Image)>,
+    rig: &StereoRig,
+    file: &Path,
+) -> Option<Fault> {
     let (mut sides, mut reported) = (Sides::default(), 0);
-    for (left, right) in dataset.frames.iter().filter_map(|frame| dataset.pair(frame).ok()) {
-        sides = sides + Sides::of_images(&left, &right, &dataset.rig);
+    for (left, right) in pairs {
+        sides = sides + Sides::of_images(&left, &right, rig);
         reported += usize::from(sides.is_decisive());
         if reported == INSPECTED_PAIRS || sides.is_decisive() && !sides.are_swapped() {
             break;
         }
     }
-    swap_fault(sides, &dataset.folder.join(&dataset.table))
+    swap_fault(sides, file)
 }
 
 /// The rig of `dataset` with an estimated rotation of the right camera. The estimate uses a sample of pairs, evenly
 /// over the data set; `None` if the images agree with the rig. Unreadable images are ignored.
 pub fn right_camera_rotation(dataset: &Dataset) -> Option<RightCameraRotation> {
-    let apart = dataset.frames.len().div_ceil(ASKED).max(1);
-    let some = dataset.frames.iter().step_by(apart).filter_map(|frame| dataset.pair(frame).ok());
-    let seen: Vec<StereoPixels> =
-        some.flat_map(|(left, right)| repeated_patterns(&left, &right, &dataset.rig)).collect();
-    RightCameraRotation::of(&seen, &dataset.rig)
+    rotation_of_sample(dataset.frames.len(), |index| dataset.pair(&dataset.frames[index]).ok(), &dataset.rig)
+}
+
+/// The estimate of [`right_camera_rotation`] from a sample of any `count` pairs; `pair` is `None` if one cannot be read.
+pub(crate) fn rotation_of_sample(
+    count: usize,
+    pair: impl Fn(usize) -> Option<(Image, Image)>,
+    rig: &StereoRig,
+) -> Option<RightCameraRotation> {
+    let apart = count.div_ceil(ASKED).max(1);
+    let some = (0..count).step_by(apart).filter_map(pair);
+    let seen: Vec<StereoPixels> = some.flat_map(|(left, right)| repeated_patterns(&left, &right, rig)).collect();
+    RightCameraRotation::of(&seen, rig)
 }
 
 /// The fault of `file` if its left and right images are exchanged.

@@ -20,6 +20,7 @@ pub use check::{
     are_identical, check, contradictions, identical_images_fault, partners_remedy, right_camera_rotation, strangers,
     swap_fault, swapped_at_first,
 };
+pub(crate) use check::{odd_times, rotation_of_sample, swap_of_first};
 pub use contents::{Dataset, DatasetFrame};
 pub use kitti::Cameras;
 pub use open::is_one;

@@ -26,7 +26,7 @@ use crate::{
 };
 
 /// The stereo rig and pairs of a recording; every image has been decoded once.
-pub(super) struct Bag {
+pub(crate) struct Bag {
     path: PathBuf,
     recording: Recordings,
     settings: Mcap,
@@ -34,14 +34,14 @@ pub(super) struct Bag {
     tree: Tree,
     /// The coordinate frames of the cameras.
     frames: [String; 2],
-    pub(super) rig: StereoRig,
+    pub(crate) rig: StereoRig,
     /// What the images are taken for, and why.
     views: String,
     /// The stamp and the two messages of each pair.
-    pub(super) pairs: Vec<(u64, [Message; 2])>,
-    pub(super) warnings: Vec<Fault>,
+    pub(crate) pairs: Vec<(u64, [Message; 2])>,
+    pub(crate) warnings: Vec<Fault>,
     /// The contradictions between images and rig.
-    pub(super) doubts: Vec<Fault>,
+    pub(crate) doubts: Vec<Fault>,
     /// The matches of some pairs, by the index of the pair.
     pub(super) inspected: Vec<(usize, Vec<StereoPixels>)>,
 }
@@ -49,7 +49,7 @@ pub(super) struct Bag {
 impl Bag {
     /// Reads `path`, decodes every image, and checks rig and images for consistency. A pair with an unreadable image is
     /// skipped with a warning; at least half of the pairs must be readable.
-    pub(super) fn open(path: &Path, settings: &Mcap) -> Result<Self, Fault> {
+    pub(crate) fn open(path: &Path, settings: &Mcap) -> Result<Self, Fault> {
         let recording = Recordings::open(path, |topic: &Topic| topic.encoding == "cdr")?;
         let topics = Topics::of(path, &recording, settings)?;
         let mut warnings = Vec::new();
@@ -104,7 +104,7 @@ impl Bag {
     }
 
     /// The two images of a pair.
-    pub(super) fn pair(&self, index: usize) -> Result<(Image, Image), Fault> {
+    pub(crate) fn pair(&self, index: usize) -> Result<(Image, Image), Fault> {
         let [left, right] = &self.pairs[index].1;
         self.decoded([left, right], [&self.recording.bytes(left)?, &self.recording.bytes(right)?])
     }

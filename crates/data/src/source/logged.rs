@@ -7,7 +7,7 @@ use seafix::{FrameData, SensorFrame, WorldPrior};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Covariance6, Pinhole, RightCamera, StereoRig, Transform, World};
 use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord, unchanged};
-use seafix_navigation::Device;
+use seafix_navigation::{Device, Reading};
 use seafix_referencing::Site;
 use seafix_vision::Image;
 
@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// The log of a trial as a sequence: inputs and ground truth, without the trial's results.
-pub(super) struct Logged {
+pub(crate) struct Logged {
     frames: Frames,
     name: String,
     site: Site,
@@ -36,7 +36,7 @@ pub(super) struct Logged {
 
 impl Logged {
     /// Opens the log at `path`; `reading` selects its images or its clouds.
-    pub(super) fn open(path: &Path, reading: LoggedInput) -> Result<Self, Vec<Fault>> {
+    pub(crate) fn open(path: &Path, reading: LoggedInput) -> Result<Self, Vec<Fault>> {
         let one = |fault| vec![fault];
         let frames = unchanged(path).and_then(|()| Frames::open(path));
         let frames = frames.map_err(|error| one(fault(path, &error)))?;
@@ -93,6 +93,46 @@ impl Logged {
             path: path.display().to_string(),
             frames,
         })
+    }
+
+    /// The times of all frames (ns).
+    ///
+    /// # Errors
+    /// A log that has changed since it was opened.
+    pub(crate) fn stamps(&self) -> Result<Vec<u64>, Fault> {
+        (0..self.numbers.len()).map(|index| Ok(self.frame(index, false)?.stamp_ns)).collect()
+    }
+
+    /// The two images of the frame at `index`.
+    ///
+    /// # Errors
+    /// A frame without images or with thumbnails.
+    pub(crate) fn pair(&self, index: usize) -> Result<(Image, Image), Fault> {
+        let frame = self.frame(index, true)?;
+        let Some(images) = &frame.images else {
+            let fault = Fault::new("a frame without images", Path::new(&self.path));
+            return Err(fault.value(format!("frame {}", frame.frame)).remedy("run again with images in the log"));
+        };
+        self.decoded(images, frame.frame)
+    }
+
+    /// The two images of frame `number` at full size.
+    fn decoded(&self, [left, right]: &[GreyImage; 2], number: u64) -> Result<(Image, Image), Fault> {
+        let broken = |what: String| Fault::new(what, Path::new(&self.path)).value(format!("frame {number}"));
+        if left.width != self.rig.left().size()[0] {
+            let fault = broken("an image logged as a thumbnail".to_owned());
+            return Err(fault.remedy("replay the clouds, or run again with full images in the log"));
+        }
+        Ok((image(left).map_err(broken)?, image(right).map_err(broken)?))
+    }
+
+    /// The readings that the frame at `index` brought.
+    ///
+    /// # Errors
+    /// A reading of an unknown device.
+    pub(crate) fn readings(&self, index: usize) -> Result<Vec<Reading>, Fault> {
+        let Some(inputs) = self.frame(index, false)?.inputs else { return Ok(Vec::new()) };
+        log_conversion::readings(&inputs).map_err(|what| Fault::new(what, Path::new(&self.path)))
     }
 
     fn frame(&self, index: usize, images: bool) -> Result<FrameRecord, Fault> {
@@ -203,11 +243,7 @@ impl Sequence for Logged {
             None => self.old_prior(&frame).map_err(broken)?,
         };
         let frame_data = match &frame.images {
-            Some([left, _]) if left.width != self.rig.left().size()[0] => {
-                let fault = broken("an image logged as a thumbnail".to_owned());
-                return Err(fault.remedy("replay the clouds, or run again with full images in the log"));
-            }
-            Some([left, right]) => FrameData::Stereo(image(left).map_err(broken)?, image(right).map_err(broken)?),
+            Some(images) => self.decoded(images, frame.frame).map(|(left, right)| FrameData::Stereo(left, right))?,
             None if lines.is_empty() => FrameData::Points(cloud),
             None => FrameData::Features(cloud, lines),
         };

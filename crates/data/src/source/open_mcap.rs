@@ -4,7 +4,12 @@ use std::path::Path;
 
 use seafix_component::Fault;
 
-use super::{logged::Logged, mcap::Mcap, recorded::Recorded, recordings::Recordings};
+use super::{
+    logged::Logged,
+    mcap::Mcap,
+    recorded::Recorded,
+    recordings::{Recordings, is_log},
+};
 use crate::sequence::{Sequence, Source};
 
 impl Source for Mcap {
@@ -12,7 +17,7 @@ impl Source for Mcap {
         let path = folder.join(&self.path);
         let one = |fault| vec![fault];
         let recording = Recordings::open(&path, |_| false).map_err(one)?;
-        if recording.topics().iter().any(|topic| topic.schema == "seafix.v2.TrialHeader") {
+        if is_log(&recording) {
             return Ok(Box::new(Logged::open(&path, self.read)?));
         }
         if self.site.is_empty() {

@@ -13,7 +13,7 @@ const DESCRIPTION: &str = "metadata.yaml";
 
 /// A recording in one or several files, in order.
 #[derive(Debug)]
-pub(super) struct Recordings {
+pub(crate) struct Recordings {
     files: Vec<Recording>,
     /// The topics of all files, one a name.
     topics: Vec<Topic>,
@@ -22,7 +22,7 @@ pub(super) struct Recordings {
 
 /// The place of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Message {
+pub(crate) struct Message {
     file: usize,
     entry: Entry,
     /// The index of its topic.
@@ -36,6 +36,11 @@ pub(super) struct Message {
 /// Whether `path` is a folder of rosbag2 or its description.
 pub fn is_recording(path: &Path) -> bool {
     described(path).is_some()
+}
+
+/// Whether a recording is the log of a trial.
+pub(crate) fn is_log(recording: &Recordings) -> bool {
+    recording.topics().iter().any(|topic| topic.schema == "seafix.v2.TrialHeader")
 }
 
 /// The description of a folder of rosbag2: `path` itself or the file in the folder `path`.
@@ -123,7 +128,7 @@ impl Recordings {
     ///
     /// # Errors
     /// Those of [`files`], and a file that is damaged.
-    pub(super) fn open(path: &Path, wanted: impl Fn(&Topic) -> bool) -> Result<Self, Fault> {
+    pub(crate) fn open(path: &Path, wanted: impl Fn(&Topic) -> bool) -> Result<Self, Fault> {
         let paths = files(path)?;
         let open = |path: &PathBuf| Recording::open(path, &wanted).map_err(|error| fault(path, &error));
         let files = paths.iter().map(open).collect::<Result<Vec<_>, Fault>>()?;

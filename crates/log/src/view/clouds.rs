@@ -14,15 +14,16 @@ use super::{
 };
 
 /// Three coordinates, one number that tells points apart, and a colour.
-struct Dot {
-    at: [f64; 3],
-    number: u32,
-    colour: [u8; 3],
+pub(super) struct Dot {
+    pub(super) at: [f64; 3],
+    pub(super) number: u32,
+    pub(super) colour: [u8; 3],
 }
 
 const STRIDE: u32 = 20;
 
-fn cloud(frame_id: &str, number: &str, dots: impl IntoIterator<Item = Dot>, stamp_ns: u64) -> PointCloud {
+/// A cloud in a coordinate frame; `number` names what tells its points apart.
+pub(super) fn cloud(frame_id: &str, number: &str, dots: impl IntoIterator<Item = Dot>, stamp_ns: u64) -> PointCloud {
     let field = |name: &str, offset, kind: NumericType| PackedElementField {
         name: name.to_owned(),
         offset,

@@ -1,9 +1,12 @@
-//! The model as a scene: a ball and a name a feature point.
+//! The model as a scene: a ball and a name a feature point, a line a straight edge.
 
 use crate::{
     proto::{
         Duration,
-        foxglove::{KeyValuePair, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, TextPrimitive, Vector3},
+        foxglove::{
+            KeyValuePair, LinePrimitive, Point3, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive,
+            TextPrimitive, Vector3, line_primitive::Type,
+        },
     },
     record::{TargetModel, TrialHeader},
 };
@@ -15,6 +18,9 @@ use super::{
 
 /// Diameter of the ball that marks a point (m).
 const DIAMETER: f64 = 0.03;
+
+/// The width of an edge on the screen (px).
+const EDGE_PX: f64 = 3.0;
 
 /// One entity a target, fixed to the target's frame, for as long as the log runs.
 pub(crate) fn model_scene(header: &TrialHeader, stamp_ns: u64) -> SceneUpdate {
@@ -59,6 +65,24 @@ fn entity(target: &TargetModel, colour: [u8; 3], stamp_ns: u64) -> SceneEntity {
                 text: point.id.clone(),
             })
             .collect(),
+        lines: edges(target, colour).into_iter().collect(),
         ..SceneEntity::default()
     }
+}
+
+/// The straight edges of a target, if it has any.
+fn edges(target: &TargetModel, colour: [u8; 3]) -> Option<LinePrimitive> {
+    let ends = target.edges.iter().flat_map(|edge| edge.ends);
+    (!target.edges.is_empty()).then(|| LinePrimitive {
+        r#type: Type::LineList.into(),
+        pose: Some(Pose {
+            position: Some(Vector3 { x: 0.0, y: 0.0, z: 0.0 }),
+            orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }),
+        }),
+        thickness: EDGE_PX,
+        scale_invariant: true,
+        points: ends.map(|[x, y, z]| Point3 { x, y, z }).collect(),
+        color: Some(colour_message(colour)),
+        ..LinePrimitive::default()
+    })
 }

@@ -78,6 +78,7 @@ impl Writer {
         check::frame(&self.header, frame, self.last).map_err(record)?;
         let transforms = view::moving_transforms(&self.places, frame).map_err(record)?;
         let poses = view::body_pose(&self.places, frame).map_err(record)?;
+        let paths = view::path(&self.places, frame).map_err(record)?;
         let pngs = match (&frame.images, pngs) {
             (None, _) => Vec::new(),
             (Some(_), Some(known)) => known.to_vec(),
@@ -98,6 +99,13 @@ impl Writer {
         if frame.images.is_some() {
             for side in [0, 1] {
                 sink.put(topic::ANNOTATIONS[side], stamp, &view::annotations(&self.header, frame, side))?;
+            }
+            // Programs read large runs without images, people those with images.
+            sink.put(topic::CLOUD_LINES, stamp, &view::measured_lines(&self.header, frame))?;
+            sink.put(topic::CLOUD_GATES, stamp, &view::gates(&self.header, &self.places, frame))?;
+            sink.put(topic::POSE_COVARIANCE, stamp, &view::position_covariance(&self.places, frame))?;
+            for (topic, path) in paths {
+                sink.put(topic, stamp, &path)?;
             }
         }
         if !transforms.transforms.is_empty() {

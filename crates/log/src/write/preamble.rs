@@ -33,6 +33,7 @@ impl<'a> Preamble<'a> {
         add(&mut messages, topic::TF, &view::fixed_transforms(places, stamp));
         add(&mut messages, topic::SCENE_MODEL, &view::model_scene(header, stamp));
         add(&mut messages, topic::MODEL, &view::model_cloud(header, places, stamp));
+        add(&mut messages, topic::MODEL_EDGES, &view::model_edges(header, places, stamp));
         let attachments = [("configuration.toml", &header.configuration[..]), ("site.toml", &header.site[..])];
         Self { metadata: summary(header), attachments, messages }
     }

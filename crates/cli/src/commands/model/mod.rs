@@ -14,6 +14,7 @@ use seafix_experiment::changed_pipeline;
 
 pub(crate) use self::arguments::Model;
 use self::pair::PairFiles;
+use super::set::built;
 use crate::exit::{Ended, Failure, USAGE};
 
 impl Model {
@@ -37,9 +38,8 @@ impl Model {
             }
         };
         let calibration = self.dive.calibration()?;
-        let pipeline =
-            changed_pipeline(&Pipeline::default(), &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
-        let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
+        let change = |set: &[String]| changed_pipeline(&Pipeline::default(), set);
+        let (_, front_end) = built(&self.set, change, Pipeline::front_end)?;
         let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
         let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };
         if let Some(error) = self.dive.true_marks {

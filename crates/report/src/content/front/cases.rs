@@ -56,22 +56,27 @@ fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)]) -> Op
     }
     let (_, worst) = first(low)?;
     let names = |fraction: f64| {
-        let own: Vec<&str> =
-            samples.iter().filter(|(_, sample)| sample.fraction() == fraction).map(|(name, _)| *name).collect();
-        match own[..] {
-            [one] => (one.to_owned(), "has"),
-            [one, other] => (format!("{one} and {other}"), "have"),
-            [one, ..] => (format!("{one} and {} others", own.len() - 1), "have"),
-            [] => (String::new(), "has"),
+        let own: Vec<String> =
+            samples.iter().filter(|(_, sample)| sample.fraction() == fraction).map(|(name, _)| quoted(name)).collect();
+        match &own[..] {
+            [] => String::new(),
+            [one] => format!("that of {one}"),
+            // As many as one reads at a glance.
+            [first @ .., last] if own.len() <= 4 => format!("that of {} and of {last}", first.join(", of ")),
+            [one, ..] => format!("that of {one} and {} others", own.len() - 1),
         }
     };
-    let ((best_name, has), (worst_name, _)) = (names(high), names(low));
-    let mut message = text![format!("{best_name} {has} the highest rate of fixes, ")];
+    let mut message = text!["the highest rate of fixes, "];
     message.extend(best.rate());
-    message.extend(text![" of ", best.n(), format!(" attempts, and {worst_name} the lowest, ")]);
+    message.extend(text![" of ", best.n(), format!(" attempts, is {}, and the lowest, ", names(high))]);
     message.extend(worst.rate());
-    message.extend(text![" of ", worst.n()]);
+    message.extend(text![" of ", worst.n(), format!(", {}", names(low))]);
     Some(message)
+}
+
+/// A name in a sentence: one of several words in quotation marks, so that it is read as one.
+fn quoted(name: &str) -> String {
+    if name.contains(' ') { format!("“{name}”") } else { name.to_owned() }
 }
 
 /// The clause on the median errors of cases of one trial each; `None` without fixes.

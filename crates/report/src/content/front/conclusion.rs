@@ -39,8 +39,10 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
     };
     let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
     let bound = 100.0 * proportion::interval_of_counts(headers().any(proportion::is_trajectory), 0, min).1;
+    // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
+    let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
     format!(
-        "{data}{site}. The smallest trial has {}, so that its rate of wrong fixes may be up to {bound:.1} % even without any. \
+        "{data}{site}. The smallest trial has {}, so that its rate of wrong fixes may be up to {bound:.digits$} % even without any. \
          The section on threats to validity lists all limits.",
         counted(min, "attempt", "attempts")
     )

@@ -27,6 +27,8 @@ pub(super) enum Kind {
     Tolerance(String),
     /// Robust methods over the fraction of wrong pairs, on the axis of this key.
     Outliers(String),
+    /// Fixes and wrong fixes over the limit of the probability of a wrong answer, on the axis of this key.
+    Acceptance(String),
     /// Fixes along the numeric axis of this key.
     Along(String),
     /// Fixes in named cases, or in a single trial.
@@ -39,12 +41,15 @@ impl Kind {
         let searches = summary.rows.iter().any(|row| row.search != summary.rows[0].search);
         let tolerance = numeric.iter().find(|key| key.contains("tolerance"));
         let outliers = numeric.iter().find(|key| short(key) == "outliers");
+        let axes = || summary.rows.iter().flat_map(|row| &row.axes);
+        let limit = axes().find(|axis| short(&axis.key) == "max-p-wrong").map(|axis| axis.key.clone());
         match (tolerance, outliers, numeric.first()) {
             _ if summary.has_limits() => Self::Limits,
             _ if run.trials.iter().any(inspection::inspects) => Self::Points,
             _ if run.trials.iter().any(objects::moves) => Self::Objects,
             _ if run.trials.iter().any(navigation::sails) => Self::Navigation,
             _ if searches && summary.question.to_lowercase().contains("cost of") => Self::Cost,
+            _ if limit.is_some() => Self::Acceptance(limit.unwrap_or_default()),
             (Some(key), ..) => Self::Tolerance(key.clone()),
             (_, Some(key), _) => Self::Outliers(key.clone()),
             (.., Some(key)) => Self::Along(key.clone()),
@@ -59,6 +64,7 @@ impl Kind {
             Self::Points | Self::Objects | Self::Navigation => &["sawtooth", "rates", "error-over-condition"],
             Self::Cost => &["search-cost"],
             Self::Tolerance(_) => &["precision-recall"],
+            Self::Acceptance(_) => &["rates", "success", "recall"],
             Self::Outliers(_) => &["success", "error-over-condition", "recall"],
             Self::Along(_) | Self::Cases if !asked.accuracy => &["rates", "success", "error-over-condition", "recall"],
             Self::Along(_) | Self::Cases => {

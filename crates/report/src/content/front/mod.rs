@@ -1,5 +1,6 @@
 //! The first page: the answer in one sentence, the main figure, a small table, the conclusion and its limits.
 
+mod acceptance;
 mod along;
 mod cases;
 mod conclusion;
@@ -52,6 +53,7 @@ pub(crate) fn answer(run: &Run, summary: &RunSummary) -> Text {
         Kind::Navigation => navigated::sentence(run, summary, &labels, asked),
         Kind::Cost => cost::sentence(run, summary, &labels),
         Kind::Tolerance(key) => tolerance::sentence(run, summary, &key),
+        Kind::Acceptance(key) => acceptance::sentence(run, summary, &key),
         Kind::Outliers(key) => outliers::sentence(run, summary, &labels, &key),
         Kind::Along(key) => along::sentence(run, summary, &labels, &key, asked),
         Kind::Cases => None,

@@ -8,13 +8,14 @@ use crate::{
     },
     document::{Text, text},
     format::{short, unit},
+    number::Number,
     proportion::BORNE,
     run::Run,
     summary::RunSummary,
 };
 
 pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
-    let mut known = Vec::new();
+    let mut known: Vec<Borne> = Vec::new();
     for (name, members) in labels.series(summary) {
         let step = |&index: &usize| -> Option<Step<'_>> {
             Some((axes::on(&summary.rows[index], key)?, &summary.rows[index], &run.trials[index]))
@@ -25,29 +26,45 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
         known.push((name, point, surely));
     }
     known.sort_by(|a, b| b.1.value.unwrap_or(-1.0).total_cmp(&a.1.value.unwrap_or(-1.0)));
-    let mut message = Text::new();
-    for (name, point, surely) in known {
-        let begin = if message.is_empty() { "" } else { "; " };
-        if point.value.is_none() {
-            message.push(format!("{begin}{name} tolerates none of the tested fractions").into());
-            continue;
-        }
-        message.extend(text![
-            format!("{begin}{name} tolerates {} of ", short(key)),
-            point,
-            unit(key).map_or_else(String::new, |unit| format!(" {unit}"))
-        ]);
-        if surely.value.is_some() {
-            message.extend(text![" (", surely, " by the lower ends of the 95 % intervals)"]);
-        }
-    }
-    if message.is_empty() {
+    if known.is_empty() {
         return None;
     }
-    message.push(format!(", where at least {BORNE} % of the attempts have a fix").into());
+    let end = unit(key).map_or_else(String::new, |unit| format!(" {unit}"));
+    let mut message = text![format!("at least {BORNE} % of the attempts have a fix ")];
+    let same = |a: &Borne, b: &Borne| (a.1.value, a.2.value) == (b.1.value, b.2.value);
+    for (place, group) in known.chunk_by(same).enumerate() {
+        message.push(if place > 0 { ", " } else { "" }.into());
+        let names = list(&group.iter().map(|borne| borne.0.as_str()).collect::<Vec<_>>());
+        let (_, point, surely) = &group[0];
+        if point.value.is_none() {
+            message.push(format!("at none of the tested fractions with {names}").into());
+            continue;
+        }
+        message.extend(text!["up to ", point.clone(), format!("{end} {} with {names}", short(key))]);
+        // The interval states more than the rate only where its lower end is below the limit earlier.
+        if surely.value.is_some() && surely.value != point.value {
+            message.extend(text![
+                " (surely to ",
+                surely.clone(),
+                format!("{end}, by the lower end of the 95 % interval)")
+            ]);
+        }
+    }
     message.extend(loss(run, summary, labels, key).unwrap_or_default());
     message.extend(wrong(run, summary));
     Some(capitalised(message))
+}
+
+/// A method, the largest fraction that it tolerates, and the same by the lower ends of the intervals.
+type Borne = (String, Number, Number);
+
+/// Names in a sentence: `a, b and c`.
+fn list(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
 }
 
 /// The clause on the smallest and the largest median error at the smallest fraction.

@@ -1,6 +1,6 @@
 //! The answer about the tolerance of distances: the one with the largest F1 score at the ends of the other condition.
 
-use super::measured::capitalised;
+use super::measured::{Sample, capitalised};
 use crate::{
     content::{conditions::axes, figures::tolerance::Identified},
     document::{Text, text},
@@ -42,8 +42,12 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
             ),
             number("identified of fixes", identified.precision),
             " and recall ",
-            number("visible", identified.recall)
+            number("visible", identified.recall),
+            ", with fixes in "
         ]);
+        let sample = Sample::of(run, summary, &[*index]);
+        message.extend(sample.rate());
+        message.extend(text![" of ", sample.n(), " attempts"]);
     }
     (!message.is_empty()).then(|| capitalised(message))
 }

@@ -91,17 +91,24 @@ fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comp
     let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };
     let as_number = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
     let [own, other] = comparison.alone;
-    text![
+    let alone = [as_number("alone-first", own), as_number("alone-second", other)];
+    let counts = if better == first { (alone, other) } else { ([alone[1].clone(), alone[0].clone()], own) };
+    let ([of_better, of_worse], count_of_worse) = counts;
+    let mut message = text![
         format!("{}, {better} has smaller errors or fewer failures than {worse} (p ", begin(comparison)),
         holm(run, comparisons, comparison),
-        format!(", Holm-adjusted): only {first} has a fix in "),
-        as_number("alone-first", own),
-        format!(" and only {second} in "),
-        as_number("alone-second", other),
+        ", Holm-adjusted): in ",
+        of_better,
         " of ",
         as_number("pairs", comparison.n),
-        " pairs."
-    ]
+        format!(" pairs only {better} has a fix, in ")
+    ];
+    match count_of_worse {
+        0 => message.push("none".into()),
+        _ => message.extend(text![of_worse]),
+    }
+    message.push(format!(" only {worse}.").into());
+    message
 }
 
 fn begin(comparison: &Comparison) -> String {

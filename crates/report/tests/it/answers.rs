@@ -1,0 +1,87 @@
+//! The first page's sentences on synthetic runs with known results.
+
+use std::{fs, path::Path};
+
+use seafix_log::{Axis, Writer};
+use seafix_report::{Forms, report, verify};
+
+use crate::made_up::{blind, header};
+
+/// Writes a trial of 40 frames, of which the first `rejected` have no fix.
+fn trial(folder: &Path, index: usize, axes: [(&str, &str); 2], question: &str, rejected: u64) {
+    let mut header = header(index, 2.0, axes[1].1);
+    header.question = question.to_owned();
+    header.trial = format!("{index:03}");
+    header.axes = axes.map(|(key, value)| Axis { key: key.to_owned(), value: value.to_owned() }).to_vec();
+    let mut writer = Writer::create(&folder.join(format!("{}.mcap", header.trial)), &header).unwrap();
+    for place in 0..40 {
+        // Frame 5 of the synthetic run is rejected.
+        let mut frame = blind(&header, if place < rejected { 5 } else { 0 }, 2.0);
+        (frame.frame, frame.stamp_ns) = (place, 100 * place);
+        writer.frame(&frame).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// The text of the report's first page after the question; its numbers are verified.
+fn page(folder: &Path) -> String {
+    let out = folder.join("report");
+    report(folder, &out, Forms::ALL).unwrap();
+    assert!(verify(folder, &out).unwrap().holds());
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    let (_, page) = page.split_once("class=\"question\"").unwrap();
+    let page = page.split_once("class=\"appendix\"").unwrap().0;
+    let mut text = String::new();
+    let mut inside = true;
+    for c in page.chars() {
+        match c {
+            '<' => inside = true,
+            '>' => inside = false,
+            c if !inside => text.push(c),
+            _ => {}
+        }
+    }
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Methods that tolerate the same are named together, and a lower end that says nothing new is left out; one method
+/// without fixes is named as such.
+#[test]
+fn methods_that_tolerate_the_same_have_one_clause() {
+    let folder = tempfile::tempdir().unwrap();
+    let question = "How many wrong pairs does each robust method tolerate?";
+    let rejected = [("kabsch", [0, 0]), ("horn", [0, 0]), ("triad", [0, 30]), ("umeyama", [30, 30])];
+    let mut index = 0;
+    for (solver, by_fraction) in rejected {
+        for (fraction, rejected) in ["10", "50"].into_iter().zip(by_fraction) {
+            index += 1;
+            let axes = [("source.outliers", fraction), ("pipeline.solver", solver)];
+            trial(folder.path(), index, axes, question, rejected);
+        }
+    }
+    let page = page(folder.path());
+    let expected = "At least 95 % of the attempts have a fix up to 50 % outliers with kabsch and horn";
+    assert!(page.contains(expected), "{page}");
+    assert!(page.contains(", up to 10 % outliers with triad"), "{page}");
+    assert!(page.contains(", at none of the tested fractions with umeyama"), "{page}");
+}
+
+/// A question about limits of acceptance has the fixes and the wrong ones at each limit.
+#[test]
+fn every_limit_of_acceptance_has_its_fixes() {
+    let folder = tempfile::tempdir().unwrap();
+    let question = "How many objects are found, and how many answers are wrong, at each limit?";
+    for (index, (limit, rejected)) in [("strict", 40), ("0.5", 0)].into_iter().enumerate() {
+        let axes = [("pipeline.acceptance.max-p-wrong", limit), ("pipeline.solver", "kabsch")];
+        trial(folder.path(), index + 1, axes, question, rejected);
+    }
+    let page = page(folder.path());
+    let place = page.find("At the limit strict, 0.0 % [").unwrap_or_else(|| panic!("{page}"));
+    let answer = &page[place..place + 300];
+    assert!(
+        answer.contains("] of 40 attempts have a fix, and 0 of the fixes are wrong; at the limit 0.5, 100.0 % ["),
+        "{answer}"
+    );
+    // A count of none is a word.
+    assert!(page.contains(" of 40 pairs only ") && page.contains("has a fix, in none only "), "{page}");
+}
