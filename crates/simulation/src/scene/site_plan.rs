@@ -100,11 +100,12 @@ mod tests {
     fn a_given_model_replaces_the_survey_and_not_the_truth() {
         let plain = built_in("drill-centre").expect("a built-in site");
         let mut given = plain.site.objects[1].clone();
-        // The last point is not in the model, another one is a millimetre off, and the base is another one.
+        // One point is not in the model, another one is a millimetre off.
+        let others: Vec<usize> = (0..given.points.len()).filter(|k| !given.base.contains(k)).collect();
+        given.points[others[0]].at.coords.x += 1e-3;
         given.points.pop();
-        given.points[3].at.coords.x += 1e-3;
+        assert!(others.len() >= 2 && others.contains(&given.points.len()), "the last point is none of the base");
         given.points.iter_mut().for_each(|point| point.sigma = 4e-4);
-        given.base = [4, 0, 2];
         (given.base_in_world, given.world_from_object, given.edges) = (None, None, Vec::new());
         let id = given.id.clone();
         let site = Site { name: id.clone(), frame: 0, objects: vec![given.clone()], warnings: Vec::new() };

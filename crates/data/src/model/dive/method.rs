@@ -19,7 +19,7 @@ use super::{
     finish::{Finish, largest_angle},
     gather::{Feature, Gathered},
     marks,
-    recover::{LineOfSight, recovered},
+    recover::{MarkRay, recovered},
     relocate::relocate,
     settle::{HELD, Key, Scene, Settled, settle},
     start::{Located, Marked, Marks, pairs_of},
@@ -296,10 +296,10 @@ impl<'a> Progress<'a> {
         let posed = |mark: &&Located| self.scene.poses[mark.pair].is_some();
         let lines =
             marked.iter().enumerate().filter(|(index, _)| !self.features[*index].corner || alone.contains(index));
-        let lines: Vec<LineOfSight> = lines
+        let lines: Vec<MarkRay> = lines
             .filter_map(|(feature, marked)| {
                 let mark = marked.marks.iter().find(posed)?;
-                Some(LineOfSight { feature, pair: mark.pair, mark: mark.mark.mark.left })
+                Some(MarkRay { feature, pair: mark.pair, mark: mark.mark.mark.left })
             })
             .collect();
         let known: Vec<usize> = self.places().into_iter().filter(|feature| !alone.contains(feature)).collect();

@@ -14,7 +14,7 @@ use crate::dataset::Dataset;
 
 /// The mark of a feature whose corner is searched for.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LineOfSight {
+pub(super) struct MarkRay {
     /// The index of the feature.
     pub(super) feature: usize,
     /// The pair of the mark.
@@ -48,7 +48,7 @@ pub(super) fn recovered(
     dataset: &Dataset,
     scene: &Scene,
     known: &[usize],
-    lines: &[LineOfSight],
+    lines: &[MarkRay],
 ) -> Vec<(usize, UncertainPoint<World>)> {
     if lines.is_empty() {
         return Vec::new();
@@ -61,11 +61,11 @@ pub(super) fn recovered(
         Some(View { pair: *pair, pose, images: [left, right] })
     };
     let views: Vec<View> = posed.into_iter().step_by(step).collect::<Vec<_>>().par_iter().filter_map(view).collect();
-    let corner = |line: &LineOfSight| Some((line.feature, line.corner(finder, scene, known, &views)?));
+    let corner = |line: &MarkRay| Some((line.feature, line.corner(finder, scene, known, &views)?));
     lines.par_iter().filter_map(corner).collect()
 }
 
-impl LineOfSight {
+impl MarkRay {
     /// The corner that most pairs confirm.
     fn corner(
         &self,

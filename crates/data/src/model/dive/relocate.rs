@@ -67,8 +67,8 @@ pub(super) fn relocate(
     let scored: Vec<(usize, Pose)> = refined.collect();
     let (count, pose) = *scored.iter().max_by_key(|(count, _)| *count)?;
     // Those that align with both cancel.
-    let rivals = |(other, at): &(usize, Pose)| other + DECISIVE > count && !same(&pose, at, scene, known);
-    (count >= MIN_ALIGNED && !scored.iter().any(rivals)).then_some(pose)
+    let as_good = |(other, at): &(usize, Pose)| other + DECISIVE > count && !same(&pose, at, scene, known);
+    (count >= MIN_ALIGNED && !scored.iter().any(as_good)).then_some(pose)
 }
 
 /// Whether two poses put the features at the same places: a pitch of a pattern is larger than a hundredth of the range.
