@@ -51,7 +51,7 @@ fn survey_object(
         .points
         .iter()
         .zip(&body.points)
-        .map(|(plan, corner)| Mark { id: &plan.id, at: corner.at, normal: Some(corner.normal), given: None })
+        .map(|(plan, corner)| Mark { id: &plan.id, at: corner.at, normal: Some(corner.normal) })
         .collect();
     survey_marks(&plan.id, base, &marks, errors, stream)
 }
@@ -62,8 +62,6 @@ pub(crate) struct Mark<'a> {
     pub(crate) at: Vector3<f64>,
     /// Outward normal of the side from which the point is visible.
     pub(crate) normal: Option<Vector3<f64>>,
-    /// The point of a given model, instead of a measurement with a random error.
-    pub(crate) given: Option<&'a ModelPoint>,
 }
 
 /// An object as surveyed, and the true pose of its surveyed points.
@@ -75,34 +73,19 @@ pub(crate) fn survey_marks(
     stream: &mut Stream,
 ) -> (SiteObject, Transform<World, Object>) {
     let truth: Vec<Vector3<f64>> = marks.iter().map(|mark| mark.at).collect();
-    // The model is measured on the object itself, with an independent error of each point. A given model has a frame of
-    // its own, in which the measurement takes place.
-    let measured: Vec<Point<World>> = marks
-        .iter()
-        .map(|mark| match mark.given {
-            Some(point) => Point::from(point.at.coords),
-            None => Point::from(mark.at + stream.normal3(errors.model)),
-        })
-        .collect();
+    // The model is measured on the object itself, with an independent error of each point.
+    let measured: Vec<Point<World>> = truth.iter().map(|p| Point::from(p + stream.normal3(errors.model))).collect();
     let [p1, p2, p3] = base.map(|k| measured[k]);
     let object_from_world =
         triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; sites are checked").inverse();
-    let given = marks.iter().any(|mark| mark.given.is_some());
-    let start = if given {
-        let [p1, p2, p3] = base.map(|k| Point::from(truth[k]));
-        triad::<World, Object>(&p1, &p2, &p3).expect("the base spans a plane; sites are checked")
-    } else {
-        object_from_world.inverse()
-    };
-    let turn = start.inverse().rotation();
     let points: Vec<ModelPoint> = marks
         .iter()
         .zip(&measured)
         .map(|(mark, at)| ModelPoint {
             id: mark.id.to_owned(),
             at: Point::from((object_from_world * *at).coords.map(micrometres)),
-            sigma: mark.given.map_or(errors.model, |point| point.sigma),
-            normal: mark.normal.map(|normal| (turn * normal).map(micrometres).normalize()),
+            sigma: errors.model,
+            normal: mark.normal.map(|normal| (object_from_world.rotation() * normal).map(micrometres).normalize()),
         })
         .collect();
     let base_in_world = surveyed_base(base.map(|k| truth[k]), base.map(|k| points[k].at), errors, stream);
@@ -117,7 +100,41 @@ pub(crate) fn survey_marks(
         edges: Vec::new(),
         interest: Vec::new(),
     };
+    let start = object_from_world.inverse();
     let world_from_object = best_fit(start, object.points.iter().map(|p| p.at).zip(truth));
+    (object, world_from_object)
+}
+
+/// A given model of an object with surveyed base points, and its true pose: the one that fits its points best.
+pub(crate) fn given_model(
+    given: &SiteObject,
+    marks: &[Mark<'_>],
+    errors: SurveyErrors,
+    stream: &mut Stream,
+) -> (SiteObject, Transform<World, Object>) {
+    let mark = |point: &ModelPoint| marks.iter().find(|mark| mark.id == point.id);
+    let known: Vec<&Mark<'_>> =
+        given.points.iter().map(|point| mark(point).expect("a plan's models have its points")).collect();
+    let truth = given.base.map(|k| known[k].at);
+    let [p1, p2, p3] = truth.map(Point::from);
+    let start = triad(&p1, &p2, &p3).expect("the base spans a plane; sites are checked");
+    let pairs = given.points.iter().map(|point| point.at).zip(known.iter().map(|mark| mark.at));
+    let world_from_object: Transform<World, Object> = best_fit(start, pairs);
+    let turn = world_from_object.inverse().rotation();
+    let side = |mark: &Mark<'_>| mark.normal.map(|normal| (turn * normal).map(micrometres).normalize());
+    let points =
+        given.points.iter().zip(&known).map(|(point, mark)| ModelPoint { normal: side(mark), ..point.clone() });
+    let base_in_world = surveyed_base(truth, given.base.map(|k| given.points[k].at), errors, stream);
+    let [s1, s2, s3] = &base_in_world;
+    let object = SiteObject {
+        base_in_world: Some(base_in_world),
+        survey_sigma: errors.survey,
+        world_from_object: triad(s1, s2, s3).ok(),
+        points: points.collect(),
+        edges: Vec::new(),
+        interest: Vec::new(),
+        ..given.clone()
+    };
     (object, world_from_object)
 }
 

@@ -33,7 +33,7 @@ pub use site_plan::SitePlan;
 use crate::{
     seabed::{Mound, Seabed},
     stream::{Purpose, Stream},
-    survey::{Mark, SurveyErrors, survey_marks},
+    survey::{Mark, SurveyErrors, given_model, survey_marks},
 };
 
 /// A feature point at its true position.
@@ -47,13 +47,21 @@ pub(crate) struct ScenePoint {
 /// One object at its true pose.
 #[derive(Debug, Clone)]
 pub(crate) struct SceneObject {
+    /// The feature points that the site lists, in its order.
     pub(crate) points: Vec<ScenePoint>,
+    /// The mean of all feature points, whether the site lists them or not: scene and route depend on it.
+    centroid: Vector3<f64>,
 }
 
 impl SceneObject {
-    /// The mean of the feature points.
+    fn new(points: Vec<ScenePoint>) -> Self {
+        let centroid = points.iter().map(|p| p.at).sum::<Vector3<f64>>() / points.len() as f64;
+        Self { points, centroid }
+    }
+
+    /// The mean of all feature points.
     pub(crate) fn centroid(&self) -> Vector3<f64> {
-        self.points.iter().map(|p| p.at).sum::<Vector3<f64>>() / self.points.len() as f64
+        self.centroid
     }
 }
 
@@ -88,26 +96,23 @@ impl Scene {
                     id: &p.id,
                     at: (before * p.at).coords,
                     normal: p.normal.map(|normal| before.rotation() * normal),
-                    given: plan.given(&object.id).and_then(|given| given.points.iter().find(|own| own.id == p.id)),
                 })
                 .collect();
             let mut stream = Stream::new(seed, 0, number, Purpose::Survey);
-            let (mut described, fit) = survey_marks(&object.id, object.base, &marks, errors, &mut stream);
+            let (mut described, fit) = match plan.given(&object.id) {
+                Some(given) => given_model(given, &marks, errors, &mut stream),
+                None => survey_marks(&object.id, object.base, &marks, errors, &mut stream),
+            };
             described.interest.clone_from(&object.interest);
             let centre = marks.iter().map(|m| m.at).sum::<Vector3<f64>>() / marks.len() as f64;
             let concerned = changes.concern(&object.id);
             let now = if concerned { changes.moved(&before, &centre, seed, number) } else { before };
             let moved = now * before.inverse();
-            objects.push(SceneObject {
-                points: object
-                    .points
-                    .iter()
-                    .map(|p| ScenePoint {
-                        at: (now * p.at).coords,
-                        normal: p.normal.map(|normal| now.rotation() * normal),
-                    })
-                    .collect(),
-            });
+            let point = |p: &seafix_referencing::ModelPoint| ScenePoint {
+                at: (now * p.at).coords,
+                normal: p.normal.map(|normal| now.rotation() * normal),
+            };
+            objects.push(SceneObject::new(object.points.iter().map(point).collect()));
             if concerned && changes.silt > 0.0 {
                 let reach = marks.iter().map(|m| (m.at - centre).xy().norm()).fold(0.0, f64::max);
                 mounds.push(Mound { centre: [centre.x, centre.y], radius: reach + 0.5, height: changes.silt });
@@ -135,6 +140,12 @@ impl Scene {
                 let mut stream = Stream::new(seed, 0, index as u64, Purpose::Occluders);
                 clutter::occluders(&mut mesh, &seabed, &centre, changes.occluders, &mut stream);
             }
+        }
+        // The points that the site lists, in its order.
+        for (object, (described, known)) in objects.iter_mut().zip(plan.site.objects.iter().zip(&nominal)) {
+            let place = |id: &str| described.points.iter().position(|point| point.id == id);
+            object.points =
+                known.points.iter().filter_map(|point| place(&point.id)).map(|k| object.points[k]).collect();
         }
         let bvh = Bvh::new(&mesh.triangles);
         let seabed_skin = mesh.skins.len() as u32;

@@ -15,6 +15,7 @@ pub struct SitePlan {
     /// The bodies in the format `seafix-geometry/1`.
     pub geometry: Geometry,
     /// Models of objects that methods receive instead of surveyed ones, each with the ids of its object and of its points.
+    /// A method receives the base of the model, and only its points.
     pub given: Vec<SiteObject>,
 }
 
@@ -45,7 +46,7 @@ impl SitePlan {
         Self::parse((&read(path)?, path), (&read(&other)?, &other))
     }
 
-    /// The site with given models from these files. An object has the base of its model, and only the model's points.
+    /// The site with given models from these files.
     ///
     /// # Errors
     /// Files that are no sites, and objects or points that this site does not have.
@@ -58,7 +59,7 @@ impl SitePlan {
                     let remedy = format!("give one of {}", names().collect::<Vec<_>>().join(", "));
                     return Err(vec![fault.value(format!("`{}`", given.id)).remedy(remedy)]);
                 };
-                let object = &mut self.site.objects[index];
+                let object = &self.site.objects[index];
                 if let Some(point) =
                     given.points.iter().find(|own| object.points.iter().all(|other| other.id != own.id))
                 {
@@ -67,9 +68,6 @@ impl SitePlan {
                     let names = object.points.iter().map(|point| point.id.as_str()).collect::<Vec<_>>().join(", ");
                     return Err(vec![fault.value(format!("`{}`", point.id)).remedy(format!("its points are {names}"))]);
                 }
-                object.points.retain(|point| given.points.iter().any(|own| own.id == point.id));
-                let place = |id: &str| object.points.iter().position(|point| point.id == id);
-                object.base = given.base.map(|k| place(&given.points[k].id).expect("the point was kept"));
                 self.given.push(given);
             }
         }
@@ -128,9 +126,12 @@ mod tests {
             let normal = pose.rotation() * a.normal.expect("the true side");
             assert!(normal.angle(&scene.objects[1].points[k].normal.unwrap()) < 2e-3);
         }
+        // Neither the bodies nor the centre that the route heads for depend on the model.
+        let full = Scene::new(&plain, &Changes::default(), errors, 3);
+        assert_eq!(scene.mesh.triangles.len(), full.mesh.triangles.len());
+        assert_eq!(scene.objects[1].centroid(), full.objects[1].centroid());
         // The other objects have the survey that they had.
-        let before = Scene::new(&plain, &Changes::default(), errors, 3);
-        assert_eq!(before.nominal.objects[0], scene.nominal.objects[0]);
+        assert_eq!(full.nominal.objects[0], scene.nominal.objects[0]);
 
         let message = |site: Site| {
             std::fs::write(&file, site.to_toml()).unwrap();

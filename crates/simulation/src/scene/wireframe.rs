@@ -38,7 +38,9 @@ pub(crate) fn add_edges(scene: &mut Scene, plan: &SitePlan, sigma: f64, fraction
         let mut places: Vec<(Vector3<f64>, Point<Object>)> = Vec::new();
         // The survey describes the object as built; a displacement since then moves the scene only.
         let nominal = &scene.nominal.objects[index];
-        let fit = surveyed(nominal.points.iter(), described.points.iter(), &before, &scene.world_from_object[index]);
+        let truly = |point: &ModelPoint| described.points.iter().find(|other| other.id == point.id);
+        let known: Vec<&ModelPoint> = nominal.points.iter().filter_map(truly).collect();
+        let fit = surveyed(nominal.points.iter(), known.iter().copied(), &before, &scene.world_from_object[index]);
         let listed = |k: usize| libm::floor((k + 1) as f64 * fraction) > libm::floor(k as f64 * fraction);
         let mut edges = Vec::new();
         for (number, edge) in wireframe(shape).into_iter().enumerate() {
@@ -46,7 +48,7 @@ pub(crate) fn add_edges(scene: &mut Scene, plan: &SitePlan, sigma: f64, fraction
                 continue;
             }
             let ends = edge.ends.map(|end| {
-                if let Some(point) = described.points.iter().position(|p| (p.at.coords - end).norm() < SAME) {
+                if let Some(point) = known.iter().position(|p| (p.at.coords - end).norm() < SAME) {
                     return End::Point(point);
                 }
                 if let Some((_, at)) = places.iter().find(|(known, _)| (known - end).norm() < SAME) {

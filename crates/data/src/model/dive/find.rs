@@ -74,7 +74,7 @@ pub(super) const GATE: f64 = 23.512_7;
 /// The largest radius of a search, in units of the reach: corners farther away are as likely others.
 const MAX_RADIUS: f64 = 3.0;
 /// The distance (px) of the starts of the locator; it moves farther than half of it.
-const SPACING: f64 = 3.0;
+pub(super) const SPACING: f64 = 3.0;
 /// The distance (px) below which two located corners are one.
 const SAME: f64 = 0.5;
 /// The minimum correlation of a feature's neighbourhood with its template. Half of a window may show another background.
@@ -138,7 +138,7 @@ impl Finder<'_> {
         Ok(Found { correlation, ..found })
     }
 
-    /// The corners near `places`, each once, in the camera of the pair.
+    /// The corners within [`SPACING`] px of `places`, each once, in the camera of the pair.
     pub(super) fn corners_along(
         &self,
         [left, right]: [&Image; 2],

@@ -18,6 +18,7 @@ mod method;
 mod operator;
 mod picture;
 mod plane;
+mod progress;
 mod propose;
 mod recover;
 mod relocate;

@@ -39,7 +39,6 @@ impl SimulatedOperator {
             let mut stream = Stream::new(self.seed, 0, number as u64, Purpose::Marks);
             let seen = |frame: &DatasetFrame| {
                 frame.visible.iter().find(|(object, name)| object == id && *name == point.id)?;
-
                 let pixels = dataset.rig.project(&(frame.truth?.inverse() * (world_from_object * point.at)))?;
                 Some((frame.stamp_ns, pixels.left))
             };

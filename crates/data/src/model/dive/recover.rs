@@ -9,7 +9,11 @@ use rayon::prelude::*;
 use seafix_geometry::{Camera, Pixel, Point, UncertainPoint, World};
 use seafix_vision::Image;
 
-use super::{expect::ExpectedPose, find::Finder, settle::Scene};
+use super::{
+    expect::ExpectedPose,
+    find::{Finder, SPACING},
+    settle::Scene,
+};
 use crate::dataset::Dataset;
 
 /// The mark of a feature whose corner is searched for.
@@ -30,14 +34,12 @@ struct View {
     images: [Image; 2],
 }
 
-/// The maximum number of pairs that are read: more decide nothing that a dozen leaves open.
+/// The maximum number of pairs that are read: their images are in memory together.
 const EXAMINED: usize = 12;
 /// The number of those, nearest to the mark's pair, whose corners are candidates.
 const PROPOSING: usize = 4;
 /// The depths that are searched, relative to the smallest and the largest depth of the known features.
 const DEPTHS: [f64; 2] = [0.8, 1.25];
-/// The distance (px) of the places on a line of sight.
-const SPACING: f64 = 3.0;
 /// The minimum number of pairs that confirm a corner.
 const MIN_CONFIRMED: usize = 3;
 

@@ -30,7 +30,8 @@ const NEAR: f64 = 3.0;
 const COMPARED: usize = 24;
 /// The number of surroundings by which the best pose must exceed another, of those that align with one of both alone.
 ///
-/// Elsewhere than at its feature, fewer than one window in ten aligns: four do by chance in fewer than 1e-4 of cases.
+/// If one window in ten aligned elsewhere than at its feature, four would in 1e-4 of cases. On OpenCV's chessboard the
+/// nearest other pose aligns six fewer of 54.
 const DECISIVE: usize = 4;
 /// The minimum number of features with aligned surroundings: one more than determine the pose.
 const MIN_ALIGNED: usize = 4;
