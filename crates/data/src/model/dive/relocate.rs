@@ -66,9 +66,14 @@ pub(super) fn relocate(
         Some((aligned(finder, images, &pose, scene, features, known), pose))
     });
     let scored: Vec<(usize, Pose)> = refined.collect();
+    decided(&scored, |a, b| same(a, b, scene, known))
+}
+
+/// The pose with the largest number of aligned surroundings; `None` for too few, or if another pose has nearly as many.
+fn decided(scored: &[(usize, Pose)], same: impl Fn(&Pose, &Pose) -> bool) -> Option<Pose> {
     let (count, pose) = *scored.iter().max_by_key(|(count, _)| *count)?;
     // Those that align with both cancel.
-    let as_good = |(other, at): &(usize, Pose)| other + DECISIVE > count && !same(&pose, at, scene, known);
+    let as_good = |(other, at): &(usize, Pose)| other + DECISIVE > count && !same(&pose, at);
     (count >= MIN_ALIGNED && !scored.iter().any(as_good)).then_some(pose)
 }
 
@@ -192,4 +197,25 @@ fn aligned(
         finder.aligned(images[0], &appearance, place, REACH).map(|_| ())
     };
     known.iter().filter(|feature| aligns(**feature).is_some()).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_counts_if_no_other_is_nearly_as_good() {
+        let at = |x: f64| Pose::exp(&[0.0, 0.0, 0.0, x, 0.0, 0.0].into());
+        let same = |a: &Pose, b: &Pose| (a.translation() - b.translation()).norm() < 0.01;
+        let decided = |scored: &[(usize, f64)]| {
+            let scored: Vec<(usize, Pose)> = scored.iter().map(|(count, x)| (*count, at(*x))).collect();
+            decided(&scored, same).map(|pose| pose.translation().x)
+        };
+        // The same pose by two triangles, and a shift of a pattern.
+        assert_eq!(decided(&[(50, 0.125), (54, 0.0), (53, 0.001)]), Some(0.0));
+        assert_eq!(decided(&[(51, 0.125), (54, 0.0)]), None);
+        assert_eq!(decided(&[(4, 0.0), (0, 1.0)]), Some(0.0));
+        assert_eq!(decided(&[(3, 0.0)]), None);
+        assert_eq!(decided(&[]), None);
+    }
 }
