@@ -61,10 +61,7 @@ impl CloudInput {
 
     fn of_images(&self, right: &Path, rig: &Path) -> Result<CloudPair, Failure> {
         let input = |fault: Fault| Failure::new(INPUT, fault);
-        if self.pairs_of.is_given() {
-            let what = "cannot use --source: two images have no topics; give a recording in place of the images";
-            return Err(Failure::new(USAGE, what.to_owned()));
-        }
+        self.pairs_of.of_no_recording()?;
         let Rig { stereo: rig, bits, file, warning, .. } = Rig::from_file(rig).map_err(input)?;
         let limits = self.limits.of_images();
         let images = [

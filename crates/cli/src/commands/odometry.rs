@@ -18,7 +18,10 @@ use seafix_navigation::{
 use seafix_vision::{RightCameraRotation, Threads};
 use serde_json::{Value, json};
 
-use super::{pairs_of::PairsOf, set::built};
+use super::{
+    pairs_of::{PairsOf, turned, with_readings},
+    set::built,
+};
 use crate::{
     atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
@@ -79,14 +82,7 @@ impl Odometer {
         let (odometry, settings) = self.build()?;
         let mut pairs = self.pairs_of.open(&self.pairs, self.sort_stamps, ImageLimits::default())?;
         pairs.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
-        if odometry.needs_readings() && !pairs.has_readings() {
-            let what = format!("no readings for odometry `{}`", self.odometry);
-            let description = pairs.path().join("dataset.toml");
-            let fault = Fault::new(what, if description.exists() { &description } else { pairs.path() });
-            let remedy =
-                "name the tables of the Doppler log and the gyro, `doppler = …` and `gyro = …`, or use `stereo`";
-            return Err(Failure::new(INPUT, fault.remedy(remedy)));
-        }
+        with_readings(&pairs, &*odometry, &self.odometry)?;
         let pool = ThreadPoolBuilder::new()
             .num_threads(usize::from(self.threads))
             .build()
@@ -112,7 +108,7 @@ impl Odometer {
         if let Some(fault) = trip.motionless(pairs.path()) {
             return Err(Failure::new(INPUT, fault));
         }
-        let reported = right_camera_rotation.as_ref().map(|found| turned(found).to_string());
+        let reported = right_camera_rotation.as_ref().map(turned);
         let reported = reported.into_iter().chain(range_offset.as_ref().map(offset));
         let warnings: Vec<String> = reported.chain(trip.warnings()).collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
@@ -183,17 +179,6 @@ impl Odometer {
         let range_offset = session.range_offset();
         Ok(Trip { trajectory: session.trajectory(), given, unread, odometry_ms, range_offset })
     }
-}
-
-/// The warning of a corrected rotation of the right camera.
-fn turned(found: &RightCameraRotation) -> String {
-    let [baseline, ray] = found.turn.map(f64::to_degrees);
-    format!(
-        "the images contradict the rig: matches are {:.1} px (median) off its epipolar lines; the right camera was turned by \
-         {baseline:.3}° about the baseline and {ray:.3}° about its line of sight, which leaves {:.1} px (`--keep-rig` \
-         prevents it); calibrate again, since other parameters may be wrong too",
-        found.given_px, found.left_px
-    )
 }
 
 /// The warning of an offset of the disparities.

@@ -6,11 +6,15 @@ use std::{
     sync::OnceLock,
 };
 
-use seafix_data::dataset::{Dataset, write_png};
+use seafix_data::{
+    StereoPairs,
+    dataset::{Dataset, write_png},
+    source::Mcap,
+};
 use seafix_geometry::Pixel;
 use tempfile::TempDir;
 
-use crate::{Ended, ended_with, program};
+use crate::{Ended, ended_with, program, recordings::recording_of};
 
 /// Half an orbit of six pairs around an object, whose site is the truth.
 const DIVE: &str = r#"
@@ -236,4 +240,43 @@ fn proposals_are_marks_and_a_page() {
     let marks = fs::read_to_string(&out).unwrap();
     assert!(marks.starts_with(HEADER) && (2..=13).contains(&marks.lines().count()), "{marks}");
     assert!(fs::read_to_string(here.join("page.html")).unwrap().contains("data:image/png;base64,"));
+}
+
+/// A recording and the log of a run give the model of their images.
+#[test]
+fn a_recording_and_a_log_are_dives() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let source = dive().join("dive");
+    let dataset = Dataset::open(&source).unwrap();
+    let lines = marks();
+    model(here, &source, &table(&lines), &["--out", "a.toml"], 0);
+
+    let experiment = format!(
+        "question = 'Where?'\n[source]\nname = 'dataset'\npath = '{}'\n[log]\nimages = 'all'\n",
+        source.display()
+    );
+    fs::write(here.join("e.toml"), experiment).unwrap();
+    ended_with(0, program().current_dir(here).args(["run", "e.toml", "--out", "out"]));
+    let entries = fs::read_dir(here.join("out")).unwrap().map(|entry| entry.unwrap().path());
+    let log = entries.into_iter().find(|path| path.extension().is_some_and(|end| end == "mcap")).unwrap();
+    model(here, &log, &table(&lines), &["--out", "b.toml"], 0);
+    assert_eq!(fs::read(here.join("a.toml")).unwrap(), fs::read(here.join("b.toml")).unwrap());
+
+    let images = dataset.frames.iter().map(|frame| [&frame.left, &frame.right].map(|file| fs::read(file).unwrap()));
+    let left = dataset.rig.left();
+    recording_of(images.collect(), left.size(), left.focal()[0], dataset.rig.baseline(), &here.join("dive.mcap"));
+    // A pair has another time there.
+    let place = |stamp: &str| dataset.frames.iter().position(|frame| frame.stamp_ns.to_string() == stamp).unwrap();
+    let recorded = StereoPairs::open(&here.join("dive.mcap"), &Mcap::default()).unwrap();
+    let renamed = |line: &String| {
+        let (stamp, rest) = line.split_once(',').unwrap();
+        format!("{},{rest}", recorded.stamps()[place(stamp)])
+    };
+    let lines: Vec<String> = lines.iter().map(renamed).collect();
+    model(here, &here.join("dive.mcap"), &table(&lines), &["--out", "c.toml"], 0);
+    let mut eval = program();
+    let text = ended_with(0, eval.arg("eval").args(["a.toml", "c.toml"].map(|name| here.join(name)))).out;
+    let rms: f64 = text.split("RMS ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(rms < 0.05, "{text}");
 }

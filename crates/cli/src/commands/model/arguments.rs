@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{super::limits::Limits, dive_arguments::DiveArguments};
+use super::{
+    super::{limits::Limits, pairs_of::PairsOf},
+    dive_arguments::DiveArguments,
+};
 use crate::{
     atomic_file::{AtomicFile, Replacing},
     exit::{DONE, Ended},
@@ -13,7 +16,8 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Model {
-    /// The left image, or with --marks, --propose or --true-marks the folder of a dive: a data set.
+    /// The left image, or with --marks or --propose a dive: the folder of a data set, a recording of ROS 2 (an
+    /// MCAP file or a folder of rosbag2) or the log of a trial with its images; with --true-marks a data set.
     #[arg(value_name = "LEFT or DIVE")]
     pub(super) left: PathBuf,
     /// The right image.
@@ -31,6 +35,8 @@ pub(crate) struct Model {
     pub(super) marks: Option<PathBuf>,
     #[command(flatten)]
     pub(super) dive: DiveArguments,
+    #[command(flatten)]
+    pub(super) pairs_of: PairsOf,
     /// The id of the object.
     #[arg(long, default_value = "object")]
     pub(super) id: String,

@@ -3,13 +3,11 @@
 use std::path::Path;
 
 use seafix_component::{Fault, read_text};
-use seafix_data::{
-    CalibrationSigma, DiveModel, DivePoint, ModelByHand, ModelFromDive,
-    dataset::{Dataset, right_camera_rotation, swapped_at_first},
-};
+use seafix_data::{CalibrationSigma, DiveModel, DivePoint, ModelByHand, ModelFromDive, StereoPairs};
 use serde_json::{Value, json};
 
 use super::{
+    super::pairs_of::turned,
     arguments::{Model, Printed},
     page, pair,
 };
@@ -19,48 +17,42 @@ use crate::{
     terminal::{Progress, notify},
 };
 
-/// The data set of a dive, with its rig as the images show it; warnings are printed.
-pub(super) fn opened(model: &Model) -> Result<Dataset, Failure> {
-    let dataset = Dataset::open_pairs(&model.left, false).map_err(|faults| Failure::faults(INPUT, &faults))?;
-    let mut dataset = dataset.within(model.limits.of_images());
-    let odd = dataset.odd_times();
-    dataset.warnings.iter().chain(&odd).for_each(|warning| notify(&format!("warning: {warning}")));
-    if let Some(fault) = swapped_at_first(&dataset) {
+/// The pairs of a dive, with their rig as the images show it; warnings are printed.
+pub(super) fn opened(model: &Model) -> Result<StereoPairs, Failure> {
+    let mut pairs = model.pairs_of.open(&model.left, false, model.limits.of_images())?;
+    pairs.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
+    if let Some(fault) = pairs.swapped() {
         return Err(Failure::new(INPUT, fault));
     }
-    let rotation = if model.dive.keep_rig { None } else { right_camera_rotation(&dataset) };
+    let rotation = if model.dive.keep_rig { None } else { pairs.right_camera_rotation() };
     if let Some(found) = rotation {
-        dataset.rig = found.rig;
-        notify(&format!(
-            "warning: the images contradict the rig: matches are {:.1} px (median) off its epipolar lines, and {:.1} px \
-             after a rotation of the right camera, which was corrected (`--keep-rig` prevents it); calibrate again",
-            found.given_px, found.left_px
-        ));
+        notify(&format!("warning: {}", turned(&found)));
+        pairs.rig = found.rig;
     }
-    Ok(dataset)
+    Ok(pairs)
 }
 
 /// Builds the model of a dive and writes it.
 pub(super) fn execute(model: &Model, marks: &Path, by_hand: ModelByHand<'_>, calibration: CalibrationSigma) -> Ended {
     let faults = |faults: Vec<Fault>| Failure::faults(INPUT, &faults);
     let arguments = &model.dive;
-    let dataset = opened(model)?;
-    let odometry = arguments.odometry(&dataset)?;
+    let dive = opened(model)?;
+    let odometry = arguments.odometry(&dive)?;
     let text = read_text(marks).map_err(|fault| Failure::new(INPUT, fault))?;
     let inputs = [&*model.left, marks];
     let (halves, pictures) = (arguments.half, arguments.page.is_some());
     let corner_sigma = arguments.corner_sigma;
     let from_dive =
         ModelFromDive { by_hand, calibration, corner_sigma, odometry: odometry.as_deref(), halves, pictures };
-    if dataset.frames.len() == 1 {
-        let built = from_dive.of_only_pair(&dataset, &text, marks).map_err(faults)?;
+    if dive.stamps().len() == 1 {
+        let built = from_dive.of_only_pair(&dive, &text, marks).map_err(faults)?;
         return model.finish(&pair::printed(&built), &inputs);
     }
     // An output that cannot be written is reported before the work.
     let page = arguments.page.as_deref().map(|path| AtomicFile::begin(path, model.replacing, &inputs)).transpose()?;
     let progress = Progress::new();
-    progress.expect(dataset.frames.len());
-    let built = arguments.pool()?.install(|| from_dive.model(&dataset, &text, marks, &mut || progress.step("")));
+    progress.expect(dive.stamps().len());
+    let built = arguments.pool()?.install(|| from_dive.model(&dive, &text, marks, &mut || progress.step("")));
     progress.end();
     let built = built.map_err(faults)?;
     if let Some(page) = page {

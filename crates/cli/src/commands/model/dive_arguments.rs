@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use seafix_component::{Choice, Fault};
-use seafix_data::{CalibrationSigma, ModelFromDive, dataset::Dataset};
+use seafix_component::Choice;
+use seafix_data::{CalibrationSigma, ModelFromDive, StereoPairs};
 use seafix_navigation::{ODOMETRIES, Odometry};
 
-use crate::exit::{Failure, INPUT, OUTPUT, USAGE};
+use super::super::pairs_of::with_readings;
+use crate::exit::{Failure, OUTPUT, USAGE};
 
 #[derive(Debug, Args)]
 pub(super) struct DiveArguments {
@@ -64,7 +65,7 @@ impl DiveArguments {
     }
 
     /// The odometry by its name; `None` for `none`.
-    pub(super) fn odometry(&self, dataset: &Dataset) -> Result<Option<Box<dyn Odometry>>, Failure> {
+    pub(super) fn odometry(&self, dive: &StereoPairs) -> Result<Option<Box<dyn Odometry>>, Failure> {
         if self.odometry == "none" {
             return Ok(None);
         }
@@ -75,13 +76,7 @@ impl DiveArguments {
             *corrects = false.into();
         }
         let odometry = ODOMETRIES.build(&choice).map_err(usage)?;
-        if odometry.needs_readings() && !dataset.has_readings() {
-            let what = format!("no readings for odometry `{}`", self.odometry);
-            let fault = Fault::new(what, &dataset.folder.join("dataset.toml"));
-            let remedy =
-                "name the tables of the Doppler log and the gyro, `doppler = …` and `gyro = …`, or use `stereo`";
-            return Err(Failure::new(INPUT, fault.remedy(remedy)));
-        }
+        with_readings(dive, &*odometry, &self.odometry)?;
         Ok(Some(odometry))
     }
 

@@ -51,6 +51,7 @@ impl Model {
         match (&self.marks, &self.right, &self.rig, &self.points) {
             (Some(marks), ..) => dive::execute(self, marks, by_hand, calibration),
             (None, Some(right), Some(rig), Some(points)) => {
+                self.pairs_of.of_no_recording()?;
                 pair::execute(self, &PairFiles { left: &self.left, right, rig, points }, &by_hand)
             }
             // The parser of the command line requires the others without --marks.

@@ -16,8 +16,8 @@ const INTRODUCTION: &str = "Delete the lines of features that the object should 
 
 /// Proposes features, and writes them as marks and as a page of pictures.
 pub(super) fn execute(model: &Model, count: usize, front_end: &FrontEnd) -> Ended {
-    let dataset = dive::opened(model)?;
-    let Some(odometry) = model.dive.odometry(&dataset)? else {
+    let pairs = dive::opened(model)?;
+    let Some(odometry) = model.dive.odometry(&pairs)? else {
         let message =
             "cannot propose features without an odometry: views of one feature are found by it; omit --odometry none";
         return Err(Failure::new(USAGE, message));
@@ -27,17 +27,18 @@ pub(super) fn execute(model: &Model, count: usize, front_end: &FrontEnd) -> Ende
     let sheet = model.dive.page.as_deref().map(|path| AtomicFile::begin(path, model.replacing, &inputs)).transpose()?;
     let proposer = Proposer { front_end, odometry: &*odometry, count };
     let progress = Progress::new();
-    progress.expect(dataset.frames.len());
-    let (proposals, unread) = model.dive.pool()?.install(|| proposer.propose(&dataset, &mut || progress.step("")));
+    progress.expect(pairs.stamps().len());
+    let (proposals, unread) = model.dive.pool()?.install(|| proposer.propose(&pairs, &mut || progress.step("")));
     progress.end();
     unread.iter().for_each(|fault| notify(&format!("warning: {fault}")));
     if proposals.is_empty() {
-        let fault = Fault::new("no feature to propose: none is seen in five pairs over 15° to 2 mm", &dataset.folder);
+        let fault = Fault::new("no feature to propose: none is seen in five pairs over 15° to 2 mm", pairs.path());
         return Err(Failure::new(INPUT, fault.remedy("pass the object on crossing paths, or mark features by hand")));
     }
     if let Some(sheet) = sheet {
         let entries: Vec<page::Entry<'_>> = proposals.iter().map(entry).collect();
-        let title = format!("Proposed features of {}", dataset.name);
+        let name = pairs.path().file_name().unwrap_or(pairs.path().as_os_str());
+        let title = format!("Proposed features of {}", name.display());
         let text = page::page(&title, INTRODUCTION, &entries).map_err(|message| Failure::new(OUTPUT, message))?;
         sheet.finish(text)?;
     }

@@ -10,7 +10,7 @@ use super::{
     picture::{HALF, Picture, cut},
     settle::Scene,
 };
-use crate::dataset::Dataset;
+use crate::StereoPairs;
 
 /// Number of views of each point.
 const VIEWS: usize = 3;
@@ -26,7 +26,7 @@ pub(super) struct Shown {
 /// The pictures of each point: the view of the highest resolution, and those whose directions differ most from it.
 ///
 /// Every pair is read once. The standard deviations are those of the point's expected position in the image.
-pub(super) fn pictures(dataset: &Dataset, scene: &Scene, points: &[Shown]) -> Vec<Vec<Picture>> {
+pub(super) fn pictures(dive: &StereoPairs, scene: &Scene, points: &[Shown]) -> Vec<Vec<Picture>> {
     let mut wanted: BTreeMap<usize, Vec<(usize, usize)>> = BTreeMap::new();
     for (index, point) in points.iter().enumerate() {
         for (rank, pair) in chosen(scene, point).into_iter().enumerate() {
@@ -35,15 +35,14 @@ pub(super) fn pictures(dataset: &Dataset, scene: &Scene, points: &[Shown]) -> Ve
     }
     let mut pictures: Vec<Vec<(usize, Picture)>> = points.iter().map(|_| Vec::new()).collect();
     for (pair, all) in wanted {
-        let frame = &dataset.frames[pair];
-        let (Some(world_from_camera), Ok((left, _))) = (scene.poses[pair], dataset.pair(frame)) else { continue };
+        let (Some(world_from_camera), Ok((left, _))) = (scene.poses[pair], dive.pair(pair)) else { continue };
         let pose = ExpectedPose { world_from_camera, covariance: nalgebra::Matrix6::zeros() };
         for (index, rank) in all {
-            let Some(expected) = pose.position(&dataset.rig, &points[index].at, &points[index].covariance) else {
+            let Some(expected) = pose.position(&dive.rig, &points[index].at, &points[index].covariance) else {
                 continue;
             };
             let Some((image, place)) = cut(&left, expected.0, HALF) else { continue };
-            pictures[index].push((rank, Picture { stamp_ns: frame.stamp_ns, image, place, sigma: expected.1 }));
+            pictures[index].push((rank, Picture { stamp_ns: dive.stamps()[pair], image, place, sigma: expected.1 }));
         }
     }
     let sorted = pictures.into_iter().map(|mut all| {

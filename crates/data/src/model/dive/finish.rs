@@ -21,7 +21,7 @@ use super::{
     trail::Trail,
 };
 use crate::{
-    dataset::Dataset,
+    StereoPairs,
     model::{
         adjust::{CalibrationSigma, PointSpread},
         by_hand::{GRAIN, MIN_SINE, ModelByHand, ONE_POINT},
@@ -34,7 +34,7 @@ pub(super) struct Finish<'a> {
     pub(super) by_hand: &'a ModelByHand<'a>,
     pub(super) calibration: &'a CalibrationSigma,
     pub(super) corner_sigma: f64,
-    pub(super) dataset: &'a Dataset,
+    pub(super) dive: &'a StereoPairs,
     pub(super) marked: &'a [Marked],
     /// The features that were searched for, in the order of `marked`.
     pub(super) features: &'a [Feature],
@@ -84,7 +84,7 @@ impl Finish<'_> {
             .collect();
         if self.pictures {
             let shown: Vec<Shown> = (0..features.len()).map(|k| self.shown(k, &free)).collect();
-            let all = pictures(self.dataset, self.scene, &shown);
+            let all = pictures(self.dive, self.scene, &shown);
             made.iter_mut().zip(all).for_each(|(point, pictures)| point.pictures = pictures);
         }
         let object = SiteObject {
@@ -109,20 +109,20 @@ impl Finish<'_> {
             site,
             points: made,
             given_up: self.given_up(),
-            pairs: self.dataset.frames.len(),
+            pairs: self.dive.stamps().len(),
             used: pairs.iter().map(|pair| self.stamp(*pair)).collect(),
             excess: DiveModel::excess_of(excess),
             chi2: disagreements.iter().sum::<f64>() + of_motions,
             dof: adjustment.dof(),
             motions: adjustment.motions.len(),
             sides: self.sides(&frame.world_from_object, &frame.points),
-            halves: self.halves.then(|| halves(&self.dataset.rig, self.trail, self.scene, &pixels, pairs)).flatten(),
+            halves: self.halves.then(|| halves(&self.dive.rig, self.trail, self.scene, &pixels, pairs)).flatten(),
             warnings,
         })
     }
 
     fn stamp(&self, pair: usize) -> u64 {
-        self.dataset.frames[pair].stamp_ns
+        self.dive.stamps()[pair]
     }
 
     /// Adds the errors that all observations of a point have in common: more pairs do not reduce them.
@@ -131,7 +131,7 @@ impl Finish<'_> {
     /// directions across the view. The place that a locator calls a corner differs from the physical one by σ z/f in all
     /// directions, with the mean depth z of the observations.
     fn add_common(&self, spread: &mut PointSpread) {
-        let focal = self.dataset.rig.mean_focal();
+        let focal = self.dive.rig.mean_focal();
         for (k, feature) in self.settled.features.iter().enumerate() {
             let at = self.settled.adjustment.points[k];
             let depth = |pose: &Transform<World, Camera>| (pose.inverse() * at).coords.z;

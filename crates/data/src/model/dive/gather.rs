@@ -15,7 +15,7 @@ use super::{
     template::Template,
     trail::Trail,
 };
-use crate::dataset::Dataset;
+use crate::StereoPairs;
 
 /// A feature that is searched for.
 #[derive(Debug, Clone)]
@@ -50,13 +50,14 @@ impl Gathered {
         !self.seen.contains_key(key) && !missed
     }
 
-    /// Searches for the `features` with the indices `known` in all pairs of `dataset` whose poses are known; returns the number of new findings.
+    /// Searches for the `features` with the indices `known` in all pairs of the dive whose poses are known; returns the
+    /// number of new findings.
     ///
     /// A pair is read only if it may show a feature that it was not searched for at that place before. Pairs are
     /// independent, so the result does not depend on the number of threads.
     pub(super) fn gather(
         &mut self,
-        dataset: &Dataset,
+        dive: &StereoPairs,
         finder: &Finder<'_>,
         trail: &Trail,
         scene: &Scene,
@@ -75,7 +76,7 @@ impl Gathered {
             if expected.is_empty() {
                 return None;
             }
-            Some(dataset.pair(&dataset.frames[pair]).map(|(left, right)| {
+            Some(dive.pair(pair).map(|(left, right)| {
                 let search = |(index, expectation): &(usize, Expectation)| {
                     let feature = &features[*index];
                     let appearance = appearance(feature, &scene.features[*index], &pose, scene);
@@ -85,7 +86,7 @@ impl Gathered {
                 expected.iter().map(search).collect()
             }))
         };
-        let results: Vec<_> = (0..dataset.frames.len()).into_par_iter().map(search).collect();
+        let results: Vec<_> = (0..dive.stamps().len()).into_par_iter().map(search).collect();
         let (mut count, mut unread) = (0, Vec::new());
         for result in results.into_iter().flatten() {
             match result {

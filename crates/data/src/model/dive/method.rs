@@ -17,7 +17,7 @@ use super::{
     trail::Trail,
 };
 use crate::{
-    dataset::Dataset,
+    StereoPairs,
     model::{
         adjust::CalibrationSigma,
         by_hand::{HandModel, ModelByHand},
@@ -49,20 +49,20 @@ impl ModelFromDive<'_> {
     /// 1.3 of its degrees of freedom for eleven of fourteen, 2 to 17 for the others.
     pub const CORNER_SIGMA: f64 = 0.03;
 
-    /// Builds the model of the only pair of `dataset`, as [`ModelByHand`] does.
+    /// Builds the model of the only pair of a dive, as [`ModelByHand`] does.
     ///
     /// # Errors
     /// Invalid marks.
-    pub fn of_only_pair(&self, dataset: &Dataset, text: &str, file: &Path) -> Result<HandModel, Vec<Fault>> {
-        let marks = marks::read(text, file, sizes(dataset)).map_err(|fault| vec![fault])?;
-        pairs_of(dataset, &marks, file)?;
+    pub fn of_only_pair(&self, dive: &StereoPairs, text: &str, file: &Path) -> Result<HandModel, Vec<Fault>> {
+        let marks = marks::read(text, file, sizes(dive)).map_err(|fault| vec![fault])?;
+        pairs_of(dive, &marks, file)?;
         let one = |fault| vec![fault];
-        let (left, right) = dataset.pair(&dataset.frames[0]).map_err(one)?;
+        let (left, right) = dive.pair(0).map_err(one)?;
         let marks = marks.into_iter().map(|mark| mark.mark).collect();
-        self.by_hand.of_marks([&left, &right], &dataset.rig, marks, file).map_err(one)
+        self.by_hand.of_marks([&left, &right], &dive.rig, marks, file).map_err(one)
     }
 
-    /// Builds a model from the marks in `text`, the content of `file`, and all pairs of `dataset`.
+    /// Builds a model from the marks in `text`, the content of `file`, and all pairs of a dive.
     ///
     /// `progress` is called for each pair of the odometry.
     ///
@@ -70,25 +70,25 @@ impl ModelFromDive<'_> {
     /// All faults of the marks, pairs without connection, or fewer than three points that remain.
     pub fn model(
         &self,
-        dataset: &Dataset,
+        dive: &StereoPairs,
         text: &str,
         file: &Path,
         progress: &mut dyn FnMut(),
     ) -> Result<DiveModel, Vec<Fault>> {
-        let marks = marks::read(text, file, sizes(dataset)).map_err(|fault| vec![fault])?;
-        let Marks { features: marked, unmatched } = self.by_hand.located(dataset, marks, file)?;
+        let marks = marks::read(text, file, sizes(dive)).map_err(|fault| vec![fault])?;
+        let Marks { features: marked, unmatched } = self.by_hand.located(dive, marks, file)?;
         if marked.iter().filter(|feature| feature.marks[0].measured.is_some()).count() < HELD {
             return Err(unmatched);
         }
         let (trail, unread) = match self.odometry {
-            Some(odometry) => Trail::by_odometry(dataset, odometry, progress),
-            None => (Trail::unknown(dataset.frames.len()), Vec::new()),
+            Some(odometry) => Trail::by_odometry(dive, odometry, progress),
+            None => (Trail::unknown(dive.stamps().len()), Vec::new()),
         };
-        let finder = Finder { front_end: self.by_hand.front_end, rig: &dataset.rig, reach: self.by_hand.reach };
+        let finder = Finder { front_end: self.by_hand.front_end, rig: &dive.rig, reach: self.by_hand.reach };
         let mut state = Progress::begin(&marked, trail, finder, unread);
-        let settled = state.rounds(dataset, &marked, file)?;
+        let settled = state.rounds(dive, &marked, file)?;
         let alone = state.unconfirmed(&settled);
-        let settled = if alone.is_empty() { settled } else { state.without(&alone, dataset, file)? };
+        let settled = if alone.is_empty() { settled } else { state.without(&alone, dive, file)? };
         let faults = contradictions(&marked, &state.gathered.seen, &settled, file);
         if !faults.is_empty() {
             return Err(faults);
@@ -97,7 +97,7 @@ impl ModelFromDive<'_> {
             by_hand: &self.by_hand,
             calibration: &self.calibration,
             corner_sigma: self.corner_sigma,
-            dataset,
+            dive,
             marked: &marked,
             features: &state.features,
             trail: &state.trail,
@@ -114,6 +114,6 @@ impl ModelFromDive<'_> {
     }
 }
 
-fn sizes(dataset: &Dataset) -> [[u32; 2]; 2] {
-    [dataset.rig.left(), dataset.rig.right()].map(seafix_geometry::Pinhole::size)
+fn sizes(dive: &StereoPairs) -> [[u32; 2]; 2] {
+    [dive.rig.left(), dive.rig.right()].map(seafix_geometry::Pinhole::size)
 }

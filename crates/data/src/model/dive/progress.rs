@@ -22,7 +22,7 @@ use super::{
     trail::Trail,
 };
 use crate::{
-    dataset::Dataset,
+    StereoPairs,
     model::{adjust::CalibrationSigma, frame::inner},
 };
 
@@ -100,19 +100,19 @@ impl<'a> Progress<'a> {
     /// Searches and adjusts until nothing new is found.
     pub(super) fn rounds(
         &mut self,
-        dataset: &'a Dataset,
+        dive: &'a StereoPairs,
         marked: &[Marked],
         file: &Path,
     ) -> Result<Settled<'a>, Vec<Fault>> {
-        let (mut tried, mut recovering) = (vec![0; dataset.frames.len()], true);
+        let (mut tried, mut recovering) = (vec![0; dive.stamps().len()], true);
         for round in 1.. {
             self.place(marked);
-            let (found, unread) = self.gather(dataset);
+            let (found, unread) = self.gather(dive);
             self.warnings.extend(unread);
-            let settled = self.settle(dataset, file)?;
-            let located = self.relocate(dataset, &mut tried);
+            let settled = self.settle(dive, file)?;
+            let located = self.relocate(dive, &mut tried);
             if (found == 0 && located == 0) || round >= ROUNDS {
-                if std::mem::take(&mut recovering) && self.recover(dataset, &settled, marked) > 0 {
+                if std::mem::take(&mut recovering) && self.recover(dive, &settled, marked) > 0 {
                     continue;
                 }
                 return self.complete(settled, marked, file);
@@ -121,9 +121,9 @@ impl<'a> Progress<'a> {
         unreachable!("the last round returns")
     }
 
-    fn gather(&mut self, dataset: &Dataset) -> (usize, Vec<Fault>) {
+    fn gather(&mut self, dive: &StereoPairs) -> (usize, Vec<Fault>) {
         let places = self.places();
-        self.gathered.gather(dataset, &self.finder, &self.trail, &self.scene, &self.features, &places)
+        self.gathered.gather(dive, &self.finder, &self.trail, &self.scene, &self.features, &places)
     }
 
     /// The features with a known position.
@@ -132,7 +132,7 @@ impl<'a> Progress<'a> {
     }
 
     /// Adjusts, and keeps the poses of the adjusted pairs alone.
-    fn settle(&mut self, dataset: &'a Dataset, file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
+    fn settle(&mut self, dive: &'a StereoPairs, file: &Path) -> Result<Settled<'a>, Vec<Fault>> {
         let pairs: Vec<usize> = self.gathered.seen.keys().map(|key| key.0).collect();
         let expected = |pair: usize| ExpectedPose::of(pair, &self.scene.poses, &self.trail);
         let poses: Vec<_> = pairs.iter().map(|pair| (*pair, expected(*pair))).collect();
@@ -144,7 +144,7 @@ impl<'a> Progress<'a> {
             let fault = Fault::new("the marks determine no model", file);
             vec![fault.remedy("mark at least three features that are not on a line in one pair")]
         };
-        let settled = settle(&dataset.rig, &self.trail, &mut self.scene, &seen).map_err(undetermined)?;
+        let settled = settle(&dive.rig, &self.trail, &mut self.scene, &seen).map_err(undetermined)?;
         for pair in 0..self.scene.poses.len() {
             if settled.pairs.binary_search(&pair).is_err() {
                 self.scene.poses[pair] = None;
@@ -166,7 +166,7 @@ impl<'a> Progress<'a> {
     /// Finds the poses of pairs that no odometry connects, at most twice each; returns their number.
     ///
     /// One pair connects its complete segment. Pairs that the odometry skipped are unusable.
-    fn relocate(&mut self, dataset: &Dataset, tried: &mut [usize]) -> usize {
+    fn relocate(&mut self, dive: &StereoPairs, tried: &mut [usize]) -> usize {
         let known = self.places();
         if known.len() < HELD {
             return 0;
@@ -177,7 +177,7 @@ impl<'a> Progress<'a> {
             (0..tried.len()).filter(|pair| usable(*pair) && tried[*pair] < 2 && lost(*pair)).collect();
         pairs.iter().for_each(|pair| tried[*pair] += 1);
         let pose = |pair: &usize| {
-            let (left, right) = dataset.pair(&dataset.frames[*pair]).ok()?;
+            let (left, right) = dive.pair(*pair).ok()?;
             relocate(&self.finder, [&left, &right], &self.scene, &self.features, &known)
         };
         let poses: Vec<_> = pairs.par_iter().map(pose).collect();
@@ -194,7 +194,7 @@ impl<'a> Progress<'a> {
     }
 
     /// Finds corners for marks that have none, or whose point the other pairs do not show; returns their number.
-    fn recover(&mut self, dataset: &Dataset, settled: &Settled<'_>, marked: &[Marked]) -> usize {
+    fn recover(&mut self, dive: &StereoPairs, settled: &Settled<'_>, marked: &[Marked]) -> usize {
         let alone = self.unconfirmed(settled);
         let posed = |mark: &&Located| self.scene.poses[mark.pair].is_some();
         let lines =
@@ -206,7 +206,7 @@ impl<'a> Progress<'a> {
             })
             .collect();
         let known: Vec<usize> = self.places().into_iter().filter(|feature| !alone.contains(feature)).collect();
-        let found = recovered(&self.finder, dataset, &self.scene, &known, &lines);
+        let found = recovered(&self.finder, dive, &self.scene, &known, &lines);
         for (feature, corner) in &found {
             self.features[*feature].corner = true;
             self.features[*feature].spread = corner.covariance;
@@ -238,12 +238,12 @@ impl<'a> Progress<'a> {
     pub(super) fn without(
         &mut self,
         features: &BTreeSet<usize>,
-        dataset: &'a Dataset,
+        dive: &'a StereoPairs,
         file: &Path,
     ) -> Result<Settled<'a>, Vec<Fault>> {
         self.gathered.seen.retain(|key, _| !features.contains(&key.1));
         features.iter().for_each(|feature| self.known[*feature] = false);
-        self.settle(dataset, file)
+        self.settle(dive, file)
     }
 
     /// The adjustment, with the faults of the marks that nothing connects with it.

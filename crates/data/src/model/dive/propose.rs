@@ -14,7 +14,7 @@ use super::{
     plane::Plane,
     trail::Trail,
 };
-use crate::dataset::Dataset;
+use crate::StereoPairs;
 
 /// The search for features worth a mark.
 #[derive(Debug)]
@@ -89,13 +89,13 @@ struct Track {
 
 impl Proposer<'_> {
     /// The proposals, the best of each object first; faults of unreadable pairs beside them.
-    pub fn propose(&self, dataset: &Dataset, progress: &mut dyn FnMut()) -> (Vec<Proposal>, Vec<Fault>) {
-        let (trail, unread) = Trail::by_odometry(dataset, self.odometry, progress);
+    pub fn propose(&self, dive: &StereoPairs, progress: &mut dyn FnMut()) -> (Vec<Proposal>, Vec<Fault>) {
+        let (trail, unread) = Trail::by_odometry(dive, self.odometry, progress);
         let poses = largest_segment(&trail);
         let step = poses.len().div_ceil(EXAMINED).max(1);
         let examined: Vec<(usize, Transform<World, Camera>)> = poses.into_iter().step_by(step).collect();
         let corners: Vec<Vec<Corner>> =
-            examined.par_iter().map(|(pair, pose)| self.corners(dataset, *pair, pose)).collect();
+            examined.par_iter().map(|(pair, pose)| self.corners(dive, *pair, pose)).collect();
         let mut tracks: Vec<Track> = Vec::new();
         corners.iter().for_each(|corners| join(&mut tracks, corners));
         let seabed = Plane::through(&tracks.iter().map(|track| track.at.coords).collect::<Vec<_>>());
@@ -107,14 +107,14 @@ impl Proposer<'_> {
                 chosen.push(track);
             }
         }
-        (self.named(dataset, &chosen), unread)
+        (self.named(dive, &chosen), unread)
     }
 
     /// The fitted corners of a pair, in the world.
-    fn corners(&self, dataset: &Dataset, pair: usize, pose: &Transform<World, Camera>) -> Vec<Corner> {
-        let Ok((left, right)) = dataset.pair(&dataset.frames[pair]) else { return Vec::new() };
+    fn corners(&self, dive: &StereoPairs, pair: usize, pose: &Transform<World, Camera>) -> Vec<Corner> {
+        let Ok((left, right)) = dive.pair(pair) else { return Vec::new() };
         let mut output = FrontEndOutput::default();
-        self.front_end.run(&left, &right, &dataset.rig, &mut output);
+        self.front_end.run(&left, &right, &dive.rig, &mut output);
         let turn = pose.rotation_matrix();
         let corner = |point: &seafix_geometry::MeasuredPoint| {
             let pixels = point.pixels?;
@@ -130,23 +130,22 @@ impl Proposer<'_> {
     }
 
     /// The names of the proposals, with their pictures.
-    fn named(&self, dataset: &Dataset, chosen: &[Track]) -> Vec<Proposal> {
+    fn named(&self, dive: &StereoPairs, chosen: &[Track]) -> Vec<Proposal> {
         let mut images: BTreeMap<usize, Option<Image>> = BTreeMap::new();
         let mut count: BTreeMap<usize, usize> = BTreeMap::new();
         let objects = objects(chosen);
         let propose = |(track, object): (&Track, usize)| {
             let number = count.entry(object).or_insert(0);
             *number += 1;
-            let corner = track.clearest(dataset);
-            let frame = &dataset.frames[corner.pair];
-            let image = images.entry(corner.pair).or_insert_with(|| dataset.pair(frame).ok().map(|pair| pair.0));
+            let corner = track.clearest(dive);
+            let image = images.entry(corner.pair).or_insert_with(|| dive.pair(corner.pair).ok().map(|pair| pair.0));
             let picture = image.as_ref().and_then(|image| {
                 let (image, place) = cut(image, corner.left, HALF)?;
-                Some(Picture { stamp_ns: frame.stamp_ns, image, place, sigma: [0.0; 2] })
+                Some(Picture { stamp_ns: dive.stamps()[corner.pair], image, place, sigma: [0.0; 2] })
             });
             Proposal {
                 id: format!("{}{number}", letter(object)),
-                stamp_ns: frame.stamp_ns,
+                stamp_ns: dive.stamps()[corner.pair],
                 left: corner.left,
                 views: track.corners.len(),
                 parallax: track.parallax(),
@@ -231,8 +230,8 @@ impl Track {
     }
 
     /// The corner nearest to the middle of its image.
-    fn clearest(&self, dataset: &Dataset) -> &Corner {
-        let [u, v] = dataset.rig.left().principal();
+    fn clearest(&self, dive: &StereoPairs) -> &Corner {
+        let [u, v] = dive.rig.left().principal();
         let off = |corner: &Corner| corner.left.distance(&Pixel { u, v });
         self.corners.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a track has a corner")
     }

@@ -14,7 +14,7 @@ use super::{
     find::{Finder, SPACING},
     settle::Scene,
 };
-use crate::dataset::Dataset;
+use crate::StereoPairs;
 
 /// The mark of a feature whose corner is searched for.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ const MIN_CONFIRMED: usize = 3;
 /// pairs confirm.
 pub(super) fn recovered(
     finder: &Finder<'_>,
-    dataset: &Dataset,
+    dive: &StereoPairs,
     scene: &Scene,
     known: &[usize],
     lines: &[MarkRay],
@@ -59,7 +59,7 @@ pub(super) fn recovered(
     let step = posed.len().div_ceil(EXAMINED).max(1);
     let view = |pair: &usize| {
         let pose = ExpectedPose { world_from_camera: scene.poses[*pair]?, covariance: nalgebra::Matrix6::zeros() };
-        let (left, right) = dataset.pair(&dataset.frames[*pair]).ok()?;
+        let (left, right) = dive.pair(*pair).ok()?;
         Some(View { pair: *pair, pose, images: [left, right] })
     };
     let views: Vec<View> = posed.into_iter().step_by(step).collect::<Vec<_>>().par_iter().filter_map(view).collect();

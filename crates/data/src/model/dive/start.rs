@@ -13,7 +13,7 @@ use super::{
     template::Template,
 };
 use crate::{
-    dataset::Dataset,
+    StereoPairs,
     model::by_hand::{ModelByHand, Seen},
 };
 
@@ -56,18 +56,18 @@ const BY_DEFINITION: f64 = 0.02;
 ///
 /// # Errors
 /// All marks whose stamp is that of no pair.
-pub(super) fn pairs_of(dataset: &Dataset, marks: &[DiveMark], file: &Path) -> Result<Vec<usize>, Vec<Fault>> {
+pub(super) fn pairs_of(dive: &StereoPairs, marks: &[DiveMark], file: &Path) -> Result<Vec<usize>, Vec<Fault>> {
     let mut faults = Vec::new();
     let mut pairs = Vec::new();
     for mark in marks {
-        match dataset.frames.binary_search_by_key(&mark.stamp_ns, |frame| frame.stamp_ns) {
+        match dive.stamps().binary_search(&mark.stamp_ns) {
             Ok(pair) => pairs.push(pair),
             Err(after) => {
-                let around = &dataset.frames[after.saturating_sub(1)..dataset.frames.len().min(after + 1)];
-                let nearest = around.iter().min_by_key(|frame| frame.stamp_ns.abs_diff(mark.stamp_ns));
+                let around = &dive.stamps()[after.saturating_sub(1)..dive.stamps().len().min(after + 1)];
+                let nearest = around.iter().min_by_key(|stamp| stamp.abs_diff(mark.stamp_ns));
                 let remedy = nearest.map_or_else(
                     || "the dive has no pair".to_owned(),
-                    |frame| format!("give the stamp of a pair; the nearest is {}", frame.stamp_ns),
+                    |stamp| format!("give the stamp of a pair; the nearest is {stamp}"),
                 );
                 let fault = Fault::new("a mark at the stamp of no pair", file).on_line(mark.mark.line);
                 faults.push(fault.value(mark.stamp_ns).remedy(remedy));
@@ -84,19 +84,19 @@ impl ModelByHand<'_> {
     ///
     /// # Errors
     /// An image that cannot be read, and pairs of marks that do not triangulate.
-    pub(super) fn located(&self, dataset: &Dataset, marks: Vec<DiveMark>, file: &Path) -> Result<Marks, Vec<Fault>> {
-        let pairs = pairs_of(dataset, &marks, file)?;
+    pub(super) fn located(&self, dive: &StereoPairs, marks: Vec<DiveMark>, file: &Path) -> Result<Marks, Vec<Fault>> {
+        let pairs = pairs_of(dive, &marks, file)?;
         let mut all: Vec<(usize, DiveMark)> = pairs.into_iter().zip(marks).collect();
         all.sort_by_key(|(pair, mark)| (*pair, mark.mark.line));
         let (mut faults, mut located, mut unmatched) = (Vec::new(), Vec::new(), Vec::new());
         for same_pair in all.chunk_by(|a, b| a.0 == b.0) {
             let pair = same_pair[0].0;
-            match dataset.pair(&dataset.frames[pair]) {
+            match dive.pair(pair) {
                 Err(fault) => faults.push(fault),
                 Ok((left, right)) => {
                     let keypoints = [&left, &right].map(|image| self.front_end.detector.detect(image));
                     for (_, mark) in same_pair {
-                        let seen = match self.see(mark.mark.clone(), [&left, &right], &keypoints, &dataset.rig, file) {
+                        let seen = match self.see(mark.mark.clone(), [&left, &right], &keypoints, &dive.rig, file) {
                             Ok(seen) => Some(seen),
                             Err(fault) if mark.mark.right.is_none() => {
                                 unmatched.push(fault);

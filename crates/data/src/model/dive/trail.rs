@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Covariance6, Transform};
 use seafix_navigation::{Odometry, OdometryTrajectory, RelativeMotion, StereoPair};
 use seafix_vision::Threads;
 
-use crate::dataset::Dataset;
+use crate::StereoPairs;
 
 /// The motions of a dive: the step that leads to each pair from the one before it.
 #[derive(Debug, Clone)]
@@ -40,30 +40,31 @@ impl Trail {
         trail
     }
 
-    /// The trail of `dataset` by an odometry; a pair that cannot be read is skipped, and reported.
+    /// The trail of a dive by an odometry; a pair that cannot be read is skipped, and reported.
     pub(super) fn by_odometry(
-        dataset: &Dataset,
+        dive: &StereoPairs,
         odometry: &dyn Odometry,
         progress: &mut dyn FnMut(),
     ) -> (Self, Vec<Fault>) {
-        let mut session = odometry.begin(&dataset.rig, dataset.body_from_camera, Threads::Pool);
-        let (mut before, mut unread) = (None, Vec::new());
-        for frame in &dataset.frames {
-            let readings = dataset.readings(before.replace(frame.stamp_ns), frame.stamp_ns);
-            readings.iter().for_each(|reading| session.sense(reading));
-            match dataset.pair(frame) {
+        let mut session = odometry.begin(&dive.rig, dive.body_from_camera, Threads::Pool);
+        let mut unread = Vec::new();
+        for (index, &stamp_ns) in dive.stamps().iter().enumerate() {
+            match dive.readings(index) {
+                Ok(readings) => readings.iter().for_each(|reading| session.sense(reading)),
+                Err(fault) => unread.push(fault),
+            }
+            match dive.pair(index) {
                 Ok((left, right)) => {
-                    let pair = StereoPair { stamp_ns: frame.stamp_ns, left: &left, right: &right };
+                    let pair = StereoPair { stamp_ns, left: &left, right: &right };
                     if let Err(error) = session.advance(&pair) {
-                        unread.push(Fault::new(error.to_string(), &dataset.folder));
+                        unread.push(Fault::new(error.to_string(), dive.path()));
                     }
                 }
                 Err(fault) => unread.push(fault),
             }
             progress();
         }
-        let stamps: Vec<u64> = dataset.frames.iter().map(|frame| frame.stamp_ns).collect();
-        (Self::of(&session.trajectory(), &stamps), unread)
+        (Self::of(&session.trajectory(), dive.stamps()), unread)
     }
 
     /// The number of pairs of the dive.
