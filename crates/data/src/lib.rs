@@ -34,6 +34,6 @@ pub use contradictions::trajectory_fault;
 pub use stereo_pairs::StereoPairs;
 
 pub use model::{
-    CalibrationSigma, DiveMark, DiveModel, DivePoint, HandModel, HandPoint, Mark, ModelByHand, ModelFromDive, Picture,
-    Proposal, Proposer, SimulatedOperator,
+    CalibrationSigma, DiveEdge, DiveMark, DiveModel, DivePoint, HandModel, HandPoint, Mark, ModelByHand, ModelFromDive,
+    Picture, Proposal, Proposer, SimulatedOperator,
 };

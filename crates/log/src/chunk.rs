@@ -10,8 +10,8 @@ use mcap::{
 
 use crate::parse::parse_record;
 
-/// The maximum number of bytes that one thing in a file of `size` bytes may occupy in memory: a record, the records of a
-/// chunk, the messages of a frame. Images are compressed already, so that no honest log grows more.
+/// The memory limit (bytes) for a record, the records of a chunk or the messages of a frame, in a file of `size` bytes.
+/// Images are already compressed, so an undamaged log stays below it.
 pub(crate) fn limit(size: u64) -> usize {
     usize::try_from(size.saturating_mul(4).saturating_add(32 << 20)).unwrap_or(usize::MAX)
 }

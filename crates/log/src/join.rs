@@ -13,9 +13,9 @@ use crate::{
 
 /// Writes the log of a whole trial to `to` from logs of successive frames of it, each with its totals.
 ///
-/// Messages are copied as they are, totals added up part by part, and the header is written once. Nothing but the
-/// rounding of those sums tells where one part ends and the next begins. `go_on` is asked before each part; when it
-/// says no, `false` is returned and nothing is left.
+/// Messages are copied as they are, totals added up part by part, and the header is written once. The joined log
+/// equals a log written at once, except for the rounding of the totals. `go_on` is called before each part; if it returns
+/// `false`, no file is written and the result is `false`.
 ///
 /// # Errors
 /// [`LogError`]: a part that cannot be read, is damaged or is of another trial, or a log that cannot be written.

@@ -18,8 +18,8 @@ const FRAME: [u8; 4] = [0x28, 0xB5, 0x2F, 0xFD];
 
 /// The maximum size of an unpacked file of `size` bytes.
 ///
-/// Pixels of 8 bits have a noise of at least half a bit, so that images shrink to a sixteenth at allowed; the constant is
-/// that of [`limit`] and allows small files of repeated messages.
+/// Pixels of 8 bits have at least half a bit of noise, so images shrink to a sixteenth at most. The constant, that of
+/// [`limit`], admits small files of repeated messages.
 fn unpacked_limit(size: u64) -> u64 {
     size.saturating_mul(16).saturating_add(32 << 20)
 }

@@ -95,3 +95,4 @@ pub use site::{
 pub use solve::{
     AlternativePose, Choose, Degenerate, Kabsch, Mahalanobis, SOLVERS, ScaleError, Solver, StereoReprojection, Triad,
 };
+pub use space_line::{LineOffset, SpaceLine};

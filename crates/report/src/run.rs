@@ -10,7 +10,7 @@ use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
 use seafix_evaluation::lever_arm_error;
 use seafix_log::{
-    ELSEWHERE, FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader,
+    DISPLACED_SUFFIX, FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader,
     unchanged,
 };
 
@@ -261,7 +261,12 @@ impl Trial {
                 Box::new(NavigatedFrame {
                     places: [&record.pose, &record.odometry_only]
                         .map(|pose| place::carried(&self.header, pose.as_ref())),
-                    displaced: record.events.iter().filter(|event| event.contains(ELSEWHERE)).cloned().collect(),
+                    displaced: record
+                        .events
+                        .iter()
+                        .filter(|event| event.ends_with(DISPLACED_SUFFIX))
+                        .cloned()
+                        .collect(),
                     step,
                     counted: Counted::ALL.map(|counted| counted.holds(record)),
                     values: std::array::from_fn(|index| NavigationQuantity::ALL[index].of(record).unwrap_or(f64::NAN)),

@@ -18,7 +18,7 @@ pub struct StereoImages {
 }
 
 impl StereoImages {
-    /// Reads the two image files of a pair (PNG, JPEG or PNM, grey or colour).
+    /// Reads the two image files of a pair (PNG, JPEG, TIFF or PNM, grey or colour).
     ///
     /// # Errors
     /// [`Error::File`]: a file that cannot be read or decoded, or an image of another size than its camera's calibration.

@@ -220,7 +220,7 @@ impl<'a> NavigationSession<'a> {
     }
 
     /// The attempts of the last frame given to [`push`](Self::push), rejected ones with their reasons; empty if none was
-    /// due.
+    /// due, or if the odometry skipped the frame.
     pub fn latest(&self) -> &FrameResult {
         &self.latest
     }

@@ -29,7 +29,7 @@ pub struct PipelineStages {
     settings: Pipeline,
 }
 
-/// The result of the pipeline for one sensor frame; empty if no fix was due.
+/// The result of the pipeline for one sensor frame; empty if no fix was attempted.
 #[derive(Debug, Default)]
 pub struct FrameResult {
     /// The key points of the left image.

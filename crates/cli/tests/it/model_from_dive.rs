@@ -11,7 +11,8 @@ use seafix_data::{
     dataset::{Dataset, write_png},
     source::Mcap,
 };
-use seafix_geometry::Pixel;
+use seafix_geometry::{Object, Pixel, Transform, triad};
+use seafix_referencing::{ModelEdge, Site};
 use tempfile::TempDir;
 
 use crate::{Ended, ended_with, program, recordings::recording_of};
@@ -279,4 +280,38 @@ fn a_recording_and_a_log_are_dives() {
     let text = ended_with(0, eval.arg("eval").args(["a.toml", "c.toml"].map(|name| here.join(name)))).out;
     let rms: f64 = text.split("RMS ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(rms < 0.05, "{text}");
+}
+
+/// Edges of the true model, and no others: half an orbit shows outlines of pipes and shadows as well.
+///
+/// Fails where an outline counts as an edge (no limit of its scatter), or where poses are used in the wrong direction.
+#[test]
+fn edges_of_a_dive_are_those_of_the_object() {
+    let folder = TempDir::new().unwrap();
+    let here = folder.path();
+    let source = dive().join("dive");
+    let json = model(here, &source, &table(&marks()), &["--edges", "--json", "--out", "a.toml"], 0).out;
+    ended_with(0, program().arg("check").arg(here.join("a.toml")));
+    let read = |file: &Path| {
+        Site::from_file(file).unwrap().objects.into_iter().find(|object| object.id == "manifold").unwrap()
+    };
+    let (truth, built) = (read(&source.join("site.toml")), read(&here.join("a.toml")));
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let count = json["edges"].as_array().unwrap().len();
+    assert!(count == built.edges.len() && count >= 15, "{count} edges");
+
+    // The built frame is that of its base points.
+    let base = built.base.map(|index| built.points[index].id.as_str());
+    let [p1, p2, p3] = base.map(|id| truth.points.iter().find(|point| point.id == id).unwrap().at);
+    let truth_from_built: Transform<Object, Object> = triad(&p1, &p2, &p3).unwrap();
+    for edge in &built.edges {
+        let ends = edge.places(&built.points).map(|end| truth_from_built * end);
+        let offset = |other: &ModelEdge| {
+            let [a, b] = other.places(&truth.points);
+            let direction = (b - a).normalize();
+            ends.map(|end| (end - a).cross(&direction).norm()).into_iter().fold(0.0, f64::max)
+        };
+        let nearest = truth.edges.iter().map(offset).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 5e-3, "{} is {:.1} mm from every edge", edge.id, nearest * 1e3);
+    }
 }

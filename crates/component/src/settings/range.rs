@@ -143,7 +143,7 @@ fn number(
     let bound = |refused: &Option<String>, inside: i64| {
         let extreme = refused.as_ref()?;
         let mut candidates = numbers(&words, in_list);
-        // The outermost number: an odd one has refused neighbours on both sides.
+        // The outermost number; a number that is not a limit is rejected on both sides.
         candidates.sort_by(|a, b| if inside > 0 { a.total_cmp(b) } else { b.total_cmp(a) });
         let out = |number: f64, up: i64| out(&value(number, up), None, extreme);
         candidates.into_iter().find_map(|c| match (out(c, 0), out(c, -inside), out(c, inside)) {

@@ -272,7 +272,7 @@ impl ModelByHand<'_> {
         let names = base.map(|index| seen[index].mark.id.clone()).join(", ");
         Err(Fault::new("the base points are nearly on a line", file)
             .value(format!("{names}: sine {sine:.3}, at least {MIN_SINE} is needed"))
-            .remedy("mark a point aside of them, or choose others with --base"))
+            .remedy("mark a point off their line, or choose others with --base"))
     }
 }
 

@@ -8,5 +8,7 @@ mod marks;
 
 pub use adjust::CalibrationSigma;
 pub use by_hand::{HandModel, HandPoint, ModelByHand};
-pub use dive::{DiveMark, DiveModel, DivePoint, ModelFromDive, Picture, Proposal, Proposer, SimulatedOperator};
+pub use dive::{
+    DiveEdge, DiveMark, DiveModel, DivePoint, ModelFromDive, Picture, Proposal, Proposer, SimulatedOperator,
+};
 pub use marks::Mark;

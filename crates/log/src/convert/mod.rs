@@ -1,4 +1,4 @@
-//! Between plain records and this project's own messages, both ways and exactly.
+//! Exact conversion between plain records and the messages of `seafix.v2`.
 
 mod bare;
 mod fields;

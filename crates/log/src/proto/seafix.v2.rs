@@ -84,7 +84,7 @@ pub struct CloudPoint {
     #[prost(double, repeated, tag = "5")]
     pub pixels: ::prost::alloc::vec::Vec<f64>,
 }
-/// The rough pose that a method may use.
+/// The prior pose.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Prior {
     /// 4 x 4.
@@ -123,7 +123,7 @@ pub struct VisiblePoint {
 /// What a navigator knew after a pair, and what it did.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Navigation {
-    /// "rough", "searching", "referenced" or "dead reckoning".
+    /// "prior", "searching", "fix" or "dead reckoning".
     #[prost(string, tag = "1")]
     pub state: ::prost::alloc::string::String,
     /// Whether a fix was tried.
@@ -618,7 +618,7 @@ pub struct ExactPose {
     #[prost(double, repeated, tag = "1")]
     pub numbers: ::prost::alloc::vec::Vec<f64>,
 }
-/// The rough pose that a method may use.
+/// The prior pose.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct PriorPose {
     #[prost(message, optional, tag = "1")]
@@ -643,7 +643,7 @@ pub struct Problem {
     pub delta: f64,
     #[prost(message, optional, tag = "3")]
     pub object_from_camera: ::core::option::Option<ExactPose>,
-    /// Half-size of the shells about the rough pose (m).
+    /// Half-size of the gates about the prior pose (m).
     #[prost(double, tag = "4")]
     pub gate_half: f64,
     /// Whether only some pairs are to be considered, and which: model, cloud.

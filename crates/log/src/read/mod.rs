@@ -157,8 +157,7 @@ impl Reader {
         self.source.recovered()
     }
 
-    /// Leads all frames that are left through `take`, in order. On the threads of the pool that this is called in some
-    /// are decoded while the next are read.
+    /// Calls `take` with each remaining frame, in order. The current rayon pool decodes frames while the next are read.
     ///
     /// # Errors
     /// [`LogError`] as the reading goes; not all frames before it need have been taken.

@@ -25,9 +25,9 @@ pub struct FrameRecord {
     pub cloud: Vec<CloudPoint>,
     /// The measured straight edges; empty for a trial without edges.
     pub lines: Vec<Line>,
-    /// The rough pose a method may use.
+    /// The prior pose.
     pub prior: Option<PriorRecord>,
-    /// What really was, where it is known.
+    /// The ground truth, if it is known.
     pub truth: Option<TruthRecord>,
     /// What came of each attempted target; a frame that attempted none has the one
     /// [`TargetRecord::not_attempted`].
@@ -82,14 +82,14 @@ pub struct PixelPair {
     pub right: [f64; 2],
 }
 
-/// The rough pose known before the fix.
+/// The prior pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PriorRecord {
-    /// The left camera's rough pose.
+    /// The prior pose of the left camera.
     pub world_from_camera: Matrix4,
 }
 
-/// What really was.
+/// The ground truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruthRecord {
     /// The left camera's true pose.

@@ -104,7 +104,7 @@ pub struct CameraRecord {
 /// One thing searched for: an object, or the whole site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TargetModel {
-    /// The object's id, `site` for the whole site.
+    /// The object's id; the site's name for the whole site.
     pub id: String,
     /// Its place in the site's frame: `p_site = site_from_object · p_object`; `None` where no survey tells,
     /// of any object but the one whose frame is the site's.

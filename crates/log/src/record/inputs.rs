@@ -6,23 +6,23 @@ use super::{
     matrix::{Matrix3, Matrix4, Matrix6},
 };
 
-/// What a frame's method was given and its judge knew beyond what [`FrameRecord`](super::FrameRecord) holds, to the last
-/// bit: enough to run another method on the same.
+/// The exact inputs of the method and the ground truth of a frame, as far as [`FrameRecord`](super::FrameRecord) lacks them;
+/// a replay needs them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Inputs {
-    /// The rough pose and its covariance.
+    /// The prior pose and its covariance.
     pub prior: Option<(ExactPose, Matrix6)>,
     /// For each point of the cloud with pixels, in order, their covariance (px²).
     pub pixel_covariances: Vec<Matrix4>,
-    /// For each point of the cloud the point of the site that it says it is.
+    /// The label of each cloud point, if the points are labelled: the object and the point.
     pub names: Option<Vec<SitePoint>>,
     /// An identification problem that states its own candidates and tolerance.
     pub problem: Option<ProblemRecord>,
-    /// What the judge knew.
+    /// The ground truth.
     pub truth: Option<TrueState>,
-    /// Whether the logged images are the method's to the last bit.
+    /// Whether the logged images are bitwise those of the method.
     pub exact_images: bool,
-    /// What the navigation sensors told since the frame before, as it arrived.
+    /// The sensor readings since the previous frame, in order of arrival.
     pub readings: Vec<SensorReading>,
 }
 
@@ -64,7 +64,7 @@ pub struct ProblemRecord {
     pub model: TargetModel,
     /// Distances that differ by no more agree (m).
     pub delta: f64,
-    /// The rough pose, object from camera, and the half-size of the shells about it (m).
+    /// The prior pose, object from camera, and the half-size of the gates about it (m).
     pub prior: Option<(ExactPose, f64)>,
     /// The only pairs (model, cloud) to consider.
     pub putative: Option<Vec<[u32; 2]>>,

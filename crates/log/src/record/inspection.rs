@@ -7,9 +7,9 @@ pub struct PointOfInterest {
     pub object: String,
     /// Its own id.
     pub point: String,
-    /// Where it truly is, frame of the left camera (m).
+    /// The true position, frame of the left camera (m).
     pub at: [f64; 3],
-    /// Where the pose that is known and the site have it (m); `None` where no pose is known.
+    /// The estimated position, from the navigated pose or fix and the site (m); `None` without a pose.
     pub believed: Option<[f64; 3]>,
     /// Normalised estimation error squared of that place, three degrees of freedom.
     pub nees: Option<f64>,

@@ -20,7 +20,7 @@ pub use inputs::{AnswerRecord, ExactPose, Inputs, ProblemEdge, ProblemRecord, Se
 pub use inspection::PointOfInterest;
 pub use line::{EdgePair, Line, ModelEdge, Offset};
 pub use matrix::{Matrix3, Matrix4, Matrix6};
-pub use navigation::{ELSEWHERE, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
+pub use navigation::{DISPLACED_SUFFIX, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep};
 pub use region::Region;
 pub use target::{Alternative, BestPose, Evaluation, Integrity, Outcome, Pair, TargetRecord, TargetTimes};
 pub use totals::Totals;

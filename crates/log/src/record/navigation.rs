@@ -5,21 +5,21 @@ use super::{
     mirror::mirror,
 };
 
-/// How an event ends that says how far an object stands from where it was surveyed, after the distance.
-pub const ELSEWHERE: &str = "m from its place";
+/// The end of the event of a displaced object, after the distance.
+pub const DISPLACED_SUFFIX: &str = "m from its place in the survey";
 
-/// What a trial that navigates between fixes knew after a pair.
+/// The state of the navigation after a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NavigationRecord {
-    /// What the pose rests on: `prior_pose`, `searching`, `fixed` or `dead session`.
+    /// The state: the word of a `State` of the navigator.
     pub state: String,
-    /// Whether a fix was tried.
+    /// Whether a fix was due.
     pub due: bool,
-    /// The camera relative to the object it was last fixed at; `None` while no fix holds.
+    /// The navigated pose, relative to the object of the last fix; `None` without one.
     pub pose: Option<NavigatedRecord>,
-    /// The first fix carried here by odometry alone; `None` before it and after the way was lost.
+    /// The first fix, propagated by odometry alone; `None` before it, and after a break of the odometry.
     pub odometry_only: Option<NavigatedRecord>,
-    /// What the odometry made of the pair.
+    /// The step of the odometry to this pair.
     pub odometry: OdometryStep,
     /// What happened, in words: changes of state, fixes taken or doubted, displaced objects.
     pub events: Vec<String>,
@@ -38,13 +38,13 @@ pub struct NavigatedRecord {
     pub covariance: Matrix6,
 }
 
-/// What the odometry made of a pair.
+/// The step of the odometry to a pair.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OdometryStep {
-    /// Why no motion to the pair is known; empty where one is, and at the beginning. It ends in `the way here is unknown` where the
-    /// way is broken and goes on from this pair; else the pair was left out, and the next motion leads over it.
+    /// The reason why the motion to this pair is unknown; empty if it is known, and at the first pair. It ends in `the motion
+    /// to this frame is unknown` where a new segment begins; otherwise the pair was skipped, and the next motion spans it.
     pub lost: String,
-    /// The motion from the pair known before, `earlier_from_later`, and its covariance.
+    /// The motion from the last pair that was followed, `earlier_from_later`, and its covariance.
     pub motion: Option<(Matrix4, Matrix6)>,
 }
 

@@ -5,8 +5,7 @@ use super::target::{Outcome, TargetRecord};
 /// The region of the Stanford diagram that a fix is in, by its error e, its protection level p and the alert limit a, all of
 /// the position (m) (Tossaint and others, *The Stanford–ESA integrity diagram*, Navigation 2007).
 ///
-/// A fix whose level exceeds the limit may not be used, and does no harm; one that says less than its error misleads, and one
-/// that says it is within the limit while its error is not misleads hazardously.
+/// A fix with p > a must not be used. A fix with p < e is misleading; if also p ≤ a < e, it is hazardously misleading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Region {
     /// e ≤ p ≤ a.
@@ -19,7 +18,7 @@ pub enum Region {
     Unavailable,
     /// a < p < e.
     UnavailableMisleading,
-    /// No protection level: nothing vouches for the fix.
+    /// The fix has no protection level.
     Unprotected,
 }
 

@@ -17,9 +17,9 @@ pub struct TargetRecord {
     pub search: String,
     /// Name of the solver.
     pub solver: String,
-    /// What came of it.
+    /// The outcome.
     pub outcome: Outcome,
-    /// The reason of an outcome without a fix, in one word (`too-few`, `nfa`, `budget`, …); empty of a fix.
+    /// The reason of an outcome without a fix, in one word (`too-few`, `absent`, `budget`, …); empty of a fix.
     pub reason: String,
     /// Why not, in a sentence with numbers; where a joint fix was asked for, what took part in it, what did not and why,
     /// or why there is none. Empty of any other fix.

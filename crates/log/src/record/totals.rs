@@ -7,7 +7,7 @@ use super::{frame::FrameRecord, region::Region, target::Outcome};
 /// Sums over every frame of a trial, of which the log may hold a part.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Totals {
-    /// Of so many frames one is logged, whatever came of it: those whose number it divides.
+    /// The decimation k: every frame whose number is a multiple of k is logged.
     pub every: u64,
     /// Frames with a failure that were not logged, because there are too many.
     pub failures_left_out: u64,
@@ -41,9 +41,9 @@ pub struct Totals {
     pub position_crlb_squares: f64,
     /// Sum of the normalised errors squared.
     pub nees_sum: f64,
-    /// Over so many fixes.
+    /// The number of fixes in that sum.
     pub nees_count: u64,
-    /// So many of which are below the 95 % quantile of χ² with six degrees of freedom.
+    /// The number of these fixes with a NEES below the 95 % quantile of χ²₆.
     pub nees_within: u64,
     /// Fixes whose error, protection level and alert limit are known, by their region in the order of [`Region::ALL`]; `None`
     /// in logs that are older than these.

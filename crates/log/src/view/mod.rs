@@ -8,7 +8,7 @@
 //!   site is not known has a frame of its own, joined to nothing: its points stand in `/scene/model`,
 //!   not in `/model`, and its fixes do not place the vehicle. `world_enu` and `auv_flu` are the same
 //!   places with the axes of REP-103.
-//! - camera frames are optical: x right, y down, z forward, as the house's.
+//! - camera frames are optical: x right, y down, z forward, the convention of Seafix.
 //! - annotations count pixels from the corner of the first one, so they add 0.5.
 //! - clouds are 32-bit floats.
 

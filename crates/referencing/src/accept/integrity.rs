@@ -30,7 +30,7 @@ pub use protection::Protection;
 /// is indispensable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Redundancy {
-    /// Three points: any three fit, so a wrong match is undetectable.
+    /// Three points: a wrong match that keeps their distances within the tolerance is undetectable.
     Unmonitored,
     /// Four points: a wrong match is detectable, but not identifiable.
     Detectable,

@@ -3,7 +3,7 @@
 use super::{orientation::Sense, volumes::Volumes};
 use crate::lanes::{LANES, ones_of, packed};
 
-/// The test whether a vertex and three members of a set contradict a sense.
+/// Tests whether a vertex and three members of a set have the other orientation than `sign`.
 ///
 /// Two members span a plane with the vertex. If a third does not lie on the same side of it in model and cloud beyond
 /// doubt, the exact test decides. The memory for the planes is reused.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use seafix_component::{Fault, read_text};
 use seafix_data::{CalibrationSigma, DiveModel, DivePoint, ModelByHand, ModelFromDive, StereoPairs};
+use seafix_vision::LineFrontEnd;
 use serde_json::{Value, json};
 
 use super::{
@@ -33,7 +34,13 @@ pub(super) fn opened(model: &Model) -> Result<StereoPairs, Failure> {
 }
 
 /// Builds the model of a dive and writes it.
-pub(super) fn execute(model: &Model, marks: &Path, by_hand: ModelByHand<'_>, calibration: CalibrationSigma) -> Ended {
+pub(super) fn execute(
+    model: &Model,
+    marks: &Path,
+    by_hand: ModelByHand<'_>,
+    calibration: CalibrationSigma,
+    edges: Option<&LineFrontEnd>,
+) -> Ended {
     let faults = |faults: Vec<Fault>| Failure::faults(INPUT, &faults);
     let arguments = &model.dive;
     let dive = opened(model)?;
@@ -43,7 +50,7 @@ pub(super) fn execute(model: &Model, marks: &Path, by_hand: ModelByHand<'_>, cal
     let (halves, pictures) = (arguments.half, arguments.page.is_some());
     let corner_sigma = arguments.corner_sigma;
     let from_dive =
-        ModelFromDive { by_hand, calibration, corner_sigma, odometry: odometry.as_deref(), halves, pictures };
+        ModelFromDive { by_hand, calibration, corner_sigma, edges, odometry: odometry.as_deref(), halves, pictures };
     if dive.stamps().len() == 1 {
         let built = from_dive.of_only_pair(&dive, &text, marks).map_err(faults)?;
         return model.finish(&pair::printed(&built), &inputs);
@@ -100,6 +107,10 @@ fn people(model: &DiveModel) -> String {
         let (parallax, rejected) = (point.parallax.to_degrees(), point.rejected.len());
         text += &format!("{id:16} {x:9.1} {y:9.1} {z:9.1}  {sigma:7.2} {views:6} {parallax:8.1}° {rejected:9}\n");
     }
+    for edge in model.edges.iter().flatten() {
+        let (views, in_view, sigma) = (edge.pairs.len(), edge.in_view, edge.sigma * 1e3);
+        text += &format!("{}: {views} of {in_view} pairs show it, σ {sigma:.2} mm\n", edge.id);
+    }
     let [common, difference] = model.excess;
     text += &format!(
         "{} points from {} of {} pairs, χ² {:.0} of {}; noise beyond that of the images: {common:.3} px, {difference:.3} \
@@ -148,6 +159,13 @@ fn machines(model: &DiveModel) -> String {
         "object": object.id,
         "base": object.base.map(|index| &object.points[index].id),
         "points": model.points.iter().map(point).collect::<Vec<_>>(),
+        "edges": model.edges.as_ref().map(|edges| edges.iter().map(|edge| json!({
+            "id": edge.id,
+            "pairs": edge.pairs,
+            "in_view": edge.in_view,
+            "sigma": edge.sigma,
+            "scatter": edge.scatter,
+        })).collect::<Vec<_>>()),
         "given_up": model.given_up.iter().map(|(id, why)| json!({ "id": id, "why": why })).collect::<Vec<_>>(),
         "pairs": model.pairs,
         "used": model.used,

@@ -24,10 +24,13 @@ pub(super) struct DiveArguments {
     /// Standard deviation of the place that the locator calls a corner (px), in common to all pairs of a dive.
     #[arg(long, default_value_t = ModelFromDive::CORNER_SIGMA, value_name = "PX")]
     pub(super) corner_sigma: f64,
+    /// List the straight edges near the points that three or more pairs show.
+    #[arg(long, requires = "marks")]
+    pub(super) edges: bool,
     /// Do not correct the rotation of the right camera, even if the images of a dive contradict the rig.
     #[arg(long)]
     pub(super) keep_rig: bool,
-    /// Compare the models from every second pair of a dive.
+    /// Also build a model from the odd pairs and one from the even pairs of a dive, and report their difference.
     #[arg(long)]
     pub(super) half: bool,
     /// Propose this number of features, with marks in their best pairs; --out is then the table of marks.

@@ -49,7 +49,12 @@ impl Model {
             return propose::execute(self, count as usize, &front_end);
         }
         match (&self.marks, &self.right, &self.rig, &self.points) {
-            (Some(marks), ..) => dive::execute(self, marks, by_hand, calibration),
+            (Some(marks), ..) => {
+                let mut lines = built(&self.set, change, Pipeline::line_front_end)?.1;
+                // The points of a dive do not contain the calibration's error, which all pairs have in common.
+                lines.calibration_px = 0.0;
+                dive::execute(self, marks, by_hand, calibration, self.dive.edges.then_some(&lines))
+            }
             (None, Some(right), Some(rig), Some(points)) => {
                 self.pairs_of.of_no_recording()?;
                 pair::execute(self, &PairFiles { left: &self.left, right, rig, points }, &by_hand)

@@ -32,7 +32,10 @@ pub(super) fn execute(model: &Model, count: usize, front_end: &FrontEnd) -> Ende
     progress.end();
     unread.iter().for_each(|fault| notify(&format!("warning: {fault}")));
     if proposals.is_empty() {
-        let fault = Fault::new("no feature to propose: none is seen in five pairs over 15° to 2 mm", pairs.path());
+        let fault = Fault::new(
+            "no feature to propose: none has five pairs, a parallax of 15° and a standard deviation of 2 mm",
+            pairs.path(),
+        );
         return Err(Failure::new(INPUT, fault.remedy("pass the object on crossing paths, or mark features by hand")));
     }
     if let Some(sheet) = sheet {

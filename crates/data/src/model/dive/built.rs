@@ -16,6 +16,8 @@ pub struct DiveModel {
     pub site: Site,
     /// The points, in the order of the site.
     pub points: Vec<DivePoint>,
+    /// The straight edges, in the order of the site; `None` unless asked for.
+    pub edges: Option<Vec<DiveEdge>>,
     /// Marked features that became no point, with the reason.
     pub given_up: Vec<(String, String)>,
     /// The number of pairs of the dive.
@@ -63,6 +65,21 @@ pub struct DivePoint {
     pub rejected: Vec<(u64, String)>,
     /// The best views; empty unless asked for.
     pub pictures: Vec<Picture>,
+}
+
+/// A straight edge of the model.
+#[derive(Debug)]
+pub struct DiveEdge {
+    /// The name.
+    pub id: String,
+    /// The standard deviation (m) of its ends across the edge.
+    pub sigma: f64,
+    /// χ² of its lines in all pairs per degree of freedom: their scatter relative to their noise.
+    pub scatter: f64,
+    /// The stamps (ns) of the pairs that show most of the edge.
+    pub pairs: Vec<u64>,
+    /// The number of pairs with both ends in view.
+    pub in_view: usize,
 }
 
 impl DiveModel {

@@ -15,9 +15,9 @@ pub(super) struct ExpectedPose {
 }
 
 /// The distance (px) of a searched feature from the borders: half of a window.
-const MARGIN: f64 = 8.0;
+pub(super) const MARGIN: f64 = 8.0;
 /// The standard deviation (px) of an expectation beyond those of pose and point: the feature's own pixels.
-const SLACK: f64 = 0.3;
+pub(super) const SLACK: f64 = 0.3;
 
 impl ExpectedPose {
     /// The pose of a pair: its own, or that of the nearest pair with one and the motion from there; `None` without both.

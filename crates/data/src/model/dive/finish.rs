@@ -8,14 +8,18 @@ use std::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use seafix_component::{Fault, nearest};
 use seafix_geometry::{Camera, Object, Point, Transform, World};
-use seafix_referencing::{ModelPoint, Site, SiteObject};
+use seafix_referencing::{ModelEdge, ModelPoint, Site, SiteObject};
+use seafix_vision::LineFrontEnd;
 
 use super::{
     best_views::{Shown, pictures},
-    built::{DiveModel, DivePoint},
+    built::{DiveEdge, DiveModel, DivePoint},
+    edges::{EdgeSearch, FoundEdge},
+    expect::SLACK,
     find::Found,
     gather::{Feature, Gathered},
     halves::halves,
+    parallax::largest_angle,
     settle::{Key, Scene, Settled},
     start::Marked,
     trail::Trail,
@@ -34,6 +38,7 @@ pub(super) struct Finish<'a> {
     pub(super) by_hand: &'a ModelByHand<'a>,
     pub(super) calibration: &'a CalibrationSigma,
     pub(super) corner_sigma: f64,
+    pub(super) edges: Option<&'a LineFrontEnd>,
     pub(super) dive: &'a StereoPairs,
     pub(super) marked: &'a [Marked],
     /// The features that were searched for, in the order of `marked`.
@@ -87,17 +92,39 @@ impl Finish<'_> {
             let all = pictures(self.dive, self.scene, &shown);
             made.iter_mut().zip(all).for_each(|(point, pictures)| point.pictures = pictures);
         }
+        let of_site =
+            |point: &DivePoint| ModelPoint { sigma: rounded(point.sigma), ..ModelPoint::exact(&point.id, point.at) };
+        let site_points: Vec<ModelPoint> = made.iter().map(of_site).collect();
+        let found = self.edges.map(|front_end| self.found_edges(front_end, &frame.world_from_object, &site_points));
+        let model_edge = |(k, edge): (usize, &FoundEdge)| ModelEdge {
+            id: format!("edge-{}", k + 1),
+            ends: edge.ends,
+            sigma: rounded(edge.sigma),
+            faces: Vec::new(),
+        };
+        let dive_edge = |(k, edge): (usize, &FoundEdge)| DiveEdge {
+            id: format!("edge-{}", k + 1),
+            sigma: edge.sigma,
+            scatter: edge.scatter,
+            pairs: edge.pairs.iter().map(|pair| self.stamp(*pair)).collect(),
+            in_view: edge.in_view,
+        };
+        if found.as_ref().is_some_and(Vec::is_empty) {
+            warnings.push(
+                Fault::new("no straight edge in three pairs", self.file)
+                    .remedy("mark features on all sides of the object, or omit --edges"),
+            );
+        }
+        let model_edges = found.iter().flatten().enumerate().map(model_edge).collect();
+        let edges = found.as_ref().map(|found| found.iter().enumerate().map(dive_edge).collect());
         let object = SiteObject {
             id: self.by_hand.object.clone(),
             base,
             base_in_world: None,
             survey_sigma: 0.0,
             world_from_object: None,
-            points: made
-                .iter()
-                .map(|point| ModelPoint { sigma: rounded(point.sigma), ..ModelPoint::exact(&point.id, point.at) })
-                .collect(),
-            edges: Vec::new(),
+            points: site_points,
+            edges: model_edges,
             interest: Vec::new(),
         };
         let site = Site { name: self.by_hand.object.clone(), frame: 0, objects: vec![object], warnings: Vec::new() };
@@ -108,6 +135,7 @@ impl Finish<'_> {
         Ok(DiveModel {
             site,
             points: made,
+            edges,
             given_up: self.given_up(),
             pairs: self.dive.stamps().len(),
             used: pairs.iter().map(|pair| self.stamp(*pair)).collect(),
@@ -119,6 +147,20 @@ impl Finish<'_> {
             halves: self.halves.then(|| halves(&self.dive.rig, self.trail, self.scene, &pixels, pairs)).flatten(),
             warnings,
         })
+    }
+
+    /// The straight edges near the points.
+    fn found_edges(
+        &self,
+        front_end: &LineFrontEnd,
+        world_from_object: &Transform<World, Object>,
+        points: &[ModelPoint],
+    ) -> Vec<FoundEdge> {
+        let object_from_world = world_from_object.inverse();
+        let view = |pair: &usize| Some((*pair, object_from_world * self.scene.poses[*pair]?));
+        let views: Vec<_> = self.settled.pairs.iter().filter_map(view).collect();
+        let common_px = self.corner_sigma;
+        EdgeSearch { front_end, dive: self.dive, views: &views, points, slack_px: SLACK, common_px }.edges()
     }
 
     fn stamp(&self, pair: usize) -> u64 {
@@ -187,7 +229,7 @@ impl Finish<'_> {
         }
         Err(Fault::new("the base points are nearly on a line", self.file)
             .value(format!("{}: sine {sine:.3}, at least {MIN_SINE} is needed", base.map(id).join(", ")))
-            .remedy("mark a point aside of them, or choose others with --base"))
+            .remedy("mark a point off their line, or choose others with --base"))
     }
 
     fn point(&self, k: usize, at: Point<Object>, covariance: Matrix3<f64>, sigma: f64) -> DivePoint {
@@ -319,10 +361,4 @@ impl Finish<'_> {
 /// A standard deviation (m) to the resolution of written coordinates, and never zero.
 fn rounded(sigma: f64) -> f64 {
     (sigma / GRAIN).ceil() * GRAIN
-}
-
-/// The largest angle between two of the rays (rad).
-pub(super) fn largest_angle(rays: &[Vector3<f64>]) -> f64 {
-    let pairs = rays.iter().enumerate().flat_map(|(k, a)| rays[..k].iter().map(move |b| a.angle(b)));
-    pairs.fold(0.0, f64::max)
 }

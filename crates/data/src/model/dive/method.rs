@@ -4,6 +4,7 @@ use std::path::Path;
 
 use seafix_component::Fault;
 use seafix_navigation::Odometry;
+use seafix_vision::LineFrontEnd;
 
 use super::{
     built::DiveModel,
@@ -34,6 +35,8 @@ pub struct ModelFromDive<'a> {
     /// The standard deviation (px) of the place that the locator calls a corner, in common to all pairs: light, texture,
     /// and what lies behind the corner.
     pub corner_sigma: f64,
+    /// The measurement of lines, for straight edges; `None` for points alone.
+    pub edges: Option<&'a LineFrontEnd>,
     /// The odometry; `None` to find the pose of each pair from the model itself.
     pub odometry: Option<&'a dyn Odometry>,
     /// Whether the models of every second pair are compared.
@@ -97,6 +100,7 @@ impl ModelFromDive<'_> {
             by_hand: &self.by_hand,
             calibration: &self.calibration,
             corner_sigma: self.corner_sigma,
+            edges: self.edges,
             dive,
             marked: &marked,
             features: &state.features,

@@ -8,6 +8,9 @@
 mod best_views;
 mod built;
 mod contradictions;
+mod edge_track;
+mod edge_view;
+mod edges;
 mod expect;
 mod find;
 mod finish;
@@ -16,6 +19,7 @@ mod halves;
 mod marks;
 mod method;
 mod operator;
+mod parallax;
 mod picture;
 mod plane;
 mod progress;
@@ -27,7 +31,7 @@ mod start;
 mod template;
 mod trail;
 
-pub use built::{DiveModel, DivePoint};
+pub use built::{DiveEdge, DiveModel, DivePoint};
 pub use marks::DiveMark;
 pub use method::ModelFromDive;
 pub use operator::SimulatedOperator;

@@ -13,8 +13,8 @@ use seafix_geometry::{Point, Transform, UncertainPixels};
 use super::{
     expect::ExpectedPose,
     find::Finder,
-    finish::largest_angle,
     gather::{Feature, Gathered},
+    parallax::largest_angle,
     recover::{MarkRay, recovered},
     relocate::relocate,
     settle::{HELD, Key, Scene, Settled, settle},

@@ -14,7 +14,7 @@ use crate::{
     edge_candidates::OVERLAP,
     problem::{Correspondence, Problem},
     site::{edge::ModelEdge, model::ModelPoint},
-    space_line::{Row, SpaceLine},
+    space_line::{LineOffset, SpaceLine},
 };
 
 /// Gate of a pair about its place under the pose (χ²₄).
@@ -40,7 +40,7 @@ pub(in crate::search) struct EdgeVertex {
 
 /// A vertex under a motion.
 pub(in crate::search) struct Placed {
-    pub(in crate::search) rows: [Row; 4],
+    pub(in crate::search) rows: [LineOffset; 4],
     pub(in crate::search) residual: Vector4<f64>,
 }
 

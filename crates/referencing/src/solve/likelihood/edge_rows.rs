@@ -6,7 +6,7 @@ use seafix_geometry::{Camera, NormalOffset, Pinhole, Pixel, Point, RightCamera, 
 use super::pixel_terms::PIXEL_FLOOR;
 use crate::{
     observations::EdgeObservation,
-    space_line::{MIN_SLOPE, Row, SpaceLine},
+    space_line::{LineOffset, MIN_SLOPE, SpaceLine},
 };
 
 /// An edge with prepared measurements.
@@ -53,7 +53,7 @@ impl<'a> EdgeRows<'a> {
     }
 
     /// The residuals of a model edge with these ends, camera frame; `None` if a camera cannot see the edge there.
-    pub(crate) fn rows(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<[Row; 4]> {
+    pub(crate) fn rows(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> Option<[LineOffset; 4]> {
         let along = to - from;
         match &self.kind {
             Kind::Pixels(all) => {
@@ -78,7 +78,7 @@ impl<'a> ImageOffset<'a> {
         Some(Self { measured, plane, camera: CameraOf::Right(rig) })
     }
 
-    fn row(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<Row> {
+    fn row(&self, from: &Vector3<f64>, along: &Vector3<f64>) -> Option<LineOffset> {
         let (normal, offset) = &self.plane;
         let slope = normal.dot(along);
         if !(slope.abs() > MIN_SLOPE * normal.norm() * along.norm() * STEEP) {
@@ -97,7 +97,7 @@ impl<'a> ImageOffset<'a> {
         // The place slides along the edge so that it stays on the normal.
         let across = n - tangent * (n.dot(&motion) / slope);
         let off = Vector2::new(self.measured.at.u - pixel.u, self.measured.at.v - pixel.v);
-        Some(Row { at, gradient: j.tr_mul(&across), residual: across.dot(&off), along: t })
+        Some(LineOffset { at, gradient: j.tr_mul(&across), residual: across.dot(&off), along: t })
     }
 
     fn project(&self, at: &Vector3<f64>) -> Option<(Pixel, Matrix2x3<f64>)> {

@@ -37,7 +37,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
     }
     // With a navigator there are two trajectories: navigated, and odometry only from the first fix.
     let navigated = || frames().filter_map(|frame| Some((frame, frame.navigated.as_ref()?)));
-    let sails = navigated().next().is_some();
+    let navigates = navigated().next().is_some();
     let carried = |which: usize| {
         let places = navigated().map(move |(frame, navigated)| (frame, navigated.places[which]));
         places.filter(|(_, at)| at[0].is_finite())
@@ -71,7 +71,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         }
         layers.push(Layer::Marks { series: 6, points: objects.iter().flatten().map(flat).collect(), radius: 0.9 });
         let truth: Vec<[f64; 2]> = truth.iter().map(flat).collect();
-        if sails {
+        if navigates {
             let path = |which: usize| carried(which).map(|(_, at)| flat(&at)).collect();
             layers.push(Layer::Line { series: 0, points: truth });
             layers.push(Layer::Line { series: 3, points: path(1) });
@@ -83,12 +83,12 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
         Panel { x: Axis::linear(labels[0]), y: Axis::linear(labels[1]), layers, equal: true, ..Panel::default() }
     };
     let mut legend = vec![
-        if sails { Entry::line("true camera positions", 0) } else { Entry::mark("true camera positions", 0) },
+        if navigates { Entry::line("true camera positions", 0) } else { Entry::mark("true camera positions", 0) },
         Entry::mark("fixes", 1),
         Entry::mark("feature points", 6),
         Entry::line("bounding boxes", 2),
     ];
-    if sails {
+    if navigates {
         legend.extend([Entry::line("odometry only, from the first fix", 3), Entry::line("navigated", 4)]);
     }
     let chart = Chart {
@@ -100,7 +100,7 @@ pub(crate) fn figure(run: &Run) -> Option<Figure> {
     };
     let message = format!(
         "Trajectory from above and from the side, on equal scales: true positions of the left camera, positions by the fixes and the survey,{} feature points and the bounding boxes of the objects. {}Log {}.",
-        if sails { " the navigated trajectory, the trajectory by odometry only from the first fix," } else { "" },
+        if navigates { " the navigated trajectory, the trajectory by odometry only from the first fix," } else { "" },
         if every > 1 { format!("One frame in {every} is shown. ") } else { String::new() },
         trial.file()
     );

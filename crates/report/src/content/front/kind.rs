@@ -47,7 +47,7 @@ impl Kind {
             _ if summary.has_limits() => Self::Limits,
             _ if run.trials.iter().any(inspection::inspects) => Self::Points,
             _ if run.trials.iter().any(objects::moves) => Self::Objects,
-            _ if run.trials.iter().any(navigation::sails) => Self::Navigation,
+            _ if run.trials.iter().any(navigation::navigates) => Self::Navigation,
             _ if searches && summary.question.to_lowercase().contains("cost of") => Self::Cost,
             _ if limit.is_some() => Self::Acceptance(limit.unwrap_or_default()),
             (Some(key), ..) => Self::Tolerance(key.clone()),

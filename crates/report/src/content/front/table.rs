@@ -27,13 +27,16 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
         return None;
     }
     let single = lines.iter().all(|(_, members)| members.len() == 1);
-    let sails = run.trials.iter().any(navigation::sails);
+    let navigates = run.trials.iter().any(navigation::navigates);
     let mut heads = vec![Head::words(""), Head::numbers("attempts"), Head::numbers("fixes (%)")];
     heads.push(Head::numbers("wrong"));
     if single {
-        heads.push(Head::numbers(format!("median {} (mm)", if sails { "error of fixes" } else { error(summary).0 })));
+        heads.push(Head::numbers(format!(
+            "median {} (mm)",
+            if navigates { "error of fixes" } else { error(summary).0 }
+        )));
     }
-    if sails && single {
+    if navigates && single {
         heads.push(Head::numbers("navigated error RMS (mm)"));
     }
     let caption = text!["Fixes in % of the attempts and median errors, with 95 % intervals."];
@@ -47,7 +50,7 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
             let known = (error(summary).2)(&summary.rows[*index]).is_some();
             let shown = if known { without_unit(median(summary, &run.trials[*index])) } else { text!["–"] };
             cells.push(Cell { text: shown, ..Cell::default() });
-            if sails {
+            if navigates {
                 let trial = &run.trials[*index];
                 let rms = navigation::statistic(trial, "rms", NavigationQuantity::Position, Unit::Millimetres);
                 cells.push(rms.into());

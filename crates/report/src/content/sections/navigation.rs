@@ -15,13 +15,13 @@ use crate::{
 };
 
 /// Whether a trial has a navigator.
-pub(crate) fn sails(trial: &Trial) -> bool {
+pub(crate) fn navigates(trial: &Trial) -> bool {
     trial.sample().any(|frame| frame.navigated.is_some())
 }
 
 /// The section; `None` where no trial has a navigator.
 pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
-    if !run.trials.iter().any(sails) {
+    if !run.trials.iter().any(navigates) {
         return None;
     }
     let caption = text![
@@ -36,7 +36,7 @@ pub(crate) fn section(run: &Run, summary: &RunSummary) -> Option<Section> {
     below.extend(["p95", "mean", "median", "p95", "at the end"].map(Head::numbers));
     let mut table = Table { id: "navigation".to_owned(), caption, heads: vec![above, below], lines: Vec::new() };
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
-        if !sails(trial) {
+        if !navigates(trial) {
             continue;
         }
         let mut line = columns::cells(row);
@@ -75,15 +75,15 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
         if fix_intervals.is_empty() {
             continue;
         }
-        let as_number = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
+        let quoted = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
             let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
             let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated{suffix}"));
             Number::new(value.map(|value| value * unit.scale()), decimals, key)
         };
         let mut line = columns::cells(row);
-        line.push(as_number("count", Some(fix_intervals.len() as f64), (Unit::Plain, 0)).into());
+        line.push(quoted("count", Some(fix_intervals.len() as f64), (Unit::Plain, 0)).into());
         line.push(
-            as_number(
+            quoted(
                 "path-length",
                 Some(fix_intervals.iter().map(|fix_interval| fix_interval.path_length).sum()),
                 (Unit::Plain, 1),
@@ -91,7 +91,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
             .into(),
         );
         line.push(
-            as_number(
+            quoted(
                 "seconds",
                 Some(fix_intervals.iter().map(|fix_interval| fix_interval.seconds).sum()),
                 (Unit::Plain, 1),
@@ -101,10 +101,10 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
         let mut amplitudes: Vec<f64> = fix_intervals.iter().map(|fix_interval| fix_interval.amplitude).collect();
         for (name, p) in [("median", 0.5), ("q95", 0.95), ("greatest", 1.0)] {
             let value = seafix_evaluation::quantile(&mut amplitudes, p);
-            line.push(as_number(&format!("{name} amplitude"), Some(value), (Unit::Millimetres, 1)).into());
+            line.push(quoted(&format!("{name} amplitude"), Some(value), (Unit::Millimetres, 1)).into());
         }
         line.push(
-            as_number(
+            quoted(
                 "drift-per-metre",
                 drift(&fix_intervals, |fix_interval| fix_interval.path_length),
                 (Unit::Millimetres, 2),
@@ -112,7 +112,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
             .into(),
         );
         line.push(
-            as_number(
+            quoted(
                 "drift-per-second",
                 drift(&fix_intervals, |fix_interval| fix_interval.seconds),
                 (Unit::Millimetres, 2),
@@ -128,7 +128,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
 ///
 /// `name` gives the name of the trial at an index.
 pub(crate) fn sentences(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
-    let trials = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial));
+    let trials = run.trials.iter().enumerate().filter(|(_, trial)| navigates(trial));
     let sentence = |(index, trial): (usize, &Trial)| {
         let metres = |name: &str, quantity| statistic(trial, name, quantity, Unit::Millimetres);
         text![
@@ -177,7 +177,7 @@ fn min(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
         let (n, square) = errors.fold((0, 0.0), |(n, sum), error| (n + 1, sum + error * error));
         (n, (square / n as f64).sqrt())
     };
-    let all: Vec<(usize, &Trial)> = run.trials.iter().enumerate().filter(|(_, trial)| sails(trial)).collect();
+    let all: Vec<(usize, &Trial)> = run.trials.iter().enumerate().filter(|(_, trial)| navigates(trial)).collect();
     let known: Vec<(usize, f64)> = all.iter().map(|(_, trial)| rms(trial)).collect();
     let comparable = known.iter().all(|(n, rms)| *n == known[0].0 && rms.is_finite());
     let min = (0..all.len()).min_by(|&a, &b| known[a].1.total_cmp(&known[b].1)).filter(|_| comparable)?;
@@ -190,32 +190,32 @@ fn min(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
 ///
 /// The first event of each object is quoted from the log.
 fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
-    let as_number = |trial: &Trial| -> Vec<String> {
+    let quoted = |trial: &Trial| -> Vec<String> {
         let mut objects: Vec<&str> = Vec::new();
-        let mut as_number = Vec::new();
+        let mut quoted = Vec::new();
         for frame in trial.sample() {
             for event in frame.navigated.iter().flat_map(|navigated| &navigated.displaced) {
-                let object = event.split(" stands ").next().unwrap_or(event);
+                let object = event.split(" is ").next().unwrap_or(event);
                 if !objects.contains(&object) {
                     objects.push(object);
-                    as_number.push(format!("at frame {}, “{event}”", frame.number));
+                    quoted.push(format!("at frame {}, “{event}”", frame.number));
                 }
             }
         }
-        as_number
+        quoted
     };
     let all: Vec<(usize, Vec<String>)> = run
         .trials
         .iter()
         .enumerate()
-        .filter(|(_, trial)| sails(trial))
-        .map(|(index, trial)| (index, as_number(trial)))
+        .filter(|(_, trial)| navigates(trial))
+        .map(|(index, trial)| (index, quoted(trial)))
         .collect();
-    if all.iter().all(|(_, as_number)| as_number.is_empty()) {
+    if all.iter().all(|(_, quoted)| quoted.is_empty()) {
         return Vec::new();
     }
-    let sentence = |(index, as_number): (usize, Vec<String>)| {
-        let what = if as_number.is_empty() { "none".to_owned() } else { as_number.join("; ") };
+    let sentence = |(index, quoted): (usize, Vec<String>)| {
+        let what = if quoted.is_empty() { "none".to_owned() } else { quoted.join("; ") };
         text![format!("{}: objects reported away from their surveyed pose: {}.", name(index), what)]
     };
     all.into_iter().map(sentence).collect()

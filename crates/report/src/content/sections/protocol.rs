@@ -107,8 +107,8 @@ pub(crate) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             ],
         ));
     }
-    let sails = |trial: &Trial| trial.sample().any(|frame| frame.navigated.is_some());
-    if run.trials.iter().any(sails) {
+    let navigates = |trial: &Trial| trial.sample().any(|frame| frame.navigated.is_some());
+    if run.trials.iter().any(navigates) {
         terms.push((
             text![italic("amplitude, drift")],
             text![

@@ -9,7 +9,7 @@ use super::{
     MIN, Seeds,
 };
 
-/// Number of starts of a pose sought regardless of its evidence, and of vertices compared for each.
+/// Number of starting pairs of this search, and number of vertices compared with each.
 const BEGINNINGS: usize = 8;
 const COMPARED_BEGINNINGS: usize = 512;
 
