@@ -10,7 +10,7 @@ use super::{
     picture::{HALF, Picture, cut},
     settle::Scene,
 };
-use crate::StereoPairs;
+use crate::stereo_pairs::StereoPairs;
 
 /// Number of views of each point.
 const VIEWS: usize = 3;

@@ -15,7 +15,7 @@ use super::{
     edge_view::View,
     parallax::largest_angle,
 };
-use crate::StereoPairs;
+use crate::stereo_pairs::StereoPairs;
 
 /// The search for edges.
 pub(super) struct EdgeSearch<'a> {

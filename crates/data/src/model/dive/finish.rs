@@ -25,12 +25,12 @@ use super::{
     trail::Trail,
 };
 use crate::{
-    StereoPairs,
     model::{
         adjust::{CalibrationSigma, PointSpread},
         by_hand::{GRAIN, MIN_SINE, ModelByHand, ONE_POINT},
         frame::{ObjectFrame, inner, relative_sigmas},
     },
+    stereo_pairs::StereoPairs,
 };
 
 /// An adjusted dive.

@@ -15,7 +15,7 @@ use super::{
     template::Template,
     trail::Trail,
 };
-use crate::StereoPairs;
+use crate::stereo_pairs::StereoPairs;
 
 /// A feature that is searched for.
 #[derive(Debug, Clone)]

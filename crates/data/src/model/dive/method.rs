@@ -18,11 +18,11 @@ use super::{
     trail::Trail,
 };
 use crate::{
-    StereoPairs,
     model::{
         adjust::CalibrationSigma,
         by_hand::{HandModel, ModelByHand},
     },
+    stereo_pairs::StereoPairs,
 };
 
 /// The settings for a model from a dive.

@@ -22,8 +22,8 @@ use super::{
     trail::Trail,
 };
 use crate::{
-    StereoPairs,
     model::{adjust::CalibrationSigma, frame::inner},
+    stereo_pairs::StereoPairs,
 };
 
 /// The maximum number of searches; later ones find next to nothing.

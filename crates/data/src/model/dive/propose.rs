@@ -14,7 +14,7 @@ use super::{
     plane::Plane,
     trail::Trail,
 };
-use crate::StereoPairs;
+use crate::stereo_pairs::StereoPairs;
 
 /// The search for features worth a mark.
 #[derive(Debug)]

@@ -14,7 +14,7 @@ use super::{
     find::{Finder, SPACING},
     settle::Scene,
 };
-use crate::StereoPairs;
+use crate::stereo_pairs::StereoPairs;
 
 /// The mark of a feature whose corner is searched for.
 #[derive(Debug, Clone, Copy)]

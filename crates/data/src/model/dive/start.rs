@@ -13,8 +13,8 @@ use super::{
     template::Template,
 };
 use crate::{
-    StereoPairs,
     model::by_hand::{ModelByHand, Seen},
+    stereo_pairs::StereoPairs,
 };
 
 /// A mark, located in its pair.

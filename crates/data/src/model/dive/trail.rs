@@ -7,7 +7,7 @@ use seafix_geometry::{Camera, Covariance6, Transform};
 use seafix_navigation::{Odometry, OdometryTrajectory, RelativeMotion, StereoPair};
 use seafix_vision::Threads;
 
-use crate::StereoPairs;
+use crate::stereo_pairs::StereoPairs;
 
 /// The motions of a dive: the step that leads to each pair from the one before it.
 #[derive(Debug, Clone)]
