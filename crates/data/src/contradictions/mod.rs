@@ -5,9 +5,10 @@ mod evidence;
 mod margins;
 mod pixels;
 mod poses;
+mod rig_mistakes;
 mod trajectories;
 
 pub(crate) use evidence::MeasuredPair;
-pub(crate) use pixels::{images_fault, mosaic_fault, residual};
+pub(crate) use pixels::{dim_fault, images_fault, mosaic_fault, residual};
 pub(crate) use poses::{View, poses_faults, scale_fault};
 pub use trajectories::trajectory_fault;

@@ -18,7 +18,7 @@ use seafix_io::{
 };
 
 use super::{contents::Dataset, folder::inside, pairing::SAME_INSTANT_NS};
-use crate::contradictions::{MeasuredPair, View, images_fault, mosaic_fault, poses_faults, scale_fault};
+use crate::contradictions::{MeasuredPair, View, dim_fault, images_fault, mosaic_fault, poses_faults, scale_fault};
 
 /// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
 /// calibration, and compares every file with its hash if there is one.
@@ -39,6 +39,7 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
         let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
         faults.extend(swap_fault(sides, &table));
         warnings.extend(strangers(sides, &table));
+        warnings.extend(dim_images(&dataset));
         faults.extend(contradictions(&dataset));
     }
     (faults, warnings)
@@ -105,7 +106,8 @@ pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
             (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
         });
         let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
-        faults.extend(poses_faults(&view, &priors, &truths, sigma, &measured, &file));
+        let survey = View::new(site, &[], &dataset.rig, dataset.body_from_camera);
+        faults.extend(poses_faults([&survey, &view], &priors, &truths, sigma, &measured, &file));
     }
     if let Some(site) = dataset.site.as_ref().filter(|_| faults.is_empty()) {
         let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
@@ -175,6 +177,15 @@ pub fn swapped(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides(dataset), &dataset.folder.join(&dataset.table))
 }
 
+/// A warning about images of 16 bits that hold numbers of fewer bits, as [`dim_fault`] of the first pairs.
+fn dim_images(dataset: &Dataset) -> Option<Fault> {
+    let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
+    let frames = dataset.frames.iter().step_by(step);
+    let images: Vec<Image> =
+        frames.clone().filter_map(|frame| dataset.pair(frame).ok()).flat_map(<[Image; 2]>::from).collect();
+    dim_fault(&images, dataset.bits, &frames.clone().next()?.left)
+}
+
 /// The result of the swap check on three frames over the complete data set.
 fn sides(dataset: &Dataset) -> Sides {
     let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
@@ -230,7 +241,7 @@ pub fn swap_fault(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_swapped().then(|| {
         Fault::new("exchanged left and right images", file)
             .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))
-            .remedy("exchange the images, or the cameras of the rig")
+            .remedy("exchange the images, or the cameras of the rig; if they are in order, the images are mirrored: flip them")
     })
 }
 

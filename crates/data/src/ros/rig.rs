@@ -26,6 +26,11 @@ pub(crate) fn is_without_raw_model(info: &CameraInfo) -> bool {
     info.k[0] == 0.0
 }
 
+/// Whether neither K nor P is a camera: drivers publish zeros until a camera is calibrated.
+pub(crate) fn is_uncalibrated(info: &CameraInfo) -> bool {
+    info.k[0] == 0.0 && info.p[0] == 0.0
+}
+
 /// The camera model of the images.
 pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, String> {
     if info.binning.iter().any(|&binning| binning > 1)
@@ -38,7 +43,13 @@ pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, Stri
     let distortion: &[f64] = if info.d.iter().all(|&number| number == 0.0) { &[] } else { &info.d };
     let built = match (rectified, info.model.as_str()) {
         (true, _) => Pinhole::new(info.size, [px, py], [pcx, pcy], &[]),
-        (false, "plumb_bob" | "rational_polynomial" | "") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
+        (false, "plumb_bob" | "rational_polynomial") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
+        // Drivers of images without distortion state `none` or nothing, with zeros or without numbers.
+        (false, "none" | "None" | "") if distortion.is_empty() => Pinhole::new(info.size, [fx, fy], [cx, cy], &[]),
+        (false, nothing @ ("none" | "None" | "")) => {
+            let remedy = "record plumb_bob, rational_polynomial or equidistant, or set images = \"rectified\"";
+            return Err(format!("the distortion model is `{nothing}`, but D has {} numbers; {remedy}", info.d.len()));
+        }
         (false, "equidistant" | "fisheye" | "kannala_brandt" | "kannala_brandt4") => {
             Pinhole::equidistant(info.size, [fx, fy], [cx, cy], &info.d)
         }
