@@ -29,8 +29,8 @@ pub fn parse(text: &str, file: &Path) -> Result<Yaml, Fault> {
         body = body.replace(":[", ": [");
     }
     let documents = bounded_yaml::load(&body).map_err(|(what, line)| {
-        let what = if file.extension().is_some_and(|end| end == "json") { "invalid JSON" } else { "invalid YAML" };
-        Fault::new(what, file).on_line(line + offset).value(what).remedy("correct the line")
+        let format = if file.extension().is_some_and(|end| end == "json") { "invalid JSON" } else { "invalid YAML" };
+        Fault::new(format, file).on_line(line + offset).value(what).remedy("correct the line")
     })?;
     Ok(documents.into_iter().next().unwrap_or(Yaml::Null))
 }

@@ -54,6 +54,31 @@ fn a_site_in_another_world_is_named() {
     checked(&folder, 1, &["poses of the prior that put no object in view", "ENU for NED"]);
 }
 
+/// The vehicle's poses as the camera's, with a prior so wide that chance gives as many matches: only fixes tell.
+#[test]
+fn a_wide_prior_of_the_vehicle_is_named_by_fixes() {
+    let folder = copied();
+    // body_from_camera turns by a quarter about the axis of view.
+    let mounted = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, -std::f64::consts::FRAC_PI_2);
+    edit(&folder, "prior.tum", |text| {
+        let line = |line: &str| {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let n: Vec<f64> = words[1..].iter().map(|word| word.parse().unwrap()).collect();
+            let q =
+                nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(n[6], n[3], n[4], n[5])) * mounted;
+            format!("{} {} {} {} {}\n", words[..4].join(" "), q.i, q.j, q.k, q.w)
+        };
+        text.lines().filter(|line| !line.starts_with('#')).take(2).map(line).collect()
+    });
+    edit(&folder, "dataset.toml", |text| {
+        let kept = |line: &&str| !["truth =", "visibility =", "objects ="].iter().any(|key| line.starts_with(key));
+        let text: String = text.lines().filter(kept).map(|line| format!("{line}\n")).collect();
+        text.replace("position = 0.1", "position = 1.0").replace("attitude_deg = 0.5", "attitude_deg = 5.0")
+    });
+    let named = "a fix in 0 of 2 pairs as given, in 2 if they are poses of the vehicle (body_from_camera is applied)";
+    checked(&folder, 1, &["poses of the prior that give no fix", named]);
+}
+
 #[test]
 fn images_of_another_size_state_the_ratio() {
     for (size, part) in [

@@ -8,6 +8,7 @@ use std::{
 
 use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
+use seafix::{PosePrior, Rig, StereoImages};
 use seafix_component::Fault;
 use seafix_geometry::{StereoPixels, StereoRig};
 use seafix_vision::{Image, RightCameraRotation, Sides, repeated_patterns};
@@ -18,7 +19,9 @@ use seafix_io::{
 };
 
 use super::{contents::Dataset, folder::inside, pairing::SAME_INSTANT_NS};
-use crate::contradictions::{MeasuredPair, View, dim_fault, images_fault, mosaic_fault, poses_faults, scale_fault};
+use crate::contradictions::{
+    MeasuredPair, View, dim_fault, fixes_fault, images_fault, mosaic_fault, poses_faults, scale_fault,
+};
 
 /// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
 /// calibration, and compares every file with its hash if there is one.
@@ -41,6 +44,9 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
         warnings.extend(strangers(sides, &table));
         warnings.extend(dim_images(&dataset));
         faults.extend(contradictions(&dataset));
+    }
+    if faults.is_empty() {
+        faults.extend(prior_without_fixes(&dataset));
     }
     (faults, warnings)
 }
@@ -175,6 +181,20 @@ const ASKED: usize = 8;
 /// The fault of exchanged left and right images, by a swap check on three frames over the complete data set.
 pub fn swapped(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides(dataset), &dataset.folder.join(&dataset.table))
+}
+
+/// The fault of a prior that gives no fix, as [`fixes_fault`] of some pairs.
+fn prior_without_fixes(dataset: &Dataset) -> Option<Fault> {
+    let site = dataset.site.as_ref()?;
+    let rig = Rig { body_from_camera: dataset.body_from_camera, bits: dataset.bits, ..Rig::from(dataset.rig.clone()) };
+    let with_prior: Vec<_> = dataset.frames.iter().filter(|frame| frame.prior.is_some()).collect();
+    let step = with_prior.len().div_ceil(INSPECTED_PAIRS).max(1);
+    let pairs = with_prior.iter().step_by(step).filter_map(|frame| {
+        let (left, right) = dataset.pair(frame).ok()?;
+        let (world_from_camera, covariance) = frame.prior?;
+        Some((StereoImages { left, right }, PosePrior { world_from_camera, covariance }))
+    });
+    fixes_fault(site, &rig, &pairs.collect::<Vec<_>>(), &dataset.folder.join("dataset.toml"))
 }
 
 /// A warning about images of 16 bits that hold numbers of fewer bits, as [`dim_fault`] of the first pairs.
