@@ -8,6 +8,22 @@ use crate::{
     program,
 };
 
+/// The first pairs of the sample, as few as a test needs.
+fn pairs(count: usize) -> tempfile::TempDir {
+    let folder = copied();
+    edit(&folder, "frames.csv", |text| text.lines().take(1 + count).map(|line| format!("{line}\n")).collect());
+    edit(&folder, "visibility.csv", |text| {
+        let stamps: Vec<String> = fs::read_to_string(folder.path().join("frames.csv"))
+            .unwrap()
+            .lines()
+            .map(|line| line.split(',').next().unwrap().to_owned())
+            .collect();
+        let kept = |line: &&str| stamps.iter().any(|stamp| line.starts_with(stamp));
+        text.lines().filter(kept).map(|line| format!("{line}\n")).collect()
+    });
+    folder
+}
+
 /// Fails if a focal length in millimetres is a camera of 179°.
 #[test]
 fn a_focal_length_in_millimetres_is_refused() {
@@ -26,9 +42,8 @@ fn mistakes_of_both_cameras_are_named() {
     for (from, to, explained) in [
         (["cx =", "cy ="], ["cy =", "cx ="], "if cx and cy are exchanged"),
         (["fx = 500.0", "fy = 500.0"], ["fx = 250.0", "fy = 250.0"], "if the focal length is twice as large"),
-        (["fx = 500.0", "fy = 500.0"], ["fx = 1000.0", "fy = 1000.0"], "if the focal length is half as large"),
     ] {
-        let folder = copied();
+        let folder = pairs(2);
         edit(&folder, "dataset.toml", |text| {
             text.replace(from[0], "\u{1}").replace(from[1], to[1]).replace('\u{1}', to[0])
         });
@@ -39,7 +54,7 @@ fn mistakes_of_both_cameras_are_named() {
 /// The prior predicts the objects where they were surveyed. Fails if it is compared with their true places.
 #[test]
 fn a_site_in_another_world_is_named() {
-    let folder = copied();
+    let folder = pairs(3);
     edit(&folder, "site.toml", |text| {
         let line = |line: &str| match line.strip_prefix("base_in_world = ") {
             Some(rows) => {
@@ -57,7 +72,7 @@ fn a_site_in_another_world_is_named() {
 /// The vehicle's poses as the camera's, with a prior so wide that chance gives as many matches: only fixes tell.
 #[test]
 fn a_wide_prior_of_the_vehicle_is_named_by_fixes() {
-    let folder = copied();
+    let folder = pairs(2);
     // body_from_camera turns by a quarter about the axis of view.
     let mounted = nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, -std::f64::consts::FRAC_PI_2);
     edit(&folder, "prior.tum", |text| {
@@ -87,9 +102,7 @@ fn images_of_another_size_state_the_ratio() {
         ("[1000, 768]", "use the images of the calibrated camera"),
     ] {
         let folder = copied();
-        edit(&folder, "dataset.toml", |text| {
-            text.replace("[1024, 768]", size).replace("cx = 511.5", "cx = 383.5").replace("fx = 500.0", "fx = 500.0")
-        });
+        edit(&folder, "dataset.toml", |text| text.replace("[1024, 768]", size).replace("cx = 511.5", "cx = 383.5"));
         checked(&folder, 1, &[part]);
     }
 }

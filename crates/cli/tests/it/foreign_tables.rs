@@ -48,7 +48,7 @@ fn exports_of_other_programs_are_read() {
         move |_: usize, ns: u64, p: [f64; 3], q: [f64; 4]| format!("{} {}", ns / 10u64.pow(power), rest(p, q, ' '))
     };
     let negated = |k: usize, ns: u64, p: [f64; 3], q: [f64; 4]| {
-        tum(k, ns, p, q.map(|part| if k % 2 == 0 { part } else { -part }))
+        tum(k, ns, p, q.map(|part| if k.is_multiple_of(2) { part } else { -part }))
     };
     for (folder, tolerance) in [
         (walk(echoed, topic), 1e-5),

@@ -186,7 +186,7 @@ pub fn swapped(dataset: &Dataset) -> Option<Fault> {
 /// The fault of a prior that gives no fix, as [`fixes_fault`] of some pairs.
 fn prior_without_fixes(dataset: &Dataset) -> Option<Fault> {
     let site = dataset.site.as_ref()?;
-    let rig = Rig { body_from_camera: dataset.body_from_camera, bits: dataset.bits, ..Rig::from(dataset.rig.clone()) };
+    let rig = Rig { body_from_camera: dataset.body_from_camera, bits: dataset.bits, ..Rig::from(dataset.rig) };
     let with_prior: Vec<_> = dataset.frames.iter().filter(|frame| frame.prior.is_some()).collect();
     let step = with_prior.len().div_ceil(INSPECTED_PAIRS).max(1);
     let pairs = with_prior.iter().step_by(step).filter_map(|frame| {
