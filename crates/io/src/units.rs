@@ -15,7 +15,10 @@ pub fn doubtful_baseline(baseline: f64) -> Option<(String, String)> {
         b if b < 1e-6 || USUAL.contains(&b) => return None,
         b if b >= 30.0 => format!("as millimetres it is {:.4} m: divide the translation by 1000", b * 1e-3),
         b if b > 1.0 => format!("as centimetres it is {:.4} m: divide the translation by 100", b * 1e-2),
-        b => format!("as kilometres it is {:.4} m: give metres", b * 1e3),
+        b => format!(
+            "as kilometres it is {:.4} m: give metres; P[3] of ROS is −fx·baseline, in metres times pixels",
+            b * 1e3
+        ),
     };
     Some((format!("units? a baseline of {baseline} m"), format!("lengths are in metres; {guess}")))
 }

@@ -59,6 +59,8 @@ struct Bag {
     rectified: bool,
     model: &'static str,
     d: Vec<f64>,
+    /// P[1] of both cameras, which is 0 for rectified ones.
+    skew: f64,
     /// P[0] and P[3] of the two cameras at each pair.
     p: Vec<[[f64; 2]; 2]>,
     /// The baseline of /tf_static (m), the frame of the right camera in that of the left.
@@ -110,6 +112,7 @@ impl Bag {
             rectified: true,
             model: "plumb_bob",
             d: vec![0.0; 4],
+            skew: 0.0,
             p: vec![[[500.0, 0.0], [500.0, -125.0]]; 5],
             tf: Some([0.25, 0.0, 0.0]),
             poses: poses.collect(),
@@ -153,7 +156,7 @@ impl Bag {
                 let [width, height] = self.size;
                 let [cx, cy] = self.size.map(|pixels| f64::from(pixels - 1) / 2.0);
                 let matrix = [fx, 0.0, cx, 0.0, fx, cy, 0.0, 0.0, 1.0];
-                let p = [fx, 0.0, cx, tx, 0.0, fx, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+                let p = [fx, self.skew, cx, tx, 0.0, fx, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
                 let message = Cdr::new(stamp, frame).u32(height).u32(width).text(self.model);
                 let message = message.u32(self.d.len() as u32).f64s(&self.d);
                 let message = message.f64s(&matrix).f64s(&eye).f64s(&p);
@@ -286,6 +289,16 @@ fn a_camera_without_a_distortion_model() {
     }
     let bag = Bag { model: "none", d: vec![-0.2, 0.05, 0.0, 0.0, 0.0], ..Bag::sound() };
     bag.refused(&["the distortion model is `none`, but D has 5 numbers", "/cam/left/camera_info"]);
+}
+
+/// Some drivers publish K [R | t] of the mounted camera as P, others the baseline as P[3]. Fails if only the places of fx, cx
+/// and tx are read.
+#[test]
+fn a_projection_that_is_not_of_rectified_images() {
+    let bag = Bag { skew: 52.4, tf: None, ..Bag::sound() };
+    bag.refused(&["P is not of the form K [I | t]", "/cam/right/camera_info", "publish P of rectified cameras"]);
+    let bag = Bag { p: vec![[[500.0, 0.0], [500.0, -0.25]]; 5], tf: None, ..Bag::sound() };
+    bag.refused(&["units? a baseline of 0.0005 m", "P[3] of ROS is −fx·baseline"]);
 }
 
 #[test]

@@ -13,6 +13,9 @@ use crate::{
     yaml,
 };
 
+/// The greatest skew of a rectified camera, as a part of its focal length: the rounding of six digits.
+const SKEW: f64 = 1e-6;
+
 pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fault> {
     let Some(content) = sources[0].yaml() else { return Ok(None) };
     let content = content?;
@@ -27,6 +30,14 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
     let p = [(left, &content), (right, &other)]
         .map(|(source, content)| source.numbers::<12>("projection_matrix", projection(content)));
     let [p, q] = [p[0].clone()?, p[1].clone()?];
+    for (source, p) in [(left, &p), (right, &q)] {
+        if p[0] != 0.0 && ![p[1], p[4], p[8], p[9]].iter().all(|part| part.abs() <= SKEW * p[0].abs()) {
+            let fault = source.fault("projection_matrix", "P is not of the form K [I | t]").value(format!("{p:?}"));
+            return Err(fault.remedy(
+                "give the files of a stereo calibration: P of rectified cameras has neither skew nor rotation",
+            ));
+        }
+    }
     // Before the baseline, which an uncalibrated camera lacks too.
     let cameras = [raw(left, &content, given)?, raw(right, &other, given)?];
     // P = K [I | t]: the left camera's centre in the rectified right view.

@@ -111,4 +111,9 @@ fn a_camera_without_distortion_has_no_coefficients() {
     assert!(said.starts_with("coefficients of no distortion model") && said.contains("state plumb_bob"), "{said}");
     let said = found(&ros("plumb_bob", "", &[0.0; 9]), Given::default()).unwrap_err();
     assert!(said.starts_with("a camera that is not calibrated: K is zero"), "{said}");
+    let [left, right] = ros("plumb_bob", "", &k);
+    let turned = right.1.replace("data: [480, 0, 500, -120", "data: [480, 52.4, 500, -120");
+    assert_ne!(turned, right.1);
+    let said = found(&[left, ("right.yaml", turned)], Given::default()).unwrap_err();
+    assert!(said.starts_with("P is not of the form K [I | t]") && said.contains("right.yaml"), "{said}");
 }
