@@ -46,7 +46,13 @@ fn decoded(bytes: Vec<u8>, path: &Path) -> Result<String, Fault> {
         _ => {
             return String::from_utf8(bytes).map_err(|error| {
                 let at = error.utf8_error().valid_up_to();
-                Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy("save the file as UTF-8")
+                // COLMAP's binary models have no signature.
+                let is_model = path.extension().is_some_and(|end| end == "bin");
+                let remedy = match is_model {
+                    true => "a model of COLMAP is converted by `colmap model_converter --output_type TXT`",
+                    false => "save the file as UTF-8",
+                };
+                Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy(remedy)
             });
         }
     };
@@ -74,6 +80,8 @@ mod tests {
         assert!(said(b"MATLAB 5.0 MAT-file, Platform: GLNXA64").contains("a MAT-file"));
         assert!(said(b"version https://git-lfs.github.com/spec/v1\n").contains("git lfs pull"));
         assert!(said(b"\xE4,b\n").starts_with("not UTF-8"));
+        let model = decoded(b"\x02\0\0\0\0\0\0\0\xFF".to_vec(), Path::new("images.bin")).unwrap_err().to_string();
+        assert!(model.contains("colmap model_converter --output_type TXT"), "{model}");
     }
 
     #[test]

@@ -125,6 +125,13 @@ fn the_columns_of_the_frames_are_read_by_name() {
 }
 
 #[test]
+fn stamps_in_seconds_are_named_where_nanoseconds_stand() {
+    let folder = copied();
+    edit(&folder, "frames.csv", |text| text.replace("1700000000000000000,", "1700000000.0,"));
+    checked(&folder, 1, &["not a whole number in", "frames.csv:2: 1700000000.0; stamps are whole nanoseconds"]);
+}
+
+#[test]
 fn a_calibration_of_orb_slam_is_a_rig() {
     let folder = copied();
     let text = "%YAML:1.0\nCamera.type: \"Rectified\"\nCamera1.fx: 500.0\nCamera1.fy: 500.0\nCamera1.cx: 511.5\n\

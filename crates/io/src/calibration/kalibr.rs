@@ -10,8 +10,15 @@ use super::{
 use crate::dataset::{CameraNumbers, Model, RigNumbers};
 use nalgebra::{Matrix3, Vector3};
 
+/// The words that head the cameras in Kalibr's report, `…-results-cam.txt`.
+pub(super) const REPORT: &str = "Camera-system parameters";
+
 pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fault> {
     let source = &sources[0];
+    if source.text.contains(REPORT) {
+        let fault = source.fault(REPORT, "a report of Kalibr, which is not the calibration");
+        return Err(fault.remedy("give the camchain (yaml) that Kalibr wrote beside it"));
+    }
     let Some(content) = source.yaml() else { return Ok(None) };
     let content = content?;
     if content["cam0"]["camera_model"].is_badvalue() {

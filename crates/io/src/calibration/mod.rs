@@ -131,6 +131,7 @@ pub fn is_calibration(file: &Path) -> bool {
                 || opencv::is_json(file, &text)
                 || [
                     "cam0",
+                    kalibr::REPORT,
                     "camera_matrix",
                     "opencv_storage",
                     "%YAML",

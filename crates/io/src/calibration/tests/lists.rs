@@ -72,6 +72,16 @@ fn a_chain_of_three_cameras_states_which_two_are_used() {
     assert!(found.notes.iter().any(|note| note.contains("cam0 and cam1 of 3 cameras")), "{:?}", found.notes);
 }
 
+#[test]
+fn kalibr_s_report_is_not_its_calibration() {
+    let text = "Calibration results\n====================\nCamera-system parameters:\ncam0 (/left/image_raw):\n";
+    let said = found(&[("data-results-cam.txt", text.to_owned())], Given::default()).unwrap_err();
+    assert!(
+        said.starts_with("a report of Kalibr, which is not the calibration in") && said.contains("camchain"),
+        "{said}"
+    );
+}
+
 /// The last row of a motion is 0 0 0 1. Fails if any sixteen numbers are a motion.
 #[test]
 fn a_motion_by_columns_is_refused() {
