@@ -77,6 +77,9 @@ fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
 }
 
 /// All parsers, sorted by name.
+///
+/// An input takes 5 ms or less, so that 200 000 take a quarter of an hour. Time is spent on what repeats: the points of
+/// a site beside the parsed file, the bodies of a geometry, the trials of an experiment. The corpus has two of each.
 pub const PARSERS: &[Parser] = &[
     Parser { name: "calibration", file: "a.yaml", parse: foreign_calibration },
     Parser { name: "dataset", file: "dataset.toml", parse: check_dataset },

@@ -18,10 +18,12 @@ mod reference;
 mod settings;
 mod signals;
 mod terminal;
+mod usage;
 
 fn main() -> ExitCode {
     signals::outgrow_files();
-    match commands::Arguments::parse().command.execute() {
+    let arguments = commands::Arguments::try_parse().unwrap_or_else(|error| usage::refuse(&error));
+    match arguments.command.execute() {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {
             for line in &failure.lines {

@@ -113,15 +113,6 @@ impl fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
-/// The part of a setting that is at fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// The key: it is unknown, or a key below it is missing.
-    Key,
-    /// The value.
-    Value,
-}
-
 /// The line (from 1) of the byte at `offset`.
 pub fn line_at(text: &str, offset: usize) -> usize {
     1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
@@ -133,51 +124,6 @@ pub fn place_at(text: &str, offset: usize) -> (usize, usize) {
     let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |end| end + 1);
     // Continuation bytes of UTF-8 do not count as characters.
     (line_at(text, offset), 1 + before[start..].iter().filter(|&&b| b & 0xC0 != 0x80).count())
-}
-
-/// The line (from 1) of the key at `path` in a TOML text.
-///
-/// If the key does not exist, it is the line of the nearest existing table above. Numbers in the path are indices of
-/// arrays: `["object", "2", "id"]`.
-pub fn line_of(text: &str, path: &[&str]) -> Option<usize> {
-    place_of(text, path, Part::Key).map(|(_, (line, _))| line)
-}
-
-/// The position of the key at `path` or of its value, in a TOML text.
-///
-/// The result is (number of existing steps of `path`, (line, column)). The number is smaller than the path's length if
-/// only a table above exists. The position of a table is that of its key. A component given by its bare name counts as
-/// having a `name`.
-pub fn place_of(text: &str, path: &[&str], part: Part) -> Option<(usize, (usize, usize))> {
-    let (document, _) = toml::de::DeTable::parse_recoverable(text);
-    let mut place = None;
-    let mut scalar: Option<usize> = None;
-    let mut table = Some(document.get_ref());
-    let mut array: Option<&toml::de::DeArray<'_>> = None;
-    for (depth, step) in path.iter().enumerate() {
-        let value = if let Some(items) = array {
-            step.parse::<usize>().ok().and_then(|k| items.get(k))
-        } else {
-            table.and_then(|table| table.iter().find(|(key, _)| key.get_ref() == step)).map(|(key, value)| {
-                place = Some((depth + 1, place_at(text, key.span().start)));
-                value
-            })
-        };
-        let Some(value) = value else {
-            // A bare name, or a value in place of a table.
-            if let Some(start) = scalar {
-                place = Some((depth + usize::from(*step == "name"), place_at(text, start)));
-            }
-            break;
-        };
-        let is_table = value.get_ref().is_table();
-        if array.is_some() || (part == Part::Value && !is_table && depth + 1 == path.len()) {
-            place = Some((depth + 1, place_at(text, value.span().start)));
-        }
-        (table, array) = (value.get_ref().as_table(), value.get_ref().as_array());
-        scalar = (table.is_none() && array.is_none()).then(|| value.span().start);
-    }
-    place
 }
 
 #[cfg(test)]
@@ -197,24 +143,6 @@ mod tests {
         let error = toml::from_str::<Experiment>(text).unwrap_err();
         let fault = Fault::in_toml(Path::new("e.toml"), text, &error);
         assert_eq!(fault.to_string(), "unknown key in e.toml:2:1: `sede`; did you mean `seed`?");
-    }
-
-    #[test]
-    fn a_path_leads_to_its_line() {
-        let text = "a = 1\n[b]\nc = 2\n[[d]]\ne = 3\n[[d]]\ne = 4\n";
-        assert_eq!(line_of(text, &["b", "c"]), Some(3));
-        assert_eq!(line_of(text, &["d", "1", "e"]), Some(7));
-        assert_eq!(line_of(text, &["d", "1", "missing"]), Some(6));
-        assert_eq!(line_of(text, &["nothing"]), None);
-        let table = "é = 1\nb = { ü = 2, c = 'd' }";
-        let place = |path: &[&str], part| place_of(table, path, part);
-        assert_eq!(place(&["b", "c"], Part::Key), Some((2, (2, 14))));
-        assert_eq!(place(&["b", "c"], Part::Value), Some((2, (2, 18))));
-        assert_eq!(place(&["b"], Part::Value), Some((1, (2, 1))));
-        assert_eq!(place(&["b", "c", "x"], Part::Key), Some((2, (2, 18))));
-        assert_eq!(place(&["b", "c", "name"], Part::Value), Some((3, (2, 18))));
-        assert_eq!(place(&["b", "x"], Part::Value), Some((1, (2, 1))));
-        assert_eq!(place_at("ab\ncé d", 7), (2, 4));
     }
 
     #[test]

@@ -42,10 +42,12 @@
 
 extern crate self as seafix_component; // for the paths of `#[derive(Settings)]`
 
+mod binary;
 mod border;
 mod choice;
 mod fault;
 mod owned;
+mod places;
 mod registry;
 mod settings;
 mod suggest;
@@ -54,8 +56,9 @@ mod words;
 
 pub use border::{decoded, decoded_file, undecodable};
 pub use choice::Choice;
-pub use fault::{Fault, Part, line_at, line_of, place_at, place_of};
+pub use fault::{Fault, line_at, place_at};
 pub use owned::{LOCK, MARKER, Marker, Ownership, PartialFile, create_real_folder, is_plain_name};
+pub use places::{Part, Places, line_of, place_of};
 pub use registry::{
     BuildError, Component, Entry, Listing, Properties, Registry,
     added::{Added, Construct, NotAdded},

@@ -8,7 +8,7 @@ pub use listing::{Listing, Properties};
 
 use crate::{
     choice::Choice,
-    fault::Part,
+    places::Part,
     registry::added::{Added, NotAdded, is_name},
     settings::{Settings, SettingsError, SettingsTable},
     suggest::{nearest, unknown},

@@ -2,7 +2,7 @@
 
 use std::{io::Read, path::Path};
 
-use crate::fault::Fault;
+use crate::{binary, fault::Fault};
 
 /// The text of a file of at most 64 MiB: UTF-8, with an optional byte order mark and LF or CRLF line ends.
 ///
@@ -37,13 +37,22 @@ pub fn read_long_text(path: &Path, limit: u64) -> Result<String, Fault> {
 
 /// The text of bytes in UTF-8, or in UTF-16 with the byte order mark that spreadsheets write.
 fn decoded(bytes: Vec<u8>, path: &Path) -> Result<String, Fault> {
+    if let Some((format, remedy)) = binary::format(&bytes) {
+        return Err(Fault::new("not a text file", path).value(format).remedy(remedy));
+    }
     let word: fn([u8; 2]) -> u16 = match bytes[..] {
         [0xFF, 0xFE, ..] => u16::from_le_bytes,
         [0xFE, 0xFF, ..] => u16::from_be_bytes,
         _ => {
             return String::from_utf8(bytes).map_err(|error| {
                 let at = error.utf8_error().valid_up_to();
-                Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy("save the file as UTF-8")
+                // COLMAP's binary models have no signature.
+                let is_model = path.extension().is_some_and(|end| end == "bin");
+                let remedy = match is_model {
+                    true => "a model of COLMAP is converted by `colmap model_converter --output_type TXT`",
+                    false => "save the file as UTF-8",
+                };
+                Fault::new("not UTF-8", path).value(format!("byte {at}")).remedy(remedy)
             });
         }
     };
@@ -57,6 +66,23 @@ fn decoded(bytes: Vec<u8>, path: &Path) -> Result<String, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Fails if a spreadsheet is only "not UTF-8".
+    #[test]
+    fn binary_formats_state_what_to_give_instead() {
+        let said = |bytes: &[u8]| decoded(bytes.to_vec(), Path::new("a.csv")).unwrap_err().to_string();
+        let sheet = said(b"PK\x03\x04\x14\0\x06\0");
+        assert_eq!(
+            sheet,
+            "not a text file in a.csv: a zip archive or a spreadsheet; unpack it, or save the sheet as CSV in UTF-8"
+        );
+        assert!(said(b"\x93NUMPY\x01\0").contains("numpy.savetxt"));
+        assert!(said(b"MATLAB 5.0 MAT-file, Platform: GLNXA64").contains("a MAT-file"));
+        assert!(said(b"version https://git-lfs.github.com/spec/v1\n").contains("git lfs pull"));
+        assert!(said(b"\xE4,b\n").starts_with("not UTF-8"));
+        let model = decoded(b"\x02\0\0\0\0\0\0\0\xFF".to_vec(), Path::new("images.bin")).unwrap_err().to_string();
+        assert!(model.contains("colmap model_converter --output_type TXT"), "{model}");
+    }
 
     #[test]
     fn text_of_a_spreadsheet_is_read_in_utf_16() {

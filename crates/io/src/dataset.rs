@@ -6,7 +6,7 @@ use seafix_component::{Fault, line_of};
 use seafix_geometry::{BadCamera, Body, Camera, LensModel, NotRigid, Pinhole, StereoRig, Transform};
 use serde::{Deserialize, Serialize};
 
-use crate::units::doubtful_baseline;
+use crate::units::{doubtful_baseline, doubtful_focal};
 
 /// The supported versions of the format. Data sets are written in the second; those with sensor readings in the third.
 pub const FORMATS: [&str; 3] = ["seafix-dataset/1", "seafix-dataset/1.1", "seafix-dataset/1.2"];
@@ -312,6 +312,9 @@ impl RigNumbers {
         let camera = |side: &'static str, c: &CameraNumbers| {
             if let Some(port) = &c.port {
                 port.calibrated_in_water().map_err(|what| (vec![side, "port"], what))?;
+            }
+            if let Some((what, remedy)) = doubtful_focal(c.fx, c.size[0]).filter(|_| c.model.is_pinhole()) {
+                return Err((vec![side], format!("fx = {}: {what}; {remedy}", c.fx)));
             }
             c.model
                 .camera(c.size, [c.fx, c.fy], [c.cx, c.cy], &c.distortion)

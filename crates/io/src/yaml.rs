@@ -23,8 +23,14 @@ pub fn parse(text: &str, file: &Path) -> Result<Yaml, Fault> {
     // OpenCV's first line is not valid YAML, and its type names have a colon that other parsers reject.
     let body = if text.starts_with("%YAML:") { text.split_once('\n').map_or("", |(_, rest)| rest) } else { text };
     let offset = usize::from(text.len() > body.len());
-    let documents = bounded_yaml::load(&body.replace("!!opencv-matrix", "")).map_err(|(what, line)| {
-        Fault::new("invalid YAML", file).on_line(line + offset).value(what).remedy("correct the line")
+    let mut body = body.replace("!!opencv-matrix", "");
+    if offset > 0 {
+        // OpenCV reads `data:[1, 2]`, as hand-written settings have it; YAML wants a blank.
+        body = body.replace(":[", ": [");
+    }
+    let documents = bounded_yaml::load(&body).map_err(|(what, line)| {
+        let format = if file.extension().is_some_and(|end| end == "json") { "invalid JSON" } else { "invalid YAML" };
+        Fault::new(format, file).on_line(line + offset).value(what).remedy("correct the line")
     })?;
     Ok(documents.into_iter().next().unwrap_or(Yaml::Null))
 }
@@ -56,6 +62,13 @@ mod tests {
         let file = Path::new("a.yaml");
         let text = "%YAML:1.0\n---\nM1: !!opencv-matrix\n   rows: 1\n   data: [ 1., 2, -3.5e-1 ]\n";
         assert_eq!(numbers(&parse(text, file).unwrap()["M1"]["data"]), Some(vec![1.0, 2.0, -0.35]));
+        assert_eq!(
+            numbers(&parse("%YAML:1.0\nD:\n   data:[1, 2]\n", file).unwrap()["D"]["data"]),
+            Some(vec![1.0, 2.0])
+        );
+        let json = "{\n\t\"K\": {\"rows\": 1, \"data\": [1., 2.0, 3e-1]}, \"a\": \"x\"\n}\n";
+        let json = parse(json, Path::new("a.json")).unwrap();
+        assert!(numbers(&json["K"]["data"]) == Some(vec![1.0, 2.0, 0.3]) && json["a"].as_str() == Some("x"));
         assert_eq!(numbers(&parse("a: &a [1, 2]\nb: *a\n", file).unwrap()["b"]), Some(vec![1.0, 2.0]));
         let nested = parse(&("%YAML:1.0\n".to_owned() + &"[".repeat(200)), file).unwrap_err().to_string();
         assert!(nested.starts_with("invalid YAML in a.yaml:2") && nested.contains("nested"), "{nested}");

@@ -5,10 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_component::{Fault, decoded, read_text, undecodable};
+use seafix_component::{Fault, counted, decoded, read_text, undecodable};
 use seafix_data::{
     dataset,
     source::{check_recording, is_recording},
+    trajectory::Trajectory,
 };
 use seafix_experiment::{Plan, check_run, inputs, is_run};
 use seafix_io::{
@@ -132,8 +133,34 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
             Err(fault) => Examined { faults: vec![fault.to_string()], ..Examined::default() },
         };
     }
+    if is_table(path) {
+        return match Trajectory::read(path) {
+            Ok(found) => Examined { note: trajectory_note(&found), warnings: found.warnings, ..Examined::default() },
+            Err(fault) => Examined { faults: vec![fault.to_string()], ..Examined::default() },
+        };
+    }
     let (faults, warnings) = read(path, limits);
     Examined { faults: lines(faults), warnings, note: String::new() }
+}
+
+/// Whether a file is a table of poses by its name: no other file that `check` knows is called so.
+fn is_table(path: &Path) -> bool {
+    let known = ["tum", "kitti", "csv", "tsv", "txt", "xlsx", "xls"];
+    path.is_file() && path.extension().is_some_and(|end| known.iter().any(|known| end == *known))
+}
+
+/// A summary of a trajectory.
+fn trajectory_note(found: &Trajectory) -> String {
+    let length: f64 = found.poses.windows(2).map(|pair| (pair[1].position - pair[0].position).norm()).sum();
+    let time = match found.stamps.as_deref() {
+        Some([first, .., last]) => format!(" over {:.1} s", (last - first) as f64 * 1e-9),
+        _ => String::new(),
+    };
+    let attitude = if found.has_attitude { "" } else { ", positions without attitude" };
+    format!(
+        "note: a trajectory of {}{time}, {length:.2} m long{attitude}; `seafix eval` compares it with another\n",
+        counted(found.poses.len(), "pose")
+    )
 }
 
 /// The first bytes of MCAP and of Zstandard.

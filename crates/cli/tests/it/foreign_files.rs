@@ -13,17 +13,17 @@ fn sample() -> std::path::PathBuf {
 }
 
 /// A pose of a walk at `k`: position, and the quaternion x, y, z, w.
-fn pose(k: usize) -> ([f64; 3], [f64; 4]) {
+pub(crate) fn pose(k: usize) -> ([f64; 3], [f64; 4]) {
     let t = k as f64 * 0.1;
     let q = [0.1 * t.sin(), 0.2, 0.3 * t.cos(), 0.8];
     let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
     ([3.0 * t.cos(), 3.0 * t.sin(), 0.3 * t], q.map(|x| x / norm))
 }
 
-const START: u64 = 1_403_636_579_763_555_584;
+pub(crate) const START: u64 = 1_403_636_579_763_555_584;
 
 /// A folder with the walk as `reference.tum`, and in another notation as `estimate`.
-fn walk(line: impl Fn(usize, u64, [f64; 3], [f64; 4]) -> String, header: &str) -> TempDir {
+pub(crate) fn walk(line: impl Fn(usize, u64, [f64; 3], [f64; 4]) -> String, header: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
     let lines = |line: &dyn Fn(usize, u64, [f64; 3], [f64; 4]) -> String| -> String {
         (0..40).map(|k| line(k, START + k as u64 * 100_000_000, pose(k).0, pose(k).1) + "\n").collect()
@@ -33,16 +33,16 @@ fn walk(line: impl Fn(usize, u64, [f64; 3], [f64; 4]) -> String, header: &str) -
     folder
 }
 
-fn seconds(ns: u64) -> String {
+pub(crate) fn seconds(ns: u64) -> String {
     format!("{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
 }
 
-fn tum(_: usize, ns: u64, [x, y, z]: [f64; 3], [a, b, c, d]: [f64; 4]) -> String {
+pub(crate) fn tum(_: usize, ns: u64, [x, y, z]: [f64; 3], [a, b, c, d]: [f64; 4]) -> String {
     format!("{} {x} {y} {z} {a} {b} {c} {d}", seconds(ns))
 }
 
 /// The largest attitude error (degrees) of the estimate, and what was said on standard error.
-fn angle(folder: &TempDir) -> (f64, String) {
+pub(crate) fn angle(folder: &TempDir) -> (f64, String) {
     let mut command = program();
     let ended = ended(command.current_dir(folder.path()).args([
         "eval",
@@ -58,7 +58,7 @@ fn angle(folder: &TempDir) -> (f64, String) {
     (value["ape"]["max"].as_f64().unwrap(), ended.error)
 }
 
-fn refused(folder: &TempDir, part: &str) {
+pub(crate) fn refused(folder: &TempDir, part: &str) {
     let mut command = program();
     let ended = ended_with(3, command.current_dir(folder.path()).args(["eval", "reference.tum", "estimate"]));
     assert!(ended.error.contains(part) && ended.error.lines().count() == 1, "{}", ended.error);
@@ -216,7 +216,7 @@ fn colmap_s_images_are_a_trajectory() {
 }
 
 /// The sample with its images, as a folder of its own.
-fn copied() -> TempDir {
+pub(crate) fn copied() -> TempDir {
     let folder = TempDir::new().unwrap();
     for entry in fs::read_dir(sample()).unwrap() {
         let entry = entry.unwrap();
@@ -228,13 +228,13 @@ fn copied() -> TempDir {
     folder
 }
 
-fn edit(folder: &TempDir, name: &str, change: impl Fn(&str) -> String) {
+pub(crate) fn edit(folder: &TempDir, name: &str, change: impl Fn(&str) -> String) {
     let file = folder.path().join(name);
     let text = fs::read_to_string(&file).unwrap();
     fs::write(file, change(&text)).unwrap();
 }
 
-fn checked(folder: &TempDir, code: i32, parts: &[&str]) {
+pub(crate) fn checked(folder: &TempDir, code: i32, parts: &[&str]) {
     let ended = ended_with(code, program().current_dir(folder.path()).args(["check", "."]));
     for part in parts {
         assert!(ended.out.contains(part), "no `{part}` in {}", ended.out);

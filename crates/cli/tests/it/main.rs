@@ -12,6 +12,8 @@ mod documentation;
 mod eval;
 mod fixes;
 mod foreign_files;
+mod foreign_rigs;
+mod foreign_tables;
 mod generate;
 #[cfg(unix)]
 mod hyperqueue;

@@ -58,6 +58,9 @@ struct Bag {
     /// Whether the topics' names call the images rectified.
     rectified: bool,
     model: &'static str,
+    d: Vec<f64>,
+    /// P[1] of both cameras, which is 0 for rectified ones.
+    skew: f64,
     /// P[0] and P[3] of the two cameras at each pair.
     p: Vec<[[f64; 2]; 2]>,
     /// The baseline of /tf_static (m), the frame of the right camera in that of the left.
@@ -108,6 +111,8 @@ impl Bag {
             images: (0..5).map(pair).collect(),
             rectified: true,
             model: "plumb_bob",
+            d: vec![0.0; 4],
+            skew: 0.0,
             p: vec![[[500.0, 0.0], [500.0, -125.0]]; 5],
             tf: Some([0.25, 0.0, 0.0]),
             poses: poses.collect(),
@@ -151,8 +156,9 @@ impl Bag {
                 let [width, height] = self.size;
                 let [cx, cy] = self.size.map(|pixels| f64::from(pixels - 1) / 2.0);
                 let matrix = [fx, 0.0, cx, 0.0, fx, cy, 0.0, 0.0, 1.0];
-                let p = [fx, 0.0, cx, tx, 0.0, fx, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
-                let message = Cdr::new(stamp, frame).u32(height).u32(width).text(self.model).u32(4).f64s(&[0.0; 4]);
+                let p = [fx, self.skew, cx, tx, 0.0, fx, cy, 0.0, 0.0, 0.0, 1.0, 0.0];
+                let message = Cdr::new(stamp, frame).u32(height).u32(width).text(self.model);
+                let message = message.u32(self.d.len() as u32).f64s(&self.d);
                 let message = message.f64s(&matrix).f64s(&eye).f64s(&p);
                 put(info[side], stamp, (0..6).fold(message, |message, _| message.u32(0)).put(1, &[0]));
                 let data = &pair[side];
@@ -271,6 +277,34 @@ fn a_fisheye_lens_is_decided_by_the_pixels() {
     ]);
     let (code, said) = Bag { rectified: false, ..Bag::sound() }.checked();
     assert!(code == 0 && said.contains("rectified: K without distortion is P"), "{said}");
+}
+
+/// Drivers of images without distortion state `none` or nothing, with zeros or without numbers; coefficients of no model
+/// have no meaning. Fails if they are taken for plumb_bob.
+#[test]
+fn a_camera_without_a_distortion_model() {
+    for (model, d) in [("none", vec![]), ("", vec![]), ("none", vec![0.0; 5]), ("", vec![0.0; 8])] {
+        let (code, said) = Bag { model, d, rectified: false, ..Bag::sound() }.checked();
+        assert!(code == 0 && said.contains("rectified: K without distortion is P"), "{said}");
+    }
+    let bag = Bag { model: "none", d: vec![-0.2, 0.05, 0.0, 0.0, 0.0], ..Bag::sound() };
+    bag.refused(&["the distortion model is `none`, but D has 5 numbers", "/cam/left/camera_info"]);
+}
+
+/// Some drivers publish K [R | t] of the mounted camera as P, others the baseline as P[3]. Fails if only the places of fx, cx
+/// and tx are read.
+#[test]
+fn a_projection_that_is_not_of_rectified_images() {
+    let bag = Bag { skew: 52.4, tf: None, ..Bag::sound() };
+    bag.refused(&["P is not of the form K [I | t]", "/cam/right/camera_info", "publish P of rectified cameras"]);
+    let bag = Bag { p: vec![[[500.0, 0.0], [500.0, -0.25]]; 5], tf: None, ..Bag::sound() };
+    bag.refused(&["units? a baseline of 0.0005 m", "P[3] of ROS is −fx·baseline"]);
+}
+
+#[test]
+fn a_camera_that_nobody_calibrated() {
+    let bag = Bag { p: vec![[[0.0; 2]; 2]; 5], ..Bag::sound() };
+    bag.refused(&["a camera that is not calibrated: K and P are zero", "/cam/left/camera_info", "calibrate it"]);
 }
 
 #[test]

@@ -36,6 +36,12 @@ impl MeasuredPair {
         };
         Self { pair, matches: seen.iter().filter_map(depth).collect() }
     }
+
+    /// The same matches, measured with the rig of another view.
+    pub(super) fn again(&self, view: &View<'_>) -> Self {
+        let seen: Vec<StereoPixels> = self.matches.iter().map(|(seen, _)| *seen).collect();
+        Self::new(view, self.pair, &seen)
+    }
 }
 
 /// The number of feature points that the images confirm at the poses of the measured pairs, after `undo`.

@@ -106,6 +106,28 @@ pub(crate) fn mosaic_fault(image: &Image, file: &Path) -> Option<Fault> {
     })
 }
 
+/// The warning of images of 16 bits whose numbers have fewer: all are below a sixteenth of white, and finer than the
+/// numbers of 8 bits.
+pub(crate) fn dim_fault(images: &[Image], bits: u8, file: &Path) -> Option<Fault> {
+    /// The usual depths of sensors (bits) whose numbers are stored in 16.
+    const DEPTHS: [u8; 3] = [8, 10, 12];
+    let pixels = || images.iter().flat_map(|image| image.pixels());
+    let greatest = pixels().copied().fold(0.0, f32::max);
+    if bits != 16 || greatest <= 0.0 || pixels().all(|pixel| pixel.fract() == 0.0) {
+        return None;
+    }
+    // Pixels are parts of white, 65535, times 255.
+    let greatest = (f64::from(greatest) * 257.0).round();
+    let depth = DEPTHS.into_iter().find(|depth| greatest < f64::from(1_u32 << depth))?;
+    let fault = Fault::new("images that use little of their 16 bits", file);
+    let fault = fault.value(format!("the largest number is {greatest}, as of a sensor of {depth} bits"));
+    Some(fault.remedy(match depth {
+        10 => "set `bits = 12` in dataset.toml, or scale the images to their full depth",
+        8 => "set `bits = 8` in dataset.toml",
+        _ => "set `bits = 12` in dataset.toml",
+    }))
+}
+
 #[cfg(test)]
 mod tests {
     use seafix_geometry::{Camera, Point};
@@ -133,6 +155,19 @@ mod tests {
         assert!(said.contains("the images are rectified and the calibration is of raw ones"), "{said}");
         let said = images_fault(&seen(&raw), &flat, file).unwrap().to_string();
         assert!(said.contains("raw images with a rectified calibration?"), "{said}");
+    }
+
+    /// Fails if dark images of 8 bits, or bright ones of 16, are doubted.
+    #[test]
+    fn numbers_of_twelve_bits_in_sixteen_are_named() {
+        let image = |of: &dyn Fn(usize) -> f32| Image::new(8, 6, (0..48).map(of).collect()).unwrap();
+        let said = |image: Image, bits: u8| dim_fault(&[image], bits, Path::new("a")).map(|fault| fault.to_string());
+        let twelve = image(&|k| (k * 85) as f32 * 255.0 / 65535.0);
+        let text = said(twelve.clone(), 16).unwrap();
+        assert!(text.contains("3995, as of a sensor of 12 bits; set `bits = 12`"), "{text}");
+        assert_eq!(said(twelve, 12), None);
+        assert_eq!(said(image(&|k| (k % 9) as f32), 16), None);
+        assert_eq!(said(image(&|k| (k * 1000) as f32 * 255.0 / 65535.0), 16), None);
     }
 
     #[test]

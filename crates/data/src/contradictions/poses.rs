@@ -10,7 +10,10 @@ use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Object, Point, StereoPixels, StereoRig, Transform, UncertainPixels, World};
 use seafix_referencing::Site;
 
-use super::evidence::{MeasuredPair, confirmed, is_clearly_more, median_depth};
+use super::{
+    evidence::{MeasuredPair, confirmed, is_clearly_more, median_depth},
+    rig_mistakes::rig_mistakes,
+};
 
 type Pose = Transform<World, Camera>;
 
@@ -69,10 +72,11 @@ impl<'a> View<'a> {
     }
 }
 
-/// The faults of the prior and of the true poses, each of one pair; `sigma` are the standard deviations (m, rad) of the
+/// The faults of the prior and of the true poses, each of one pair. A prior predicts the objects of the `survey`, the
+/// truth those of `view`, where objects stand truly; `sigma` are the standard deviations (m, rad) of the
 /// prior, `measured` the matches of some pairs. The poses of `file` are named as the fault's place.
 pub(crate) fn poses_faults(
-    view: &View<'_>,
+    [survey, view]: [&View<'_>; 2],
     priors: &[Option<Pose>],
     truths: &[Option<Pose>],
     sigma: Option<(f64, f64)>,
@@ -81,7 +85,7 @@ pub(crate) fn poses_faults(
 ) -> Vec<Fault> {
     let mut faults = Vec::new();
     if !view.objects.is_empty() {
-        for (name, poses, sigma) in [("prior", priors, sigma), ("truth", truths, None)] {
+        for (name, view, poses, sigma) in [("prior", survey, priors, sigma), ("truth", view, truths, None)] {
             let images = Images { measured, poses, reach: sigma.map_or(0.0, |sigma| reach(view, measured, sigma)) };
             let fault = out_of_view(view, name, &sample(poses.iter().flatten()), &images, file);
             faults.extend(fault.or_else(|| beside(view, name, &images, file)));
@@ -162,16 +166,24 @@ impl Images<'_> {
     }
 }
 
-/// The fault of poses that put objects in view where the images do not show them, with the mistake that explains it.
+/// The fault of poses that put objects in view where the images do not show them, with the mistake of the poses or of
+/// the calibration that explains it.
 fn beside(view: &View<'_>, name: &str, images: &Images<'_>, file: &Path) -> Option<Fault> {
     let given = images.confirmed(view, &|pose| *pose);
-    let all = mistakes(&view.body_from_camera).into_iter();
-    let counts = all.map(|mistake| (images.confirmed(view, &*mistake.undo), mistake));
-    let (count, mistake) = counts.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
+    let of_poses = mistakes(&view.body_from_camera).into_iter();
+    let counts = of_poses.map(|mistake| (images.confirmed(view, &*mistake.undo), mistake.name, mistake.remedy));
+    let of_rig = rig_mistakes(view.rig).into_iter().map(|mistake| {
+        let other = View { rig: &mistake.rig, body_from_camera: view.body_from_camera, objects: view.objects.clone() };
+        let measured: Vec<MeasuredPair> = images.measured.iter().map(|pair| pair.again(&other)).collect();
+        let count = confirmed(&other, &measured, images.poses, &|pose| *pose, images.reach);
+        (count, mistake.name.to_owned(), mistake.remedy)
+    });
+    let (count, mistake, remedy) =
+        counts.chain(of_rig).reduce(|best, next| if next.0 > best.0 { next } else { best })?;
     is_clearly_more(count, given).then(|| {
         let what = format!("poses of the {name} that contradict the images");
-        let value = format!("matches lie at {given} predicted feature points as given, at {count} {}", mistake.name);
-        Fault::new(what, file).value(value).remedy(mistake.remedy)
+        let value = format!("matches lie at {given} predicted feature points as given, at {count} {mistake}");
+        Fault::new(what, file).value(value).remedy(remedy)
     })
 }
 
@@ -368,7 +380,7 @@ mod tests {
         let rig = rig();
         let view = View { rig: &rig, body_from_camera: mounted, objects };
         let wrong: Vec<Option<Pose>> = poses.iter().map(|pose| Some(undo(pose))).collect();
-        let faults = poses_faults(&view, &wrong, &[], None, &[], Path::new("prior.tum"));
+        let faults = poses_faults([&view; 2], &wrong, &[], None, &[], Path::new("prior.tum"));
         faults.first().map(ToString::to_string)
     }
 
@@ -427,7 +439,7 @@ mod tests {
             let moved =
                 |pose: &Pose| Transform::new(pose.rotation(), pose.translation() + Vector3::new(step, 0.0, 0.0));
             let priors: Vec<Option<Pose>> = truth.iter().map(|pose| Some(moved(pose))).collect();
-            poses_faults(&view, &priors, &truths, Some((0.1, 0.01)), &[], Path::new("prior.tum"))
+            poses_faults([&view; 2], &priors, &truths, Some((0.1, 0.01)), &[], Path::new("prior.tum"))
         };
         assert!(faults(0.2).is_empty());
         assert!(

@@ -8,6 +8,7 @@ use std::{
 
 use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
+use seafix::{PosePrior, Rig, StereoImages};
 use seafix_component::Fault;
 use seafix_geometry::{StereoPixels, StereoRig};
 use seafix_vision::{Image, RightCameraRotation, Sides, repeated_patterns};
@@ -18,7 +19,9 @@ use seafix_io::{
 };
 
 use super::{contents::Dataset, folder::inside, pairing::SAME_INSTANT_NS};
-use crate::contradictions::{MeasuredPair, View, images_fault, mosaic_fault, poses_faults, scale_fault};
+use crate::contradictions::{
+    MeasuredPair, View, dim_fault, fixes_fault, images_fault, mosaic_fault, poses_faults, scale_fault,
+};
 
 /// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
 /// calibration, and compares every file with its hash if there is one.
@@ -39,7 +42,11 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
         let (sides, table) = (sides(&dataset), dataset.folder.join(&dataset.table));
         faults.extend(swap_fault(sides, &table));
         warnings.extend(strangers(sides, &table));
+        warnings.extend(dim_images(&dataset));
         faults.extend(contradictions(&dataset));
+    }
+    if faults.is_empty() {
+        faults.extend(prior_without_fixes(&dataset));
     }
     (faults, warnings)
 }
@@ -105,7 +112,8 @@ pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
             (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
         });
         let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
-        faults.extend(poses_faults(&view, &priors, &truths, sigma, &measured, &file));
+        let survey = View::new(site, &[], &dataset.rig, dataset.body_from_camera);
+        faults.extend(poses_faults([&survey, &view], &priors, &truths, sigma, &measured, &file));
     }
     if let Some(site) = dataset.site.as_ref().filter(|_| faults.is_empty()) {
         let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
@@ -175,6 +183,29 @@ pub fn swapped(dataset: &Dataset) -> Option<Fault> {
     swap_fault(sides(dataset), &dataset.folder.join(&dataset.table))
 }
 
+/// The fault of a prior that gives no fix, as [`fixes_fault`] of some pairs.
+fn prior_without_fixes(dataset: &Dataset) -> Option<Fault> {
+    let site = dataset.site.as_ref()?;
+    let rig = Rig { body_from_camera: dataset.body_from_camera, bits: dataset.bits, ..Rig::from(dataset.rig) };
+    let with_prior: Vec<_> = dataset.frames.iter().filter(|frame| frame.prior.is_some()).collect();
+    let step = with_prior.len().div_ceil(INSPECTED_PAIRS).max(1);
+    let pairs = with_prior.iter().step_by(step).filter_map(|frame| {
+        let (left, right) = dataset.pair(frame).ok()?;
+        let (world_from_camera, covariance) = frame.prior?;
+        Some((StereoImages { left, right }, PosePrior { world_from_camera, covariance }))
+    });
+    fixes_fault(site, &rig, &pairs.collect::<Vec<_>>(), &dataset.folder.join("dataset.toml"))
+}
+
+/// A warning about images of 16 bits that hold numbers of fewer bits, as [`dim_fault`] of the first pairs.
+fn dim_images(dataset: &Dataset) -> Option<Fault> {
+    let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
+    let frames = dataset.frames.iter().step_by(step);
+    let images: Vec<Image> =
+        frames.clone().filter_map(|frame| dataset.pair(frame).ok()).flat_map(<[Image; 2]>::from).collect();
+    dim_fault(&images, dataset.bits, &frames.clone().next()?.left)
+}
+
 /// The result of the swap check on three frames over the complete data set.
 fn sides(dataset: &Dataset) -> Sides {
     let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
@@ -230,7 +261,7 @@ pub fn swap_fault(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_swapped().then(|| {
         Fault::new("exchanged left and right images", file)
             .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))
-            .remedy("exchange the images, or the cameras of the rig")
+            .remedy("exchange the images, or the cameras of the rig; if they are in order, the images are mirrored: flip them")
     })
 }
 

@@ -6,8 +6,13 @@ use std::path::Path;
 
 use seafix_component::Fault;
 
+use super::{
+    compass::{self, Compass},
+    units::{LengthUnit, TimeUnit},
+};
+
 /// The meaning of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Role {
     /// The time, in the unit that the name states.
     Stamp(Option<TimeUnit>),
@@ -15,52 +20,18 @@ pub(crate) enum Role {
     Nanoseconds,
     /// The position along the axis 0 to 2.
     Position(usize, LengthUnit),
+    /// The position along a direction of the world.
+    Direction(Compass, LengthUnit),
+    /// A position or a stamp in a unit that is not read.
+    UnknownUnit(String),
+    /// Latitude or longitude.
+    Geographic,
     /// The quaternion's part w, x, y, z.
     Quaternion(usize),
     /// An angle or a rotation vector: an attitude in a form that is not read.
     OtherAttitude,
     /// Another quantity.
     Other,
-}
-
-/// The unit of a column of stamps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TimeUnit {
-    Seconds,
-    Milliseconds,
-    Microseconds,
-    Nanoseconds,
-}
-
-impl TimeUnit {
-    /// The unit in nanoseconds.
-    pub(crate) fn nanoseconds(self) -> u64 {
-        match self {
-            Self::Seconds => 1_000_000_000,
-            Self::Milliseconds => 1_000_000,
-            Self::Microseconds => 1_000,
-            Self::Nanoseconds => 1,
-        }
-    }
-}
-
-/// The unit of a column of positions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum LengthUnit {
-    Metres,
-    Centimetres,
-    Millimetres,
-}
-
-impl LengthUnit {
-    /// The unit in metres.
-    pub(crate) fn metres(self) -> f64 {
-        match self {
-            Self::Metres => 1.0,
-            Self::Centimetres => 1e-2,
-            Self::Millimetres => 1e-3,
-        }
-    }
 }
 
 /// The columns of the parts of a pose.
@@ -93,7 +64,8 @@ fn split(header: &str) -> Vec<String> {
 /// The meaning of a column's name.
 pub(crate) fn role(name: &str) -> Role {
     let lower = name.to_lowercase();
-    let suffix = lower.rsplit_once('_').filter(|(_, unit)| ["m", "mm", "cm", "s", "ns"].contains(unit));
+    let suffix =
+        lower.rsplit_once('_').filter(|(_, unit)| ["m", "mm", "cm", "km", "ft", "s", "ms", "us", "ns"].contains(unit));
     let lower = suffix.map_or(lower.clone(), |(name, unit)| format!("{name}[{unit}]"));
     let bracketed = lower.split(['[', '(']).nth(1).map(|rest| rest.trim_end_matches([']', ')']).trim().to_owned());
     let unit = bracketed.as_deref().filter(|unit| !matches!(*unit, "w" | "x" | "y" | "z" | "qw" | "qx" | "qy" | "qz"));
@@ -112,6 +84,9 @@ pub(crate) fn role(name: &str) -> Role {
             return Role::Nanoseconds;
         }
         let spelt = unit.unwrap_or(&joined);
+        if let Some("min" | "minutes" | "h" | "hours" | "d" | "days") = unit {
+            return Role::UnknownUnit(unit.unwrap_or_default().to_owned());
+        }
         return Role::Stamp(match spelt {
             "s" | "sec" | "secs" | "second" | "seconds" => Some(TimeUnit::Seconds),
             "ms" | "msec" => Some(TimeUnit::Milliseconds),
@@ -124,13 +99,12 @@ pub(crate) fn role(name: &str) -> Role {
             _ => None,
         });
     }
-    let length = match unit {
-        Some("mm") => LengthUnit::Millimetres,
-        Some("cm") => LengthUnit::Centimetres,
-        _ => LengthUnit::Metres,
-    };
-    if let Some(axis) = ["easting", "northing", "up"].iter().position(|axis| *axis == joined) {
-        return Role::Position(axis, length);
+    let length = LengthUnit::of(unit);
+    if let Some(direction) = Compass::of(&joined) {
+        return length.map_or_else(Role::UnknownUnit, |length| Role::Direction(direction, length));
+    }
+    if is_any(&["lat", "latitude", "lon", "long", "lng", "longitude"]) {
+        return Role::Geographic;
     }
     if holds(&["roll", "pitch", "yaw", "heading", "euler", "rotvec", "rvec"]) || is_any(&["rx", "ry", "rz"]) {
         return Role::OtherAttitude;
@@ -145,9 +119,12 @@ pub(crate) fn role(name: &str) -> Role {
         _ if quaternion => Role::Quaternion(axis),
         ("", 0) => Role::Quaternion(0),
         (_, 0) => Role::Other,
-        ("" | "t" | "p", axis) => Role::Position(axis - 1, length),
-        (stem, axis) if stem.starts_with('p') || ["trans", "pos", "loc"].iter().any(|word| stem.contains(word)) => {
-            Role::Position(axis - 1, length)
+        (stem, axis)
+            if matches!(stem, "" | "t")
+                || stem.starts_with('p')
+                || ["trans", "pos", "loc"].iter().any(|word| stem.contains(word)) =>
+        {
+            length.map_or_else(Role::UnknownUnit, |length| Role::Position(axis - 1, length))
         }
         _ => Role::Other,
     }
@@ -164,18 +141,33 @@ pub(crate) fn columns(header: &str, line: usize, file: &Path) -> Result<Option<C
 /// The columns of a header's cells.
 pub(crate) fn columns_of(names: &[String], header: &str, line: usize, file: &Path) -> Result<Option<Columns>, Fault> {
     let roles: Vec<Role> = names.iter().map(|name| role(name)).collect();
-    let all = |wanted: &dyn Fn(Role) -> bool| -> Vec<usize> {
-        (0..roles.len()).filter(|&column| wanted(roles[column])).collect()
+    let all = |wanted: &dyn Fn(&Role) -> bool| -> Vec<usize> {
+        (0..roles.len()).filter(|&column| wanted(&roles[column])).collect()
     };
     let refuse =
         |what: &str, remedy: &str| Err(Fault::new(what, file).on_line(line).value(header.trim()).remedy(remedy));
-    let positions: [Vec<usize>; 3] =
-        [0, 1, 2].map(|axis| all(&|role| matches!(role, Role::Position(a, _) if a == axis)));
-    let parts: [Vec<usize>; 4] = [0, 1, 2, 3].map(|part| all(&|role| role == Role::Quaternion(part)));
+    let mut positions: [Vec<usize>; 3] =
+        [0, 1, 2].map(|axis| all(&|role| matches!(role, Role::Position(a, _) if *a == axis)));
+    let parts: [Vec<usize>; 4] = [0, 1, 2, 3].map(|part| all(&|role| *role == Role::Quaternion(part)));
     let stamps = all(&|role| matches!(role, Role::Stamp(_)));
     let named = parts.iter().filter(|part| !part.is_empty()).count();
     let numbered =
         names.iter().filter(|name| matches!(name.to_lowercase().as_str(), "q0" | "q1" | "q2" | "q3")).count();
+    if let Some(sign) = roles.iter().find_map(|role| if let Role::UnknownUnit(sign) = role { Some(sign) } else { None })
+    {
+        return refuse(&format!("a column in the unit `{sign}`, which is not read"), "give metres and seconds");
+    }
+    if positions.iter().all(Vec::is_empty) {
+        let direction = |role: &Role| if let Role::Direction(direction, _) = role { Some(*direction) } else { None };
+        if let Some(axes) = compass::axes(&roles.iter().map(direction).collect::<Vec<_>>()) {
+            positions = axes.map(|column| vec![column]);
+        } else if roles.contains(&Role::Geographic) {
+            return refuse(
+                "geographic coordinates, which are no lengths",
+                "project them to metres (UTM, or north, east and down of a place near by), and name the columns so",
+            );
+        }
+    }
     if positions.iter().any(Vec::is_empty) {
         return Ok(None);
     }
@@ -188,7 +180,13 @@ pub(crate) fn columns_of(names: &[String], header: &str, line: usize, file: &Pat
     if positions.iter().chain(&parts).any(|columns| columns.len() > 1) {
         return refuse("a column of the pose that is named twice", "give each of x y z and qx qy qz qw one column");
     }
-    let Role::Position(_, unit) = roles[positions[0][0]] else { return Ok(None) };
+    let units = positions.each_ref().map(|columns| match &roles[columns[0]] {
+        Role::Position(_, unit) | Role::Direction(_, unit) => *unit,
+        _ => LengthUnit::Metres,
+    });
+    if units.iter().any(|unit| *unit != units[0]) {
+        return refuse("positions whose axes have different units", "give all three in metres");
+    }
     // Of several times that of the measurement counts, which messages call their stamp.
     let chosen = stamps.iter().find(|&&column| names[column].to_lowercase().contains("stamp")).or(stamps.first());
     let stamp = chosen.map(|&column| match roles[column] {
@@ -197,9 +195,9 @@ pub(crate) fn columns_of(names: &[String], header: &str, line: usize, file: &Pat
     });
     Ok(Some(Columns {
         stamp,
-        nanoseconds: all(&|role| role == Role::Nanoseconds).first().copied(),
+        nanoseconds: all(&|role| *role == Role::Nanoseconds).first().copied(),
         position: positions.map(|columns| columns[0]),
-        unit,
+        unit: units[0],
         quaternion: (named == 4).then(|| parts.map(|columns| columns[0])),
         has_other_attitude: roles.contains(&Role::OtherAttitude),
     }))
@@ -239,6 +237,31 @@ mod tests {
         let found = columns("num,t,z [mm],y [mm],x [mm],v_x,v_y,v_z", 1, Path::new("a")).unwrap().unwrap();
         assert_eq!((found.position, found.unit, found.quaternion), ([4, 3, 2], LengthUnit::Millimetres, None));
         assert_eq!(found.stamp, Some((1, None)));
+    }
+
+    /// Fails if an unknown unit counts as metres, or if the first of three units is that of all.
+    #[test]
+    fn units_and_directions_are_obeyed_or_refused() {
+        let found = |header: &str| columns(header, 1, Path::new("a")).unwrap().unwrap();
+        for (header, metres) in [
+            ("t,x [ft],y [ft],z [ft]", 0.3048),
+            ("t,x_km,y_km,z_km", 1000.0),
+            ("t,x (dm),y (dm),z (dm)", 0.1),
+            ("t,x [m],y [m],z [m]", 1.0),
+        ] {
+            assert_eq!(found(header).unit.metres(), metres, "{header}");
+        }
+        assert_eq!(found("time,easting [m],northing [m],depth [m]").position, [2, 1, 3]);
+        assert_eq!(found("time;up;north;east").position, [3, 2, 1]);
+        assert_eq!(found("time,x,y,z,depth").position, [1, 2, 3], "the depth is another quantity");
+        let refused = |header: &str| columns(header, 3, Path::new("a")).unwrap_err().to_string();
+        assert!(refused("t,x [in],y [in],z [in]").starts_with("a column in the unit `in`, which is not read in a:3"));
+        assert!(refused("time [h],x,y,z").contains("the unit `h`"));
+        assert!(refused("t,x [m],y [m],z [mm]").contains("different units"));
+        assert!(
+            refused("time,lat,lon,depth").contains("geographic coordinates")
+                && refused("t,longitude,latitude").contains("UTM")
+        );
     }
 
     #[test]

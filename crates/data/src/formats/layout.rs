@@ -5,8 +5,9 @@ use std::path::Path;
 use seafix_component::Fault;
 
 use super::{
-    columns::{Columns, LengthUnit, TimeUnit, columns, columns_of, states_w_first},
+    columns::{Columns, columns, columns_of, states_w_first},
     table::{Row, Separator, Table},
+    units::{LengthUnit, TimeUnit},
 };
 
 /// The columns of a pose.
@@ -35,7 +36,9 @@ pub(super) struct Found<'a> {
 pub(super) fn find<'a>(table: &Table<'a>, lines: &[(usize, &str)], file: &Path) -> Result<Found<'a>, Fault> {
     let mut rows = table.rows.clone();
     let first = rows.first().ok_or_else(|| without_poses(file))?;
-    let is_header = first.cells.iter().filter(|cell| table.number(cell).is_none()).count() * 2 > first.cells.len();
+    // A pose of `nan`, which trackers write where they are lost, is a row and no header.
+    let is_name = |cell: &&String| cell.parse::<f64>().is_err() && table.number(cell).is_none();
+    let is_header = first.cells.iter().filter(is_name).count() * 2 > first.cells.len();
     let before = if is_header { first.line } else { rows[0].line };
     let mut named: Option<Columns> = None;
     let mut w_first = None;

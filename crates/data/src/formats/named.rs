@@ -49,8 +49,13 @@ pub(crate) fn rows<const N: usize>(
 /// A word that is not a number, with its line.
 pub(crate) fn number<T: std::str::FromStr>(word: &str, line: usize, file: &Path) -> Result<T, Fault> {
     let pointed = || word.replacen(',', ".", 1).parse().ok();
-    word.parse()
-        .ok()
-        .or_else(pointed)
-        .ok_or_else(|| Fault::new("not a number", file).on_line(line).value(word).remedy("give a plain decimal number"))
+    word.parse().ok().or_else(pointed).ok_or_else(|| {
+        // A number that is none of the column's kind is a fraction where whole numbers stand.
+        let is_fraction = word.replacen(',', ".", 1).parse::<f64>().is_ok_and(f64::is_finite);
+        let (what, remedy) = match is_fraction {
+            true => ("not a whole number", "stamps are whole nanoseconds: multiply seconds by 1000000000"),
+            false => ("not a number", "give a plain decimal number"),
+        };
+        Fault::new(what, file).on_line(line).value(word).remedy(remedy)
+    })
 }

@@ -6,10 +6,11 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use seafix_component::Fault;
 
 use super::{
-    columns::{Columns, TimeUnit},
+    columns::Columns,
     layout::{Found, Layout, find, without_poses},
     stamp::nanoseconds,
     table::{Row, Table},
+    units::TimeUnit,
 };
 
 /// The attitude in a row.
@@ -84,8 +85,8 @@ pub(crate) fn read(lines: &[(usize, &str)], file: &Path, reading: Reading) -> Re
         return Err(without_poses(file));
     }
     reader.summarise(&found, &rows)?;
-    if reading.doubts_order && !found.is_named && !found.is_euroc {
-        doubt(&rows, &found.rows, file)?;
+    if reading.doubts_order {
+        doubt(&rows, &found, file)?;
     }
     let Reader { mut warnings, normalised, .. } = reader;
     if reading.sorts && rows.iter().all(|row| row.stamp_ns.is_some()) {
@@ -102,6 +103,14 @@ pub(crate) fn read(lines: &[(usize, &str)], file: &Path, reading: Reading) -> Re
     if let Some(pair) = backwards {
         let text = found.rows.iter().find(|row| row.line == pair[1].line);
         let stamp = text.and_then(|row| row.cells.get(stamp_column(&found.layout))).cloned().unwrap_or_default();
+        let repeated = rows.windows(2).filter(|pair| pair[0].stamp_ns == pair[1].stamp_ns).count();
+        if 2 * repeated > rows.len() && repeated > FEW {
+            // Sorting would keep one pose of many.
+            let fault = Fault::new("stamps that do not tell the poses apart", file).on_line(pair[1].line);
+            let fault =
+                fault.value(format!("{stamp}, as {repeated} of {} rows the stamp of the row before", rows.len()));
+            return Err(fault.remedy("write stamps with all their digits, as text or as whole nanoseconds"));
+        }
         let fault = Fault::new("a stamp not later than the previous one", file).on_line(pair[1].line).value(stamp);
         let remedy = "sort the lines by time, or keep the first of each stamp: `--sort-stamps` of eval, `sort-stamps` of a data set";
         return Err(fault.remedy(remedy));
@@ -132,16 +141,27 @@ fn rounding(table: &Table<'_>, found: &Found<'_>) -> usize {
         .unwrap_or(0)
 }
 
-/// Rejects quaternions whose first number is close to one in every row, because w may come first.
-fn doubt(rows: &[PoseRow], source: &[Row<'_>], file: &Path) -> Result<(), Fault> {
-    let x_near_one = |row: &PoseRow| matches!(row.attitude, Attitude::Quaternion(q) if q.i.abs() >= NEAR_ONE);
-    if rows.len() < FEW || !rows.iter().all(x_near_one) {
+/// Rejects quaternions whose other end is close to one in every row, where w may stand: the first number of
+/// x, y, z, w, and the last one of EuRoC's w, x, y, z.
+fn doubt(rows: &[PoseRow], found: &Found<'_>, file: &Path) -> Result<(), Fault> {
+    let near_one = |row: &PoseRow| match row.attitude {
+        Attitude::Quaternion(q) => (if found.is_euroc { q.k } else { q.i }).abs() >= NEAR_ONE,
+        _ => false,
+    };
+    if found.is_named || rows.len() < FEW || !rows.iter().all(near_one) {
         return Ok(());
     }
-    let fault = Fault::new("quaternions that seem to have w first", file).on_line(source[0].line).value(source[0].text);
-    Err(fault.remedy(
-        "name the columns in a comment above, `# seconds tx ty tz qx qy qz qw` or `# seconds tx ty tz qw qx qy qz`",
-    ))
+    let source = &found.rows[0];
+    let fault = |what: &str| Fault::new(what, file).on_line(source.line).value(source.text);
+    Err(match found.is_euroc {
+        true => fault("quaternions that seem to have w last").remedy(
+            "add a first line with the names of the columns, `timestamp,tx,ty,tz,qx,qy,qz,qw` or \
+             `timestamp,tx,ty,tz,qw,qx,qy,qz`",
+        ),
+        false => fault("quaternions that seem to have w first").remedy(
+            "name the columns in a comment above, `# seconds tx ty tz qx qy qz qw` or `# seconds tx ty tz qw qx qy qz`",
+        ),
+    })
 }
 
 struct Reader<'a> {
@@ -163,7 +183,11 @@ impl Reader<'_> {
             let remedy = format!("this row has no column {}; the rows above have", column + 1);
             return Err(self.fault(row, format!("{} columns", row.cells.len()), row.text, &remedy));
         };
-        self.table.number(cell).ok_or_else(|| self.fault(row, "not a finite number", cell, "give a number"))
+        let remedy = match cell.parse::<f64>() {
+            Ok(_) => "remove the rows without a pose, as where a tracker was lost",
+            Err(_) => "give a number",
+        };
+        self.table.number(cell).ok_or_else(|| self.fault(row, "not a finite number", cell, remedy))
     }
 
     /// The unit of the stamps.

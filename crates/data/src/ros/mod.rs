@@ -17,6 +17,6 @@ pub(crate) use bayer::Mosaic;
 pub(crate) use definition::{differs, plain};
 pub(crate) use messages::{CameraInfo, CompressedImage, Image, POSES, PoseMessage, stamp, transforms};
 pub use rig::Views;
-pub(crate) use rig::{camera, contradiction, is_without_raw_model, right_from_left};
+pub(crate) use rig::{camera, contradiction, is_uncalibrated, is_without_raw_model, right_from_left};
 pub(crate) use tf::Tree;
 pub(crate) use uncertainty::covariance;

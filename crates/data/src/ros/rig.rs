@@ -21,9 +21,17 @@ pub enum Views {
     Rectified,
 }
 
+/// The greatest skew of a camera, as a part of its focal length: the rounding of six digits.
+const SKEW: f64 = 1e-6;
+
 /// Whether K is no camera, so that images can only be rectified.
 pub(crate) fn is_without_raw_model(info: &CameraInfo) -> bool {
     info.k[0] == 0.0
+}
+
+/// Whether neither K nor P is a camera: drivers publish zeros until a camera is calibrated.
+pub(crate) fn is_uncalibrated(info: &CameraInfo) -> bool {
+    info.k[0] == 0.0 && info.p[0] == 0.0
 }
 
 /// The camera model of the images.
@@ -33,12 +41,21 @@ pub(crate) fn camera(info: &CameraInfo, rectified: bool) -> Result<Pinhole, Stri
     {
         return Err("a region of interest or binning is not supported; record full images".to_owned());
     }
-    let [fx, _, cx, _, fy, cy, ..] = info.k;
+    let [fx, skew, cx, _, fy, cy, ..] = info.k;
+    if !rectified && skew.abs() > SKEW * fx.abs() {
+        return Err(format!("K has a skew of {skew}; calibrate without skew, or set images = \"rectified\""));
+    }
     let [px, _, pcx, _, _, py, pcy, ..] = info.p;
     let distortion: &[f64] = if info.d.iter().all(|&number| number == 0.0) { &[] } else { &info.d };
     let built = match (rectified, info.model.as_str()) {
         (true, _) => Pinhole::new(info.size, [px, py], [pcx, pcy], &[]),
-        (false, "plumb_bob" | "rational_polynomial" | "") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
+        (false, "plumb_bob" | "rational_polynomial") => Pinhole::new(info.size, [fx, fy], [cx, cy], distortion),
+        // Drivers of images without distortion state `none` or nothing, with zeros or without numbers.
+        (false, "none" | "None" | "") if distortion.is_empty() => Pinhole::new(info.size, [fx, fy], [cx, cy], &[]),
+        (false, nothing @ ("none" | "None" | "")) => {
+            let remedy = "record plumb_bob, rational_polynomial or equidistant, or set images = \"rectified\"";
+            return Err(format!("the distortion model is `{nothing}`, but D has {} numbers; {remedy}", info.d.len()));
+        }
         (false, "equidistant" | "fisheye" | "kannala_brandt" | "kannala_brandt4") => {
             Pinhole::equidistant(info.size, [fx, fy], [cx, cy], &info.d)
         }
@@ -58,6 +75,14 @@ pub(crate) fn right_from_left(
     right: &CameraInfo,
     rectified: bool,
 ) -> Result<Option<Transform<RightCamera, Camera>>, String> {
+    for info in [left, right] {
+        let [fx, skew, _, _, other, _, _, _, a, b, ..] = info.p;
+        if fx != 0.0 && ![skew, other, a, b].iter().all(|part| part.abs() <= SKEW * fx.abs()) {
+            return Err(
+                "P is not of the form K [I | t], but has skew or rotation; publish P of rectified cameras".to_owned()
+            );
+        }
+    }
     let Some(between) = baseline(left, right) else { return Ok(None) };
     if rectified {
         return Ok(Some(Transform::new(UnitQuaternion::identity(), between)));

@@ -175,6 +175,10 @@ impl Messages<'_> {
         rectified: bool,
     ) -> Result<StereoRig, Fault> {
         let fault = |side: usize, what: String| Fault::new(what, self.path).value(&topics.infos[side]);
+        if let Some(side) = infos.iter().position(ros::is_uncalibrated) {
+            let remedy = "calibrate it, and record the camera_info that the calibration gives to the driver";
+            return Err(fault(side, "a camera that is not calibrated: K and P are zero".to_owned()).remedy(remedy));
+        }
         let camera = |side: usize| ros::camera(&infos[side], rectified).map_err(|what| fault(side, what));
         let calibrated = ros::right_from_left(&infos[0], &infos[1], rectified).map_err(|what| fault(1, what))?;
         let [left, right] = frames;

@@ -93,7 +93,7 @@ impl Recorded {
         let inspected = &bag.inspected;
         let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
         let (priors, truths) = (of(&prior), of(&truth));
-        let faults = poses_faults(&view, &priors, &truths, sigma, &measured, path);
+        let faults = poses_faults([&view; 2], &priors, &truths, sigma, &measured, path);
         if faults.is_empty() {
             let posed = inspected.iter().filter_map(|(index, seen)| Some((truths[*index]?, seen.clone())));
             warnings.extend(scale_fault(&view, &posed.collect::<Vec<_>>(), path));

@@ -65,7 +65,7 @@ pub(super) fn is_cameras(text: &str) -> bool {
     is_model || text.contains("CAMERA_ID") && text.contains("MODEL")
 }
 
-fn read_cameras(source: &Source) -> Result<BTreeMap<String, CameraNumbers>, Fault> {
+pub(super) fn read_cameras(source: &Source) -> Result<BTreeMap<String, CameraNumbers>, Fault> {
     let mut all = BTreeMap::new();
     for (index, line) in
         source.text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'))
@@ -76,33 +76,43 @@ fn read_cameras(source: &Source) -> Result<BTreeMap<String, CameraNumbers>, Faul
             return Err(fault("not a camera".to_owned()).remedy("a line is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`"));
         };
         let size = [width, height].map(|word| word.parse::<u32>().unwrap_or(0));
-        let p: Vec<f64> = parameters.iter().filter_map(|word| word.parse().ok()).collect();
-        let (focal, principal, model, distortion) = match (*name, p.as_slice()) {
-            ("SIMPLE_PINHOLE", &[f, cx, cy]) => ([f, f], [cx, cy], Model::Pinhole, vec![]),
-            ("PINHOLE", &[fx, fy, cx, cy]) => ([fx, fy], [cx, cy], Model::Pinhole, vec![]),
-            ("SIMPLE_RADIAL", &[f, cx, cy, k]) => ([f, f], [cx, cy], Model::Pinhole, vec![k, 0.0, 0.0, 0.0]),
-            ("RADIAL", &[f, cx, cy, k1, k2]) => ([f, f], [cx, cy], Model::Pinhole, vec![k1, k2, 0.0, 0.0]),
-            ("OPENCV" | "FULL_OPENCV", [fx, fy, cx, cy, rest @ ..]) => {
-                ([*fx, *fy], [*cx, *cy], Model::Pinhole, rest.to_vec())
-            }
-            ("OPENCV_FISHEYE", [fx, fy, cx, cy, rest @ ..]) => {
-                ([*fx, *fy], [*cx, *cy], Model::Equidistant, rest.to_vec())
-            }
-            ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => {
-                ([f, f], [cx, cy], Model::Equidistant, vec![k, 0.0, 0.0, 0.0])
-            }
-            ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => ([f, f], [cx, cy], Model::Equidistant, vec![k1, k2, 0.0, 0.0]),
-            (name, _) => {
-                let remedy = "give PINHOLE, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE or their simple forms";
-                return Err(fault(format!("an unsupported camera model {name}, or a wrong number of parameters"))
-                    .remedy(remedy));
-            }
-        };
-        let [cx, cy] = principal.map(|c| c - 0.5);
-        all.insert(
-            (*id).to_owned(),
-            CameraNumbers { size, fx: focal[0], fy: focal[1], cx, cy, model, distortion, port: None },
-        );
+        let p: Option<Vec<f64>> = parameters.iter().map(|word| word.parse().ok()).collect();
+        let camera = p.and_then(|p| camera(name, size, &p));
+        let camera = camera.ok_or_else(|| fault(unsupported(name)).remedy(SUPPORTED))?;
+        all.insert((*id).to_owned(), camera);
     }
     Ok(all)
+}
+
+/// The remedy for a camera that is not read.
+pub(super) const SUPPORTED: &str = "give PINHOLE, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE or their simple forms";
+
+/// What a camera is that is not read.
+pub(super) fn unsupported(name: &str) -> String {
+    format!("an unsupported camera model {name}, or a wrong number of parameters")
+}
+
+/// The camera of a model's name and parameters; `None` for another model or number of parameters.
+pub(super) fn camera(name: &str, size: [u32; 2], parameters: &[f64]) -> Option<CameraNumbers> {
+    let (focal, principal, model, distortion) = match (name, parameters) {
+        ("SIMPLE_PINHOLE", &[f, cx, cy]) => ([f, f], [cx, cy], Model::Pinhole, vec![]),
+        ("PINHOLE", &[fx, fy, cx, cy]) => ([fx, fy], [cx, cy], Model::Pinhole, vec![]),
+        ("SIMPLE_RADIAL", &[f, cx, cy, k]) => ([f, f], [cx, cy], Model::Pinhole, vec![k, 0.0, 0.0, 0.0]),
+        ("RADIAL", &[f, cx, cy, k1, k2]) => ([f, f], [cx, cy], Model::Pinhole, vec![k1, k2, 0.0, 0.0]),
+        ("OPENCV", &[fx, fy, cx, cy, ref rest @ ..]) if rest.len() == 4 => {
+            ([fx, fy], [cx, cy], Model::Pinhole, rest.to_vec())
+        }
+        ("FULL_OPENCV", &[fx, fy, cx, cy, ref rest @ ..]) if rest.len() == 8 => {
+            ([fx, fy], [cx, cy], Model::Pinhole, rest.to_vec())
+        }
+        ("OPENCV_FISHEYE", &[fx, fy, cx, cy, ref rest @ ..]) if rest.len() == 4 => {
+            ([fx, fy], [cx, cy], Model::Equidistant, rest.to_vec())
+        }
+        ("SIMPLE_RADIAL_FISHEYE", &[f, cx, cy, k]) => ([f, f], [cx, cy], Model::Equidistant, vec![k, 0.0, 0.0, 0.0]),
+        ("RADIAL_FISHEYE", &[f, cx, cy, k1, k2]) => ([f, f], [cx, cy], Model::Equidistant, vec![k1, k2, 0.0, 0.0]),
+        _ => return None,
+    };
+    // COLMAP's first pixel has its centre at (0.5, 0.5).
+    let [cx, cy] = principal.map(|c| c - 0.5);
+    Some(CameraNumbers { size, fx: focal[0], fy: focal[1], cx, cy, model, distortion, port: None })
 }

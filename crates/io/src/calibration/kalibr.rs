@@ -5,13 +5,20 @@ use yaml_rust2::Yaml;
 
 use super::{
     found::{Found, Given},
-    text::{Source, rotation, rows},
+    text::{Source, inverse, motion, rows},
 };
 use crate::dataset::{CameraNumbers, Model, RigNumbers};
 use nalgebra::{Matrix3, Vector3};
 
+/// The words that head the cameras in Kalibr's report, `…-results-cam.txt`.
+pub(super) const REPORT: &str = "Camera-system parameters";
+
 pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fault> {
     let source = &sources[0];
+    if source.text.contains(REPORT) {
+        let fault = source.fault(REPORT, "a report of Kalibr, which is not the calibration");
+        return Err(fault.remedy("give the camchain (yaml) that Kalibr wrote beside it"));
+    }
     let Some(content) = source.yaml() else { return Ok(None) };
     let content = content?;
     if content["cam0"]["camera_model"].is_badvalue() {
@@ -30,28 +37,34 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
         left: camera(source, "cam0", &content["cam0"])?,
         right: camera(source, "cam1", other)?,
     };
-    Ok(Some(Found::new("Kalibr camchain", numbers)))
+    let mut found = Found::new("Kalibr camchain", numbers);
+    let more = (2..).take_while(|index| !content[format!("cam{index}").as_str()].is_badvalue()).count();
+    if more > 0 {
+        found.notes.push(format!("cam0 and cam1 of {} cameras, as left and right", more + 2));
+    }
+    Ok(Some(found))
 }
 
-/// The rotation and the translation of cam1_from_cam0: `T_cn_cnm1`, or by way of the IMU, `T_cam_imu` of both cameras.
+/// The rotation and the translation of cam1_from_cam0: `T_cn_cnm1`, or by way of the IMU, `T_cam_imu` of both cameras,
+/// or its inverse, `T_imu_cam`, as OpenVINS writes it.
 fn pose(source: &Source, left: &Yaml, right: &Yaml) -> Result<(Matrix3<f64>, Vector3<f64>), Fault> {
-    let of = |key: &str, value: &Yaml| {
-        let n = source.numbers::<16>(key, value)?;
-        let turn = Matrix3::new(n[0], n[1], n[2], n[4], n[5], n[6], n[8], n[9], n[10]);
-        Ok::<_, Fault>((rotation(source, key, &turn)?, Vector3::new(n[3], n[7], n[11])))
-    };
+    let of = |key: &str, value: &Yaml| motion(source, key, &source.numbers::<16>(key, value)?);
     if !right["T_cn_cnm1"].is_badvalue() {
         return of("T_cn_cnm1", &right["T_cn_cnm1"]);
     }
-    let [from_left, from_right] = [left, right].map(|camera| &camera["T_cam_imu"]);
-    if from_left.is_badvalue() || from_right.is_badvalue() {
-        let fault = source.fault("cam1", "no pose of the second camera");
-        return Err(fault.remedy("give `T_cn_cnm1` of cam1 (cam1_from_cam0), or `T_cam_imu` of both cameras"));
-    }
-    let ((left_turn, left_step), (right_turn, right_step)) =
-        (of("T_cam_imu", from_left)?, of("T_cam_imu", from_right)?);
-    let turn = right_turn * left_turn.transpose();
-    Ok((turn, right_step - turn * left_step))
+    let from_imu = |camera: &Yaml| match (&camera["T_cam_imu"], &camera["T_imu_cam"]) {
+        (value, Yaml::BadValue) if !value.is_badvalue() => of("T_cam_imu", value),
+        (Yaml::BadValue, value) if !value.is_badvalue() => of("T_imu_cam", value).map(inverse),
+        _ => {
+            let fault = source.fault("cam1", "no pose of the second camera");
+            Err(fault.remedy(
+                "give `T_cn_cnm1` of cam1 (cam1_from_cam0), or `T_cam_imu` of both cameras, or `T_imu_cam` of both",
+            ))
+        }
+    };
+    let (left_from_imu, (right_turn, right_step)) = (from_imu(left)?, from_imu(right)?);
+    let (turn, step) = inverse(left_from_imu);
+    Ok((right_turn * turn, right_turn * step + right_step))
 }
 
 fn camera(source: &Source, name: &str, camera: &Yaml) -> Result<CameraNumbers, Fault> {

@@ -4,6 +4,7 @@
 
 mod camera_info;
 mod colmap;
+mod colmap_rig;
 mod euroc;
 mod found;
 mod kalibr;
@@ -12,6 +13,7 @@ mod matlab;
 mod metashape;
 mod opencv;
 mod opencv_xml;
+mod orb_slam;
 mod text;
 
 use std::path::{Path, PathBuf};
@@ -55,10 +57,12 @@ pub fn read(files: &[PathBuf], given: Given) -> Result<Calibration, Fault> {
         kalibr::read,
         camera_info::read,
         euroc::read,
+        orb_slam::read,
+        matlab::read,
+        colmap_rig::read,
         opencv::read,
         colmap::read,
         metashape::read,
-        matlab::read,
         kitti::read,
     ];
     for reader in readers {
@@ -68,8 +72,8 @@ pub fn read(files: &[PathBuf], given: Given) -> Result<Calibration, Fault> {
     }
     let fault = Fault::new("not a known stereo calibration", &first);
     Err(fault.remedy(
-        "give dataset.toml, Kalibr's camchain, ROS's left.yaml and right.yaml, OpenCV's yml or xml, EuRoC's sensor.yaml, \
-         COLMAP's cameras.txt and rigs.txt, Metashape's xml, MATLAB's Calib_Results_stereo.m or json, or KITTI's calib.txt",
+        "give dataset.toml, Kalibr's camchain, ROS's left.yaml and right.yaml, OpenCV's yml, xml or json, EuRoC's \
+         sensor.yaml, COLMAP's cameras.txt and rigs.txt, or rig_config.json, settings of ORB-SLAM, Metashape's xml, MATLAB's Calib_Results_stereo.m or json, or KITTI's calib.txt",
     ))
 }
 
@@ -123,8 +127,11 @@ pub fn is_calibration(file: &Path) -> bool {
     is_foreign(file)
         && read_text(file).is_ok_and(|text| {
             colmap::is_cameras(&text)
+                || colmap_rig::is_one(&text)
+                || opencv::is_json(file, &text)
                 || [
                     "cam0",
+                    kalibr::REPORT,
                     "camera_matrix",
                     "opencv_storage",
                     "%YAML",
@@ -138,6 +145,8 @@ pub fn is_calibration(file: &Path) -> bool {
                     "PoseCamera2",
                     "P_rect_00",
                     "P0:",
+                    "Camera.fx",
+                    "Camera1.fx",
                 ]
                 .iter()
                 .any(|word| text.contains(word))

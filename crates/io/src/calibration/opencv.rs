@@ -1,8 +1,8 @@
-//! OpenCV's FileStorage (yml, xml, json-like matrices): camera matrices, coefficients, R and T of `stereoCalibrate`.
+//! OpenCV's FileStorage (yml, xml, json), and matrices as lists under the same names: camera matrices, coefficients, R and T of `stereoCalibrate`.
 //!
 //! Programs name the matrices in many ways; they are found by the part that says what it is and which camera it is of.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use nalgebra::Vector3;
 use seafix_component::Fault;
@@ -50,7 +50,6 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
         }
     }
     let source = &sources[0];
-    let plain = |key: &str| key.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase();
     let keys: BTreeMap<String, &String> = storage.numbers.keys().map(|key| (plain(key), key)).collect();
     // Cameras are counted from one or from zero: `K0`, `K1` are left and right, `K1`, `K2` too.
     let from_zero = MATRICES.iter().any(|name| keys.contains_key(&format!("{name}0")));
@@ -101,6 +100,29 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
         right: side(1, &k_right)?,
     };
     Ok(Some(Found::new("OpenCV FileStorage", numbers)))
+}
+
+/// Whether a JSON file has the matrices of two cameras; other JSON files are problems.
+pub(super) fn is_json(file: &Path, text: &str) -> bool {
+    let source = Source { file: file.to_owned(), text: text.to_owned() };
+    file.extension().is_some_and(|end| end == "json")
+        && source.yaml().is_some_and(|content| {
+            let mut storage = Storage::default();
+            content.is_ok_and(|content| {
+                add(&mut storage, &content);
+                storage.numbers.keys().any(|key| {
+                    let key = plain(key);
+                    SIDES.iter().flat_map(|words| words.iter()).any(|side| {
+                        MATRICES.iter().any(|name| key == format!("{name}{side}") || key == format!("{side}{name}"))
+                    })
+                })
+            })
+        })
+}
+
+/// A key without signs and in lower case.
+fn plain(key: &str) -> String {
+    key.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_lowercase()
 }
 
 /// Four coefficients without a named model are k1 k2 p1 p2 or those of `cv::fisheye`.

@@ -1,5 +1,9 @@
 //! One rig in the notation of every program.
 
+mod colmap_rig;
+mod lists;
+mod orb_slam;
+
 use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Rotation3, Vector3};

@@ -30,9 +30,9 @@ impl Source {
         Fault::new(what, &self.file).on_line(line)
     }
 
-    /// The content as YAML; `None` if it is not meant to be.
+    /// The content as YAML, of which JSON is a part; `None` if it is not meant to be.
     pub(super) fn yaml(&self) -> Option<Result<Yaml, Fault>> {
-        let is_one = self.file.extension().is_some_and(|end| end == "yaml" || end == "yml");
+        let is_one = self.file.extension().is_some_and(|end| ["yaml", "yml", "json"].iter().any(|known| end == *known));
         (is_one || self.text.starts_with("%YAML")).then(|| yaml::parse(&self.text, &self.file))
     }
 
@@ -54,6 +54,8 @@ impl Source {
 }
 
 /// A camera from its matrix K (row by row).
+///
+/// A K of zeros is what drivers publish for a camera that nobody calibrated.
 pub(super) fn camera(
     source: &Source,
     size: [u32; 2],
@@ -61,6 +63,10 @@ pub(super) fn camera(
     model: Model,
     distortion: Vec<f64>,
 ) -> Result<CameraNumbers, Fault> {
+    if k[0] == 0.0 && k[4] == 0.0 {
+        let fault = source.fault("camera_matrix", "a camera that is not calibrated: K is zero");
+        return Err(fault.remedy("calibrate it, and give the file that the calibration wrote"));
+    }
     let [fx, skew, cx, zero, fy, cy, a, b, c] = *k;
     if [zero, a, b] != [0.0; 3] || c != 1.0 || skew.abs() > 1e-6 * fx.abs() {
         let fault = source.fault("", "a camera matrix that is not fx 0 cx, 0 fy cy, 0 0 1").value(format!("{k:?}"));
@@ -102,6 +108,24 @@ pub(super) fn rotation(source: &Source, key: &str, m: &Matrix3<f64>) -> Result<M
 /// The rotation of a quaternion w, x, y, z.
 pub(super) fn turn([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
     UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner()
+}
+
+/// The motion of 12 or 16 numbers, row by row; the other direction is its inverse.
+pub(super) fn motion(source: &Source, key: &str, numbers: &[f64]) -> Result<(Matrix3<f64>, Vector3<f64>), Fault> {
+    let &[a, b, c, x, d, e, f, y, g, h, i, z, ..] = numbers else {
+        let fault = source.fault(key, format!("`{key}` has {} numbers", numbers.len()));
+        return Err(fault.remedy("give a motion of 4×4 numbers, row by row"));
+    };
+    if numbers.len() != 12 && (numbers.len() != 16 || numbers[12..] != [0.0, 0.0, 0.0, 1.0]) {
+        let fault = source.fault(key, format!("`{key}` is not a motion")).value(format!("{:?}", &numbers[12..]));
+        return Err(fault.remedy("give 4×4 numbers row by row, the last row 0 0 0 1"));
+    }
+    Ok((rotation(source, key, &Matrix3::new(a, b, c, d, e, f, g, h, i))?, Vector3::new(x, y, z)))
+}
+
+/// The motion in the other direction.
+pub(super) fn inverse((turn, step): (Matrix3<f64>, Vector3<f64>)) -> (Matrix3<f64>, Vector3<f64>) {
+    (turn.transpose(), -(turn.transpose() * step))
 }
 
 /// The rotation of a rotation vector (rad).

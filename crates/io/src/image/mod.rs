@@ -13,6 +13,7 @@ mod orientation;
 mod pnm;
 mod samples;
 mod tiff;
+mod unread;
 
 pub use orientation::Orientation;
 
@@ -91,6 +92,9 @@ pub fn decode_image(
 }
 
 fn read_samples(bytes: &[u8], path: &Path, expected: [u32; 2], bits: u8, limits: ImageLimits) -> Result<Image, Fault> {
+    if let Some((format, remedy)) = unread::format(bytes) {
+        return Err(Fault::new("an image of a format that is not read", path).value(format).remedy(remedy));
+    }
     let stored = decode::size(bytes).map_err(|cause| samples::damaged(path, cause))?;
     let orientation = Orientation::of(bytes);
     let size = orientation.turned(stored);
@@ -134,9 +138,20 @@ fn check_size(path: &Path, [width, height]: [u32; 2], expected: [u32; 2], limits
 }
 
 fn size_mismatch(path: &Path, [width, height]: [u32; 2], [w, h]: [u32; 2]) -> Fault {
+    let same_shape = u64::from(width) * u64::from(h) == u64::from(height) * u64::from(w);
+    let remedy = match () {
+        () if width == h && height == w => {
+            "turn the images as the calibration's were: theirs are turned by 90°".to_owned()
+        }
+        () if same_shape => format!(
+            "use images of the calibrated size, or multiply fx, fy, cx + 0.5 and cy + 0.5 by {} and correct `size`",
+            f64::from(width) / f64::from(w.max(1))
+        ),
+        () => "use the images of the calibrated camera, or correct `size`".to_owned(),
+    };
     Fault::new("an image of another size than the calibration", path)
         .value(format!("{width}×{height}, calibrated {w}×{h}"))
-        .remedy("use the images of the calibrated camera, or correct `size`")
+        .remedy(remedy)
 }
 
 /// The size of the upright image in the header of an image file; `None` without a readable header.
@@ -309,8 +324,26 @@ mod tests {
         let frames = [0, 0, 0, 8, b'a', b'c', b'T', b'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xF3, 0x8D, 0x93, 0x70];
         moving.splice(33..33, frames);
         refused("a.png", &moving, &["a moving image"]);
-        refused("a.png", b"GIF89a", &["PNG, JPEG, TIFF or PNM"]);
+        refused("a.png", b"GIF", &["PNG, JPEG, TIFF or PNM"]);
         refused("a.png", b"", &["PNG, JPEG, TIFF or PNM"]);
+    }
+
+    /// Fails if a format is one among all unknown ones.
+    #[test]
+    fn known_formats_that_are_not_read_state_their_converter() {
+        for (bytes, parts) in [
+            (&b"RIFF\x24\0\0\0WEBPVP8 "[..], ["WebP", "dwebp FILE.webp -o FILE.png"]),
+            (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", ["HEIC", "heif-convert FILE.heic FILE.png"]),
+            (b"\0\0\0\x20ftypavif\0\0\0\0avifmif1", ["AVIF", "avifdec FILE.avif FILE.png"]),
+            (b"\0\0\0\x20ftypisom\0\0\x02\0", ["a video", "ffmpeg -i FILE"]),
+            (b"GIF89a\x08\0\x06\0", ["GIF", "magick"]),
+            (b"BM\x86\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0", ["BMP", "magick FILE FILE.png"]),
+            (b"\xFF\x0A\x7A", ["JPEG XL", "djxl"]),
+            (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", ["Git LFS", "git lfs pull"]),
+            (b"<!DOCTYPE html><html>", ["a page of text", "download the file again"]),
+        ] {
+            refused("a.jpg", bytes, &[&["an image of a format that is not read in"], &parts[..]].concat());
+        }
     }
 
     #[test]

@@ -17,8 +17,10 @@ pub(super) struct Samples {
     pub(super) white: Option<u16>,
 }
 
+/// The remedy for a file of no known format.
+pub(super) const READ: &str = "give PNG, JPEG, TIFF or PNM, grey or colour, 8 or 16 bits";
+
 /// The fault of a file that is no image.
 pub(super) fn damaged(path: &Path, cause: String) -> Fault {
-    let remedy = "give PNG, JPEG, TIFF or PNM, grey or colour, 8 or 16 bits";
-    Fault::new("an image that cannot be decoded", path).value(cause).remedy(remedy)
+    Fault::new("an image that cannot be decoded", path).value(cause).remedy(READ)
 }

@@ -3,7 +3,7 @@
 use std::{collections::HashMap, path::Path};
 
 use nalgebra::Vector3;
-use seafix_component::{Fault, counted, line_of, nearest};
+use seafix_component::{Fault, Places, counted, nearest};
 use seafix_geometry::{Object, Point, World, triad};
 
 use super::{
@@ -29,9 +29,9 @@ const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
 /// The allowed difference of surveyed and model distances, in standard deviations.
 const SURVEY_SIGMAS: f64 = 4.0;
 
-/// The collected faults and warnings, with the text for their line numbers.
+/// The collected faults and warnings, with the places of the text for their line numbers.
 pub(super) struct Checker<'a> {
-    text: &'a str,
+    places: Places<'a>,
     file: &'a Path,
     pub(super) faults: Vec<Fault>,
     pub(super) warnings: Vec<Fault>,
@@ -39,7 +39,7 @@ pub(super) struct Checker<'a> {
 
 impl Checker<'_> {
     pub(super) fn at(&self, what: impl Into<String>, path: &[&str]) -> Fault {
-        Fault::new(what, self.file).on_line(line_of(self.text, path))
+        Fault::new(what, self.file).on_line(self.places.line(path))
     }
 
     pub(super) fn fault(&mut self, fault: Fault) {
@@ -81,18 +81,17 @@ impl Checker<'_> {
         for (index, id) in ids.enumerate() {
             let line = |index: usize| {
                 let path = path(&index.to_string());
-                line_of(self.text, &path.iter().map(String::as_str).collect::<Vec<_>>())
+                self.places.line(&path.iter().map(String::as_str).collect::<Vec<_>>())
             };
-            let here =
-                Fault::new(format!("{kind} id is empty"), self.file).on_line(line(index)).value(format!("`{id}`"));
+            let fault = |what: &str| {
+                Fault::new(format!("{kind} id {what}"), self.file).on_line(line(index)).value(format!("`{id}`"))
+            };
             if id.is_empty() {
-                self.faults.push(here.remedy("give a name"));
+                self.faults.push(fault("is empty").remedy("give a name"));
             } else if let Some(first) = seen.insert(id, index) {
                 let first = line(first).map_or(String::new(), |line| format!(" on line {line}"));
-                self.faults.push(
-                    Fault { what: format!("{kind} id is used twice"), ..here }
-                        .remedy(format!("it is already used{first}; choose another id")),
-                );
+                let remedy = format!("it is already used{first}; choose another id");
+                self.faults.push(fault("is used twice").remedy(remedy));
             }
         }
     }
@@ -100,7 +99,7 @@ impl Checker<'_> {
 
 /// The site of the file, or all its faults.
 pub(super) fn site(raw: &SiteFile, text: &str, file: &Path) -> Result<Site, Vec<Fault>> {
-    let mut check = Checker { text, file, faults: Vec::new(), warnings: Vec::new() };
+    let mut check = Checker { places: Places::of(text), file, faults: Vec::new(), warnings: Vec::new() };
     if raw.axes != AXES {
         let fault = check.at("unknown axes rule", &["axes"]).value(format!("`{}`", raw.axes));
         check.fault(fault.remedy(format!("this reader supports `{AXES}`")));
@@ -246,14 +245,17 @@ fn spread(check: &mut Checker<'_>, points: &[ModelPoint], of: &str, number: &str
         }
     }
     let extent = diameter(points);
+    if (SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
+        return;
+    }
     let fault = check
         .at(format!("{of}: implausible units"), &["object", number])
         .value(format!("the diameter of its points is {} m", seafix_component::number(extent)))
         .remedy("give coordinates in metres");
-    if !(IMPOSSIBLE[0]..=IMPOSSIBLE[1]).contains(&extent) {
-        check.fault(fault);
-    } else if !(SUSPICIOUS[0]..=SUSPICIOUS[1]).contains(&extent) {
+    if (IMPOSSIBLE[0]..=IMPOSSIBLE[1]).contains(&extent) {
         check.warnings.push(fault);
+    } else {
+        check.fault(fault);
     }
 }
 

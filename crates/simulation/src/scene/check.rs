@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use seafix_component::{Fault, line_of, nearest};
+use seafix_component::{Fault, Places, nearest};
 use seafix_referencing::Site;
 
 use super::plan::{Geometry, ObjectGeometry};
@@ -16,14 +16,14 @@ const FLAT: f64 = 1e-4;
 const MAX_TRIANGLES: usize = 2_000_000;
 
 struct Checker<'a> {
-    text: &'a str,
+    places: Places<'a>,
     file: &'a Path,
     faults: Vec<Fault>,
 }
 
 impl Checker<'_> {
     fn fault(&mut self, what: String, path: &[&str], value: String, remedy: &str) {
-        let line = line_of(self.text, path);
+        let line = self.places.line(path);
         self.faults.push(Fault::new(what, self.file).on_line(line).value(value).remedy(remedy));
     }
 
@@ -45,7 +45,7 @@ impl Checker<'_> {
 
 /// All faults of `geometry`, whose text is `text`, against `site`.
 pub(super) fn faults(geometry: &Geometry, site: &Site, text: &str, file: &Path) -> Vec<Fault> {
-    let mut check = Checker { text, file, faults: Vec::new() };
+    let mut check = Checker { places: Places::of(text), file, faults: Vec::new() };
     check.within("depth of the seabed", geometry.seabed.depth, [-1e5, 1e5], &["bed", "depth"], "give metres");
     check.within(
         "relief of the seabed",

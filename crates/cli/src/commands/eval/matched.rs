@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use seafix_data::trajectory::{LoggedTrajectory, Trajectory};
 use seafix_evaluation::trajectory::{Alignment, Pose, align, associate, interpolate};
 
-use super::{Eval, SyncMethod};
+use super::{Eval, SyncMethod, unassociated};
 use crate::{
     exit::{Failure, INPUT, USAGE},
     terminal::notify,
@@ -109,12 +109,11 @@ impl Eval {
             _ => 1.0,
         };
         if belong.len() < 2 {
-            return refuse(format!(
-                "only {} of {} and {} poses are associated; check --t-offset and --t-max-diff,",
-                belong.len(),
-                of.0,
-                of.1
-            ));
+            let found = format!("only {} of {} and {} poses are associated", belong.len(), of.0, of.1);
+            let (Some(a), Some(b)) = (&reference.stamps, &estimate.stamps) else { return refuse(found) };
+            let (left, right) = (self.reference.display(), self.estimate().display());
+            let why = unassociated::reason(a, b, tolerance, offset);
+            return Err(Failure::new(INPUT, format!("{found} in {left} and {right}: {why}")));
         }
         let broken = |before: &(usize, usize), now: &(usize, usize)| {
             let between = |breaks: &[usize], from: usize, to: usize| breaks.iter().any(|&at| from < at && at <= to);

@@ -3,6 +3,7 @@
 mod matched;
 mod output;
 mod sites;
+mod unassociated;
 
 use matched::Matched;
 
