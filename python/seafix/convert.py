@@ -97,7 +97,7 @@ def evo_trajectory(stamps_ns: npt.ArrayLike, poses: npt.ArrayLike) -> Any:
 
     Examples
     --------
-    >>> estimate = sf.convert.evo_trajectory(*odometry.trajectory())
+    >>> estimate = sf.convert.evo_trajectory(*odometry.trajectory()[:2])
     """
     stamps, matrices = np.asarray(stamps_ns, dtype=np.int64), _matrices(poses, "poses")
     if matrices.ndim != 3 or stamps.shape != matrices.shape[:1]:

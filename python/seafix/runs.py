@@ -126,7 +126,19 @@ def _settings(settings: Mapping[str, Any] | Sequence[str]) -> list[str]:
     if not isinstance(settings, Mapping):
         return [str(setting) for setting in settings]
     # A JSON number, text, boolean or list is a TOML value as well.
-    return [f"{key}={json.dumps(value)}" for key, value in settings.items()]
+    return [f"{key}={_toml(key, value)}" for key, value in settings.items()]
+
+
+def _toml(key: str, value: Any) -> str:
+    """A value of a setting in TOML; numpy's scalars and arrays are numbers and lists."""
+    try:
+        if value is None:
+            raise TypeError
+        return json.dumps(value, default=lambda other: other.tolist(), allow_nan=False)
+    except (TypeError, ValueError, AttributeError):
+        error = ValueError(f"the setting `{key}` is {value!r}; give a number, text, boolean, list or dictionary")
+        error.field, error.remedy = key, "give a number, text, boolean, list or dictionary"
+        raise error from None
 
 
 def _threads(threads: int | None) -> int:

@@ -3,7 +3,10 @@
 use std::{
     any::Any,
     panic::{AssertUnwindSafe, catch_unwind},
-    sync::mpsc::{RecvTimeoutError, channel},
+    sync::{
+        Arc, Mutex, PoisonError,
+        mpsc::{RecvTimeoutError, channel},
+    },
     thread,
     time::Duration,
 };
@@ -12,6 +15,7 @@ use pyo3::{
     exceptions::{PyOSError, PyRuntimeError},
     prelude::*,
 };
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// The interval between two looks for signals; a tenth of a second is felt as immediate.
 const LOOK: Duration = Duration::from_millis(50);
@@ -21,7 +25,28 @@ pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send)
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(panicked)
 }
 
-/// The result of work that may take long, on a thread of its own; this thread looks for signals.
+/// The threads of this process for long work.
+///
+/// A forked process has none of its parent's threads, so that work on them would wait forever: it gets a pool of its own.
+fn pool() -> PyResult<Arc<ThreadPool>> {
+    static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if let Some((owner, pool)) = &*pool
+        && *owner == process
+    {
+        return Ok(Arc::clone(pool));
+    }
+    let made = ThreadPoolBuilder::new().build();
+    let made = Arc::new(
+        made.map_err(|error| PyOSError::new_err(format!("cannot start threads: {error}; end other programs")))?,
+    );
+    // The parent's pool waits for threads that are not here.
+    std::mem::forget(pool.replace((process, Arc::clone(&made))));
+    Ok(made)
+}
+
+/// The result of work that may take long, on threads of its own; this thread looks for signals.
 ///
 /// A signal whose handler raises, such as Ctrl-C, raises at once. Work that cannot be stopped ends by itself, and its
 /// result is dropped.
@@ -30,9 +55,10 @@ pub(crate) fn interruptible<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
     let (sender, mut receiver) = channel();
+    let pool = pool()?;
     let spawned = thread::Builder::new().name("seafix".to_owned()).spawn(move || {
         // The receiver is gone after an interruption.
-        let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
+        let _ = sender.send(catch_unwind(AssertUnwindSafe(|| pool.install(work))));
     });
     spawned.map_err(|error| PyOSError::new_err(format!("cannot start a thread: {error}; end other programs")))?;
     loop {

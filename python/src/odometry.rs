@@ -65,7 +65,7 @@ impl Motion {
 /// --------
 /// >>> odometry = sf.Odometry(rig)
 /// >>> motion = odometry.push(stamp_ns, left, right)
-/// >>> stamps_ns, poses = odometry.trajectory()
+/// >>> stamps_ns, poses, segments = odometry.trajectory()
 #[pyclass(frozen, module = "seafix")]
 pub(crate) struct Odometry {
     session: Mutex<Box<dyn OdometrySession + 'static>>,
@@ -110,10 +110,14 @@ impl Odometry {
     fn push(
         &self,
         py: Python<'_>,
-        stamp_ns: u64,
+        stamp_ns: &Bound<'_, PyAny>,
         left: &Bound<'_, PyAny>,
         right: &Bound<'_, PyAny>,
     ) -> PyResult<Motion> {
+        let stamp_ns: u64 = stamp_ns.extract().map_err(|_| {
+            let what = format!("`stamp_ns` is {stamp_ns}");
+            invalid(py, "stamp_ns", what, "give whole nanoseconds from 0 to 18446744073709551615")
+        })?;
         let (left, right) = pair(left, right, &self.rig)?;
         let advanced = detached(py, || {
             let mut session = self.session.lock().unwrap_or_else(PoisonError::into_inner);
@@ -146,6 +150,9 @@ impl Odometry {
     ///     The times (ns).
     /// poses : ndarray, shape (k, 4, 4)
     ///     The poses ``world_from_camera`` (m). A segment after a break begins where the previous one ended.
+    /// segments : ndarray of int, shape (k,)
+    ///     The segment of each pose. The motion between two segments is unknown: poses of different segments must not be
+    ///     compared.
     fn trajectory<'py>(&self, py: Python<'py>) -> PyResult<StampedPoses<'py>> {
         let trajectory = detached(py, || self.session.lock().unwrap_or_else(PoisonError::into_inner).trajectory())?;
         let poses = || trajectory.segments.iter().flat_map(|segment| &segment.poses);
@@ -156,7 +163,10 @@ impl Odometry {
             })
             .collect();
         let stamps = PyArray1::from_iter(py, poses().map(|it| it.stamp_ns as i64));
-        Ok((stamps, PyArray2::from_array(py, &aview2(&rows)).reshape([rows.len(), 4, 4])?))
+        let segments = trajectory.segments.iter().enumerate();
+        let segments = segments.flat_map(|(index, segment)| segment.poses.iter().map(move |_| index as i64));
+        let segments = PyArray1::from_iter(py, segments);
+        Ok((stamps, PyArray2::from_array(py, &aview2(&rows)).reshape([rows.len(), 4, 4])?, segments))
     }
 
     fn __repr__(&self) -> String {
@@ -164,5 +174,5 @@ impl Odometry {
     }
 }
 
-/// Times (ns) and the poses at them.
-type StampedPoses<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f64>>);
+/// Times (ns), the poses at them, and the segments of these.
+type StampedPoses<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<i64>>);

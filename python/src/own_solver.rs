@@ -18,6 +18,7 @@ use crate::{
 
 /// A solver that calls a Python function.
 struct PythonSolver {
+    name: String,
     function: Py<PyAny>,
     settings: Py<PyDict>,
     minimum: usize,
@@ -38,6 +39,10 @@ impl PythonSolver {
         let noise = covariance_table(py, data.points.iter().map(Observation::noise))?;
         let arguments = (table(py, &src), table(py, &dst), noise);
         let given = self.function.bind(py).call(arguments, Some(self.settings.bind(py)))?;
+        if given.is_none() {
+            let what = format!("the solver `{}` returned None", self.name);
+            return Err(invalid(py, &self.name, what, "return a rigid motion of shape (4, 4)"));
+        }
         motion(&given, "T")
     }
 }
@@ -99,11 +104,13 @@ pub(crate) fn add_solver(
         return Err(invalid(py, "minimum", what, "give 3 or more; fewer points determine no motion"));
     }
     let Declared { name, summary, source, version, defaults } = own::declared(declared)?;
+    let called = name.clone();
     let construct: Construct<dyn Solver> = Box::new(move |settings| {
         Python::attach(|py| {
             let settings = own::keywords(py, settings).map_err(|error| error.to_string())?.unbind();
             let function = function.clone_ref(py);
-            Ok(Box::new(PythonSolver { function, settings, minimum, least_squares, to_rounding: exact })
+            let name = called.clone();
+            Ok(Box::new(PythonSolver { name, function, settings, minimum, least_squares, to_rounding: exact })
                 as Box<dyn Solver>)
         })
     });

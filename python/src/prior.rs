@@ -93,8 +93,11 @@ impl PosePrior {
     }
 
     fn __repr__(&self) -> String {
-        let (position, attitude) = (self.covariance.position_sigma(), self.covariance.attitude_sigma().to_degrees());
-        format!("PosePrior({}, position ± {position:.3} m, attitude ± {attitude:.2}°)", self.pose)
+        // The mean over the three axes, as the prior is given.
+        let of_axis = |sigma: f64| sigma / 3f64.sqrt();
+        let position = of_axis(self.covariance.position_sigma());
+        let attitude = of_axis(self.covariance.attitude_sigma()).to_degrees();
+        format!("PosePrior({}, each axis ± {position:.3} m and ± {attitude:.2}°)", self.pose)
     }
 }
 

@@ -11,10 +11,13 @@ use crate::{
     array::{array4, array6, rows, vector},
     choice::Built,
     failure,
-    interpreter::detached,
+    interpreter::{detached, interruptible},
     invalid::{DegenerateError, invalid, with_attributes},
     solve::BUILT_SOLVERS,
 };
+
+/// The number of points above which Ctrl-C ends the call: a thread of its own takes longer than fewer points.
+const LONG: usize = 200;
 
 /// A pose and its covariance as arrays.
 type Registered<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
@@ -91,9 +94,14 @@ pub(crate) fn register<'py>(
         let what = format!("`{name}` weights all points equally");
         return Err(invalid(py, "solver", what, "use `weighted-kabsch` or omit the weights"));
     }
-    let solve = || solution(&src, &dst, weights.as_deref(), &*solver, sigma);
-    let found = detached(py, solve)?;
-    if let Some(error) = failure::taken() {
+    let long = src.len() > LONG;
+    let solve = move || {
+        let found = solution(&src, &dst, weights.as_deref(), &*solver, sigma);
+        // A solver written in Python keeps its exception on the thread that it runs on.
+        (found, failure::taken())
+    };
+    let (found, raised) = if long { interruptible(py, solve)? } else { detached(py, solve)? };
+    if let Some(error) = raised {
         return Err(error);
     }
     let (pose, covariance) = found.map_err(|why| degenerate(py, &why))?;

@@ -96,7 +96,11 @@ def test_a_blank_pair_is_skipped_by_the_odometry(sample):
     began = odometry.push(2, SAMPLE / "left000.png", SAMPLE / "right000.png")
     assert began.outcome == "began" and began.segment == 0
     np.testing.assert_array_equal(began.world_from_camera, np.eye(4))
-    stamps, poses = odometry.trajectory()
-    assert stamps.tolist() == [2] and poses.shape == (1, 4, 4)
+    stamps, poses, segments = odometry.trajectory()
+    assert stamps.tolist() == [2] and poses.shape == (1, 4, 4) and segments.tolist() == [0]
+    for stamp in (-5, 2**70, 1.5):
+        with pytest.raises(ValueError, match="whole nanoseconds") as raised:
+            odometry.push(stamp, image, image)
+        assert raised.value.field == "stamp_ns"
     with pytest.raises(ValueError, match="other sensors"):
         sf.Odometry(rig, "dvl-gyro")

@@ -239,3 +239,12 @@ def test_an_own_detector_finds_what_the_library_finds(tmp_path):
         sf.Localizer(site, rig, 'detector = "own-harris"').localize(*images)
     with pytest.raises(RuntimeError, match="in my detector"):
         sf.run(folder, tmp_path / "broken", settings={"pipeline.detector": "own-harris"})
+
+
+def test_a_solver_that_returns_nothing_is_named(scene):
+    @sf.solver("own-nothing")
+    def nothing(src, dst, covariances):
+        pass
+
+    with pytest.raises(ValueError, match="the solver `own-nothing` returned None"):
+        sf.register(scene.seen, scene.seen, solver="own-nothing")

@@ -1,5 +1,8 @@
 """Runs of experiments, their logs, and their parts."""
 
+import multiprocessing
+import os
+
 import numpy as np
 import pytest
 import seafix as sf
@@ -100,3 +103,27 @@ def test_faults_of_an_experiment_are_stated(experiment, tmp_path):
     with pytest.raises(FileNotFoundError, match="manifest"):
         sf.Run(tmp_path)
     assert np.all([part.count == 2 for part in sf.shards("e.toml", 2, tmp_path)])
+
+
+def _run_in(arguments):
+    experiment, out = arguments
+    return len(sf.run(experiment, out, threads=2).table())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_forked_process_has_threads_of_its_own(experiment, tmp_path):
+    """Threads do not survive a fork: work on those of the parent would wait forever."""
+    path = experiment()
+    rows = _run_in((path, tmp_path / "parent"))
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(_run_in, ((path, tmp_path / "child"),)).get(timeout=120) == rows
+
+
+def test_settings_are_numbers_of_numpy_too(experiment, tmp_path):
+    path = experiment()
+    run = sf.run(path, tmp_path / "a", threads=1, settings={"source.frames": np.int64(2)})
+    assert len(set(run.table()["frame"].to_pylist())) <= 2
+    for value in (None, float("nan"), object()):
+        with pytest.raises(ValueError, match="the setting `source.frames` is") as raised:
+            sf.run(path, tmp_path / "b", threads=1, settings={"source.frames": value})
+        assert raised.value.field == "source.frames"

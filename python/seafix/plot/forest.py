@@ -107,7 +107,10 @@ def forest(
     # A median between attempts that only one method fixed is infinite or undefined; it has no place on the axis.
     finite = {name: factor * np.array(row) for name, row in intervals.items() if np.isfinite(row).all()}
     if not finite:
-        raise ValueError("no two methods have fixes of the same attempts; compare methods on the same frames")
+        raise ValueError(
+            "no two methods have fixes of the same attempts: `by` names what differs between methods, `over` what "
+            "differs between rows, such as a distance; compare methods on the same frames"
+        )
     ax = style.axes(ax, height=_ROW * len(finite) + _REST)
     ax.axvline(0.0, color=style.MINOR, linewidth=style.AXIS)
     for place, (middle, low, high) in enumerate(reversed(finite.values())):
