@@ -38,12 +38,14 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
         targets => format!(", of one site with {}", counted(targets, "target", "targets")),
     };
     let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
-    let bound = 100.0 * proportion::interval_of_counts(headers().any(proportion::is_trajectory), 0, min).1;
+    let successive = headers().any(proportion::is_trajectory);
+    let bound = 100.0 * proportion::interval_of_counts(successive, 0, min).1;
     // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
     let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
     format!(
-        "{data}{site}. The smallest trial has {}, so that its rate of wrong fixes may be up to {bound:.digits$} % even without any. \
-         The section on threats to validity lists all limits.",
-        counted(min, "attempt", "attempts")
+        "{data}{site}. The smallest trial has {}{}: without a wrong fix among them, the rate of wrong fixes may still be \
+         {bound:.digits$} % (upper end of the 95 % interval). The section on threats to validity lists all limits.",
+        counted(min, "attempt", "attempts"),
+        if successive { ", which successive frames make dependent" } else { "" }
     )
 }

@@ -14,6 +14,8 @@ use crate::{
 };
 
 /// The cheapest and the dearest search at the largest size, each at both ends of the sizes.
+///
+/// A search without a fix at the largest size ends at its limit of work, which says nothing about its growth: it is named.
 pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
     let key = labels.along.as_ref()?;
     let place = |index: usize| axes::on(&summary.rows[index], key).unwrap_or(f64::INFINITY);
@@ -28,6 +30,8 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     }
     let largest = known.iter().map(|(_, _, last)| place(*last)).reduce(f64::max)?;
     known.retain(|(_, _, last)| place(*last) == largest);
+    let (mut known, without): (Vec<_>, Vec<_>) =
+        known.into_iter().partition(|(_, _, last)| summary.rows[*last].found > 0);
     known.sort_by(|a, b| tests(a.2).value.unwrap_or(0.0).total_cmp(&tests(b.2).value.unwrap_or(0.0)));
     let dearest = if known.len() > 1 { known.pop() } else { None };
     let cheapest = known.into_iter().next();
@@ -50,6 +54,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
             statistic(&run.trials[last], "q95", Field::Tests),
             format!(") with {name}")
         ]);
+    }
+    for (name, _, last) in &without {
+        message.extend(text![format!("; {name} has no fix there after "), tests(*last), " pair tests"]);
     }
     Some(capitalised(message))
 }

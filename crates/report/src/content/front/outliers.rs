@@ -4,6 +4,7 @@ use super::measured::{capitalised, error, median, wrong};
 use crate::{
     content::{
         conditions::{axes, labels::Labels},
+        phrases,
         sections::breakdown::{self, Step},
     },
     document::{Text, text},
@@ -50,6 +51,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
             ]);
         }
     }
+    message.extend(at_most(run, summary, labels, key).unwrap_or_default());
     message.extend(loss(run, summary, labels, key).unwrap_or_default());
     message.extend(wrong(run, summary));
     Some(capitalised(message))
@@ -65,6 +67,28 @@ fn list(names: &[&str]) -> String {
         [one] => (*one).to_owned(),
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
+}
+
+/// The clause on the highest and the lowest rate of fixes at the largest fraction.
+fn at_most(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
+    let at = summary.rows.iter().filter_map(|row| axes::on(row, key)).reduce(f64::max)?;
+    let rate = |index: usize| summary.rows[index].found as f64 / summary.rows[index].attempted as f64;
+    let mut known: Vec<usize> = (0..summary.rows.len())
+        .filter(|&index| axes::on(&summary.rows[index], key) == Some(at) && summary.rows[index].attempted > 0)
+        .collect();
+    known.sort_by(|&a, &b| rate(b).total_cmp(&rate(a)));
+    let (best, worst) = (*known.first()?, *known.last()?);
+    let percent = |index: usize| {
+        let row = &summary.rows[index];
+        phrases::percent(&run.trials[index], "found", row.found, row.attempted)
+    };
+    let series = |index: usize| labels.of_series(&summary.rows[index]);
+    let mut message = text![format!("; at {} the attempts with a fix are ", labels.place(&summary.rows[best], key))];
+    message.extend(text![percent(best), format!(" % with {}", series(best))]);
+    if rate(worst) < rate(best) {
+        message.extend(text![" and ", percent(worst), format!(" % with {}", series(worst))]);
+    }
+    Some(message)
 }
 
 /// The clause on the smallest and the largest median error at the smallest fraction.

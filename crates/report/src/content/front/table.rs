@@ -39,7 +39,8 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
     if navigates && single {
         heads.push(Head::numbers("navigated error RMS (mm)"));
     }
-    let caption = text!["Fixes in % of the attempts and median errors, with 95 % intervals."];
+    let errors = if single { " and median errors" } else { "" };
+    let caption = text![format!("Fixes in % of the attempts{errors}, with 95 % intervals.")];
     let mut table = Table::new("answer", caption, heads);
     for (name, members) in lines {
         let sample = Sample::of(run, summary, &members);
