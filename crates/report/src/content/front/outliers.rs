@@ -51,7 +51,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
             ]);
         }
     }
-    message.extend(at_most(run, summary, labels, key).unwrap_or_default());
+    message.extend(at_the_largest(run, summary, labels, key).unwrap_or_default());
     message.extend(loss(run, summary, labels, key).unwrap_or_default());
     message.extend(wrong(run, summary));
     Some(capitalised(message))
@@ -70,7 +70,7 @@ fn list(names: &[&str]) -> String {
 }
 
 /// The clause on the highest and the lowest rate of fixes at the largest fraction.
-fn at_most(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
+fn at_the_largest(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
     let at = summary.rows.iter().filter_map(|row| axes::on(row, key)).reduce(f64::max)?;
     let rate = |index: usize| summary.rows[index].found as f64 / summary.rows[index].attempted as f64;
     let mut known: Vec<usize> = (0..summary.rows.len())
