@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from ._seafix import add_detector, add_search, add_solver
+from .invalid import invalid
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -17,7 +18,8 @@ def _declared(function: Callable[..., Any], name: str, source: str, version: int
     settings = [parameter for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY]
     missing = [parameter.name for parameter in settings if parameter.default is parameter.empty]
     if missing:
-        raise ValueError(f"the setting `{missing[0]}` of `{name}` has no default; give one, so that it can be printed")
+        what = f"the setting `{missing[0]}` of `{name}` has no default"
+        raise invalid(missing[0], what, "give one, so that it can be printed")
     summary = (inspect.getdoc(function) or "").partition("\n")[0] or f"the function {function.__name__}"
     return {
         "name": name,

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._seafix import Frame, Log
+from .invalid import invalid
 
 __all__ = ["evo_trajectory", "from_evo", "open3d_cloud", "rerun_log", "rotation"]
 
@@ -34,10 +35,10 @@ def _matrices(pose: Any, name: str = "pose") -> npt.NDArray[np.float64]:
         if hasattr(pose, attribute):
             pose = getattr(pose, attribute)
             if pose is None:
-                raise ValueError(f"`{name}` has no `{attribute}`; ask for `is_fix` or `outcome` first")
+                raise invalid(name, f"`{name}` has no `{attribute}`", "ask for `is_fix` or `outcome` first")
     array = np.asarray(pose, dtype=float)
     if array.shape[-2:] != (4, 4):
-        raise ValueError(f"`{name}` has the shape {array.shape}; give a pose, or an array (4, 4) or (n, 4, 4)")
+        raise invalid(name, f"`{name}` has the shape {array.shape}", "give a pose, or an array (4, 4) or (n, 4, 4)")
     return array
 
 
@@ -101,7 +102,8 @@ def evo_trajectory(stamps_ns: npt.ArrayLike, poses: npt.ArrayLike) -> Any:
     """
     stamps, matrices = np.asarray(stamps_ns, dtype=np.int64), _matrices(poses, "poses")
     if matrices.ndim != 3 or stamps.shape != matrices.shape[:1]:
-        raise ValueError(f"`stamps_ns` has the shape {stamps.shape}; give one stamp for each of {len(matrices)} poses")
+        what = f"`stamps_ns` has the shape {stamps.shape}"
+        raise invalid("stamps_ns", what, f"give one stamp for each of {len(matrices)} poses")
     return _module("evo.core.trajectory").PoseTrajectory3D(poses_se3=list(matrices), timestamps=stamps / 1e9)
 
 
@@ -159,7 +161,7 @@ def open3d_cloud(points: Any) -> Any:
     is_frame = isinstance(points, Frame)
     rows = np.asarray(points.cloud if is_frame else points, dtype=float)
     if rows.ndim != 2 or rows.shape[1] != 3:
-        raise ValueError(f"`points` has the shape {rows.shape}; give a frame or an array (n, 3)")
+        raise invalid("points", f"`points` has the shape {rows.shape}", "give a frame or an array (n, 3)")
     open3d = _module("open3d")
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(rows))
     if is_frame:

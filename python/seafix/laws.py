@@ -6,6 +6,7 @@ import sys
 from typing import TextIO
 
 from ._seafix import search_laws, searches, solver_laws, solvers
+from .invalid import invalid
 
 
 def check_laws(name: str, *, kind: str | None = None, file: TextIO | None = None) -> bool:
@@ -47,7 +48,7 @@ def check_laws(name: str, *, kind: str | None = None, file: TextIO | None = None
     >>> assert sf.check_laws("mean-translation")
     """
     if kind not in (None, "solver", "search"):
-        raise ValueError(f"`kind` is {kind!r}; give 'solver' or 'search'")
+        raise invalid("kind", f"`kind` is {kind!r}", "give 'solver' or 'search'")
     is_search = kind == "search" or kind is None and name not in solvers() and name in searches()
     results = search_laws(name) if is_search else solver_laws(name)
     for statement, counterexample in results:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ._seafix import Log, read_axes, read_log, run_experiment
+from .invalid import invalid
 
 
 class Run:
@@ -122,7 +123,7 @@ def _reporter(progress: bool | Callable[[int, int], object]) -> Callable[[int, i
 def _settings(settings: Mapping[str, Any] | Sequence[str]) -> list[str]:
     """Settings as ``key=value``, with values in TOML."""
     if isinstance(settings, str):
-        raise ValueError("`settings` is a text; give a dictionary or a list of texts `key=value`")
+        raise invalid("settings", "`settings` is a text", "give a dictionary or a list of texts `key=value`")
     if not isinstance(settings, Mapping):
         return [str(setting) for setting in settings]
     # A JSON number, text, boolean or list is a TOML value as well.
@@ -136,16 +137,15 @@ def _toml(key: str, value: Any) -> str:
             raise TypeError
         return json.dumps(value, default=lambda other: other.tolist(), allow_nan=False)
     except (TypeError, ValueError, AttributeError):
-        error = ValueError(f"the setting `{key}` is {value!r}; give a number, text, boolean, list or dictionary")
-        error.field, error.remedy = key, "give a number, text, boolean, list or dictionary"
-        raise error from None
+        remedy = "give a number, text, boolean, list or dictionary"
+        raise invalid(key, f"the setting `{key}` is {value!r}", remedy) from None
 
 
 def _threads(threads: int | None) -> int:
     if threads is None:
         return os.cpu_count() or 1
     if not 1 <= threads <= 1024:
-        raise ValueError(f"`threads` is {threads}; give 1 to 1024")
+        raise invalid("threads", f"`threads` is {threads}", "give 1 to 1024")
     return threads
 
 

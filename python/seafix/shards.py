@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ._seafix import merge_runs, run_experiment
+from .invalid import invalid
 from .runs import Run, _settings, _threads
 
 
@@ -116,7 +117,7 @@ def shards(
     >>> run = sf.merge(folders, "run")
     """
     if count < 1:
-        raise ValueError(f"`count` is {count}; give 1 or more parts")
+        raise invalid("count", f"`count` is {count}", "give 1 or more parts")
     source, folder = str(Path(experiment).absolute()), Path(out).absolute()
     changed = tuple(_settings(settings))
     return [

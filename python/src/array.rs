@@ -12,13 +12,30 @@ use crate::invalid::invalid;
 
 /// An argument as an array of doubles: a numpy array of that type itself, else a conversion.
 pub(crate) fn doubles<'py>(value: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    if let Ok(array) = value.cast::<PyArrayDyn<f64>>() {
+    // A subclass, such as a masked array, may hide numbers that are none.
+    if let Ok(array) = value.cast_exact::<PyArrayDyn<f64>>() {
         return Ok(array.readonly());
     }
     let py = value.py();
+    let module = get_array_module(py)?;
+    let masked = py.import("numpy.ma")?.call_method1("is_masked", (value,))?.is_truthy()?;
+    if masked {
+        return Err(invalid(py, name, format!("`{name}` has masked values"), "leave out the masked rows"));
+    }
+    // Complex numbers would lose a part, and times and texts become numbers of another meaning.
+    let kind = module.call_method1("asarray", (value,)).and_then(|array| array.getattr("dtype")?.getattr("kind"));
+    let kind: String = kind.and_then(|kind| kind.extract()).unwrap_or_default();
+    if matches!(&*kind, "c" | "m" | "M" | "U" | "S") {
+        let what = match &*kind {
+            "c" => "complex numbers",
+            "m" | "M" => "times",
+            _ => "texts",
+        };
+        return Err(invalid(py, name, format!("`{name}` is an array of {what}"), "give real numbers"));
+    }
     let wrong =
         || invalid(py, name, format!("`{name}` is not an array of numbers"), "give numbers, e.g. a numpy array");
-    let array = get_array_module(py)?.call_method1("asarray", (value, "float64")).map_err(|_| wrong())?;
+    let array = module.call_method1("asarray", (value, "float64")).map_err(|_| wrong())?;
     Ok(array.cast_into::<PyArrayDyn<f64>>().map_err(|_| wrong())?.readonly())
 }
 

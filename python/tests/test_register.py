@@ -98,3 +98,17 @@ def test_points_that_are_not_finite_are_refused():
     src[4, 1] = np.nan
     with pytest.raises(ValueError, match="finite"):
         sf.register(src, SRC)
+
+
+def test_numbers_of_another_meaning_are_refused():
+    points = np.arange(12.0).reshape(4, 3)
+    masked = np.ma.array(points, mask=np.eye(4, 3, dtype=bool))
+    times = np.zeros((4, 3), "datetime64[ns]")
+    for given, what in [(points + 1j, "complex"), (times, "times"), (points.astype(str), "texts"), (masked, "masked")]:
+        with pytest.raises(ValueError, match=what) as raised:
+            sf.register(given, points)
+        assert raised.value.field == "src" and raised.value.remedy
+    plain = np.random.default_rng(1).normal(size=(5, 3))
+    expected, _ = sf.register(plain, plain)
+    for same in (plain.tolist(), np.ma.array(plain), plain.astype(object)):
+        np.testing.assert_array_equal(sf.register(same, plain)[0], expected)
