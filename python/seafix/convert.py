@@ -39,6 +39,12 @@ def _matrices(pose: Any, name: str = "pose") -> npt.NDArray[np.float64]:
     array = np.asarray(pose, dtype=float)
     if array.shape[-2:] != (4, 4):
         raise invalid(name, f"`{name}` has the shape {array.shape}", "give a pose, or an array (4, 4) or (n, 4, 4)")
+    rotations = array[..., :3, :3]
+    products = rotations @ np.swapaxes(rotations, -1, -2)
+    # Six digits, as files have them.
+    rigid = np.allclose(products, np.eye(3), atol=1e-5) and np.allclose(array[..., 3, :], [0, 0, 0, 1])
+    if not (rigid and np.isfinite(array).all() and (np.linalg.det(rotations) > 0).all()):
+        raise invalid(name, f"`{name}` is not a rigid motion", "give rotations and translations without NaN")
     return array
 
 
@@ -104,6 +110,8 @@ def evo_trajectory(stamps_ns: npt.ArrayLike, poses: npt.ArrayLike) -> Any:
     if matrices.ndim != 3 or stamps.shape != matrices.shape[:1]:
         what = f"`stamps_ns` has the shape {stamps.shape}"
         raise invalid("stamps_ns", what, f"give one stamp for each of {len(matrices)} poses")
+    if (np.diff(stamps) <= 0).any():
+        raise invalid("stamps_ns", "`stamps_ns` does not ascend", "sort the poses by time")
     return _module("evo.core.trajectory").PoseTrajectory3D(poses_se3=list(matrices), timestamps=stamps / 1e9)
 
 

@@ -82,3 +82,14 @@ def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "evo.core.trajectory", None)
     with pytest.raises(ImportError, match="pip install evo"):
         sf.convert.evo_trajectory([0], np.eye(4)[None])
+
+
+def test_poses_that_are_no_motions_are_refused():
+    mirrored = np.diag([1.0, 1.0, -1.0, 1.0])
+    for pose in (np.ones((1, 4, 4)), np.full((1, 4, 4), np.nan), mirrored[None]):
+        with pytest.raises(ValueError, match="not a rigid motion") as raised:
+            sf.convert.evo_trajectory([1], pose)
+        assert raised.value.field == "poses"
+    with pytest.raises(ValueError, match="does not ascend") as raised:
+        sf.convert.evo_trajectory([3, 1], np.stack([np.eye(4)] * 2))
+    assert raised.value.field == "stamps_ns"
