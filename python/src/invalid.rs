@@ -38,17 +38,18 @@ pub(crate) fn stated(py: Python<'_>, field: &str, message: &str) -> PyErr {
     with_attributes(py, PyValueError::new_err(message.to_owned()), field, remedy)
 }
 
-/// The exception of a fault in a file: `FileNotFoundError` and its kind for a file that cannot be read, else
+/// The exception of a fault in a file, whose name is its `field`: `FileNotFoundError` and its kind for a file that cannot be read, else
 /// `ValueError`.
 pub(crate) fn in_file(py: Python<'_>, fault: &Fault) -> PyErr {
+    let field = fault.file.display().to_string();
     match std::fs::metadata(&fault.file) {
         // Other faults name places that are no files, such as the command line.
         Err(error) if fault.what.starts_with("cannot read") => {
             // An `OSError` of two arguments becomes the subclass of its number.
             let arguments = (error.raw_os_error(), fault.to_string());
-            with_attributes(py, PyOSError::new_err(arguments), &fault.file.display().to_string(), &fault.remedy)
+            with_attributes(py, PyOSError::new_err(arguments), &field, &fault.remedy)
         }
-        _ => with_attributes(py, PyValueError::new_err(fault.to_string()), &fault.what, &fault.remedy),
+        _ => with_attributes(py, PyValueError::new_err(fault.to_string()), &field, &fault.remedy),
     }
 }
 
@@ -58,8 +59,10 @@ pub(crate) fn of_faults(py: Python<'_>, faults: &[Fault]) -> PyErr {
         [fault] => in_file(py, fault),
         _ => {
             let lines: Vec<String> = faults.iter().map(ToString::to_string).collect();
-            let remedy = faults.first().map_or("", |fault| &fault.remedy);
-            with_attributes(py, PyValueError::new_err(lines.join("\n")), "", remedy)
+            let (field, remedy) = faults
+                .first()
+                .map_or_else(Default::default, |fault| (fault.file.display().to_string(), fault.remedy.clone()));
+            with_attributes(py, PyValueError::new_err(lines.join("\n")), &field, &remedy)
         }
     }
 }

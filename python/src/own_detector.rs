@@ -37,6 +37,14 @@ impl PythonDetector {
     fn called(&self, py: Python<'_>, image: &Image) -> PyResult<Vec<Keypoint>> {
         let pixels = PyArray1::from_slice(py, image.pixels()).reshape([image.height(), image.width()])?;
         let given = self.function.bind(py).call((pixels,), Some(self.settings.bind(py)))?;
+        if given.is_none() {
+            return Err(invalid(
+                py,
+                "points",
+                "the detector returned None",
+                "return an array (n, 3), also for no point",
+            ));
+        }
         let given = rows::<3>(&given, "points", "(n, 3)")?;
         let inside = |x: f64, size: usize| x >= 0.0 && x <= (size - 1) as f64;
         for (k, &[u, v, score]) in given.iter().enumerate() {
