@@ -93,7 +93,7 @@ impl PosePrior {
     }
 
     fn __repr__(&self) -> String {
-        // The mean over the three axes, as the prior is given.
+        // The RMS over the three axes: the number that an isotropic prior was given.
         let of_axis = |sigma: f64| sigma / 3f64.sqrt();
         let position = of_axis(self.covariance.position_sigma());
         let attitude = of_axis(self.covariance.attitude_sigma()).to_degrees();

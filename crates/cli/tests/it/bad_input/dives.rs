@@ -1,4 +1,4 @@
-//! Simulated dives that cannot be.
+//! Invalid settings of simulated dives.
 
 use std::{fs, path::Path};
 

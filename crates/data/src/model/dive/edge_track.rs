@@ -55,7 +55,7 @@ struct Compared {
     part: [f64; 2],
     /// The depth (m).
     depth: f64,
-    /// χ² + ln det of the residuals: the smaller, the likelier.
+    /// χ² + ln det of the residuals' covariance: minus twice the log-likelihood, up to a constant.
     cost: f64,
 }
 
@@ -66,7 +66,8 @@ const COVERED: f64 = 0.6;
 /// The fraction of the pairs that show an edge beyond each of its ends.
 const REACH: f64 = 0.25;
 
-/// Adds each line of a view to the likeliest track; a line without one begins a track if `begins` says so of its ends.
+/// Adds each line of a view to the track of the highest likelihood. A line without a track begins one if `begins` accepts
+/// its ends.
 ///
 /// `slack` is the distance (rad) of a line from its edge beyond the noise.
 pub(super) fn follow(tracks: &mut Vec<Track>, view: &View, slack: f64, begins: impl Fn(&[Vector3<f64>; 2]) -> bool) {
@@ -218,7 +219,7 @@ impl Fitted {
     }
 
     /// The part of this edge beside another one on the same line; `None` on another line.
-    fn part_on(&self, other: &Self, slack: f64) -> Option<[f64; 2]> {
+    pub(super) fn part_on(&self, other: &Self, slack: f64) -> Option<[f64; 2]> {
         let direction = other.ends[1] - other.ends[0];
         let parts = self.ends.map(|end| direction.dot(&(end - other.ends[0])) / direction.norm_squared());
         let mut residual = Vector4::zeros();

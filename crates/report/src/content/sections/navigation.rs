@@ -75,15 +75,15 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
         if fix_intervals.is_empty() {
             continue;
         }
-        let quoted = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
+        let number = |what: &str, value: Option<f64>, (unit, decimals): (Unit, usize)| {
             let suffix = if unit == Unit::Millimetres { " in mm" } else { "" };
             let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated{suffix}"));
             Number::new(value.map(|value| value * unit.scale()), decimals, key)
         };
         let mut line = columns::cells(row);
-        line.push(quoted("count", Some(fix_intervals.len() as f64), (Unit::Plain, 0)).into());
+        line.push(number("count", Some(fix_intervals.len() as f64), (Unit::Plain, 0)).into());
         line.push(
-            quoted(
+            number(
                 "path-length",
                 Some(fix_intervals.iter().map(|fix_interval| fix_interval.path_length).sum()),
                 (Unit::Plain, 1),
@@ -91,7 +91,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
             .into(),
         );
         line.push(
-            quoted(
+            number(
                 "seconds",
                 Some(fix_intervals.iter().map(|fix_interval| fix_interval.seconds).sum()),
                 (Unit::Plain, 1),
@@ -101,10 +101,10 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
         let mut amplitudes: Vec<f64> = fix_intervals.iter().map(|fix_interval| fix_interval.amplitude).collect();
         for (name, p) in [("median", 0.5), ("q95", 0.95), ("greatest", 1.0)] {
             let value = seafix_evaluation::quantile(&mut amplitudes, p);
-            line.push(quoted(&format!("{name} amplitude"), Some(value), (Unit::Millimetres, 1)).into());
+            line.push(number(&format!("{name} amplitude"), Some(value), (Unit::Millimetres, 1)).into());
         }
         line.push(
-            quoted(
+            number(
                 "drift-per-metre",
                 drift(&fix_intervals, |fix_interval| fix_interval.path_length),
                 (Unit::Millimetres, 2),
@@ -112,7 +112,7 @@ fn saw(run: &Run, summary: &RunSummary) -> Option<Table> {
             .into(),
         );
         line.push(
-            quoted(
+            number(
                 "drift-per-second",
                 drift(&fix_intervals, |fix_interval| fix_interval.seconds),
                 (Unit::Millimetres, 2),
@@ -190,7 +190,7 @@ fn min(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text> {
 ///
 /// The first event of each object is quoted from the log.
 fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
-    let quoted = |trial: &Trial| -> Vec<String> {
+    let first_events = |trial: &Trial| -> Vec<String> {
         let mut objects: Vec<&str> = Vec::new();
         let mut quoted = Vec::new();
         for frame in trial.sample() {
@@ -209,7 +209,7 @@ fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
         .iter()
         .enumerate()
         .filter(|(_, trial)| navigates(trial))
-        .map(|(index, trial)| (index, quoted(trial)))
+        .map(|(index, trial)| (index, first_events(trial)))
         .collect();
     if all.iter().all(|(_, quoted)| quoted.is_empty()) {
         return Vec::new();
