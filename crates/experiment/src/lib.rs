@@ -18,6 +18,7 @@
 //! ```
 
 mod diff;
+mod events;
 mod experiment;
 mod git;
 mod inspect;

@@ -17,6 +17,7 @@ use seafix_referencing::{Correspondence, Outcome, SEARCHES, SOLVERS, Target, Tar
 use seafix_vision::{DESCRIPTORS, DETECTORS, LOCATORS, MATCHERS};
 
 use crate::{
+    events::logged,
     experiment::{Experiment, Plan, Trial},
     git::Git,
     not_attempted::NotAttempted,
@@ -207,7 +208,7 @@ fn navigation(navigation_state: &NavigationState, targets: &[Target]) -> Navigat
             lost: navigation_state.odometry.lost.clone(),
             motion: step.map(|step| (step.motion.rows(), rows6(&step.covariance.matrix))),
         },
-        events: navigation_state.events.iter().map(ToString::to_string).collect(),
+        events: navigation_state.events.iter().map(logged).collect(),
         errors: NavigationErrors::default(),
     }
 }

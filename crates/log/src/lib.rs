@@ -85,12 +85,12 @@ pub use join::{join, join_lacking};
 pub use png::{encode_png, encode_png_16};
 pub use read::{Reader, TrialLog, looks_like, read};
 pub use record::{
-    Alternative, AnswerRecord, Axis, BestPose, CameraRecord, CloudPoint, Component, DISPLACED_SUFFIX, EdgePair,
-    Evaluation, ExactPose, FrameRecord, FrameTimes, GreyImage, Inputs, Integrity, Line, Matrix3, Matrix4, Matrix6,
-    ModelEdge, ModelPoint, NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Offset, Outcome, Pair,
-    PixelPair, PointOfInterest, PriorRecord, ProblemEdge, ProblemRecord, Region, RigRecord, SensorReading,
-    SharedStages, SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord,
-    VisiblePoint,
+    Alternative, AnswerRecord, Axis, BestPose, CameraRecord, CloudPoint, Component, EdgePair, Evaluation, ExactPose,
+    FrameRecord, FrameTimes, GreyImage, Inputs, Integrity, Line, Matrix3, Matrix4, Matrix6, ModelEdge, ModelPoint,
+    NavigatedRecord, NavigationErrors, NavigationRecord, OdometryStep, Offset, Outcome, Pair, PixelPair,
+    PointOfInterest, PriorRecord, ProblemEdge, ProblemRecord, Region, RigRecord, SensorReading, SharedStages,
+    SitePoint, TargetModel, TargetRecord, TargetTimes, Totals, TrialHeader, TrueState, TruthRecord, VisiblePoint,
+    displaced_event, displaced_object,
 };
 pub use recording::{Entry, Recording, Topic};
 pub use recover::{Recovered, recover};

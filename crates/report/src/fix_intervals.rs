@@ -88,6 +88,13 @@ pub(crate) fn drift(fix_intervals: &[FixInterval], over: fn(&FixInterval) -> f64
     (all > 0.0).then(|| fix_intervals.iter().map(|fix_interval| fix_interval.drift).sum::<f64>() / all)
 }
 
+/// The smallest and the largest drift per metre of single fix intervals; `None` if none has a path.
+pub(crate) fn extreme_drifts(fix_intervals: &[FixInterval]) -> Option<[f64; 2]> {
+    let moving = fix_intervals.iter().filter(|fix_interval| fix_interval.path_length > 0.0);
+    let drifts: Vec<f64> = moving.map(|fix_interval| fix_interval.drift / fix_interval.path_length).collect();
+    Some([drifts.iter().copied().reduce(f64::min)?, drifts.iter().copied().reduce(f64::max)?])
+}
+
 fn norm(a: [f64; 3]) -> f64 {
     distance(a, [0.0; 3])
 }
@@ -134,6 +141,8 @@ mod tests {
             Some(rounded(0.08 / 7.0))
         );
         assert_eq!(drift(&fix_intervals, |fix_interval| fix_interval.seconds).map(rounded), Some(0.02));
+        assert_eq!(extreme_drifts(&fix_intervals).map(|ends| ends.map(rounded)), Some([0.01, 0.02]));
+        assert_eq!(extreme_drifts(&[]), None);
         assert_eq!(drift(&[], |fix_interval| fix_interval.path_length), None);
     }
 }

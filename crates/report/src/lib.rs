@@ -48,6 +48,7 @@ mod print;
 mod proportion;
 mod published;
 mod rejections;
+mod rms;
 mod run;
 mod summary;
 mod terminal;

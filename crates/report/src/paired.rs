@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use seafix_evaluation::{Bootstrap, holm, mcnemar, median, signed_rank};
-use seafix_log::Axis;
+use seafix_log::{Axis, TrialHeader};
 
 use crate::{
     field::Field,
@@ -110,7 +110,17 @@ pub(crate) fn groups(run: &Run) -> Vec<Vec<usize>> {
 ///
 /// Joined runs may have different lengths, so the number of frames is ignored; [`same_views`] compares their views.
 pub(crate) fn data(trial: &Trial, joined: bool) -> String {
-    let header = &trial.header;
+    data_of(&trial.header, joined)
+}
+
+/// The largest number of these trials that have the same data: so many attempts are those at one target of one frame.
+pub(crate) fn sharing<'a>(headers: impl Iterator<Item = &'a TrialHeader>) -> usize {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    headers.for_each(|header| *counts.entry(data_of(header, false)).or_default() += 1);
+    counts.into_values().max().unwrap_or(1)
+}
+
+fn data_of(header: &TrialHeader, joined: bool) -> String {
     let mut source = header.configuration.parse::<toml::Table>().ok().and_then(|table| table.get("source").cloned());
     if let Some(toml::Value::Table(source)) = source.as_mut().filter(|_| joined) {
         source.remove("frames");

@@ -31,12 +31,27 @@ pub(crate) fn interval(trajectory: bool, events: &[bool]) -> (f64, f64) {
     clopper_pearson(events.iter().filter(|event| **event).count(), events.len(), 0.95)
 }
 
+/// The fraction of events (%), and the ends of its 95 % [`interval`] (%); `None` without events.
+pub(crate) fn rate(trajectory: bool, events: &[bool]) -> Option<[f64; 3]> {
+    let k = events.iter().filter(|event| **event).count();
+    let (low, high) = interval(trajectory, events);
+    (!events.is_empty()).then(|| [k as f64 / events.len() as f64, low, high].map(|fraction| 100.0 * fraction))
+}
+
 /// The 95 % interval of `k` of `n`, for a log that has only counts of some attempts.
 ///
 /// Their correlation is unknown, so every block of a trajectory counts as one attempt.
 pub(crate) fn interval_of_counts(trajectory: bool, k: usize, n: usize) -> (f64, f64) {
     let block = if trajectory { Bootstrap::of(n, SEED).block } else { 1 };
     of_blocks(k, n, block, 0.95)
+}
+
+/// The 95 % interval of `k` of `n` attempts of several trials, `sharing` of which have the same frames.
+///
+/// Attempts at one target of one frame are not independent: those of all trials that share it count as one.
+pub(crate) fn interval_of_shared(trajectory: bool, sharing: usize, k: usize, n: usize) -> (f64, f64) {
+    let block = if trajectory { Bootstrap::of(n / sharing.max(1), SEED).block } else { 1 };
+    of_blocks(k, n, block * sharing.max(1), 0.95)
 }
 
 /// The 95 % interval of the median: the quantiles at the ends of the interval of one half.
@@ -84,6 +99,16 @@ pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Four trials over the same 320 frames say no more than 320 frames.
+    ///
+    /// Seen to fail where all attempts count.
+    #[test]
+    fn shared_frames_count_once() {
+        assert_eq!(interval_of_shared(false, 4, 320, 1280), clopper_pearson(80, 320, 0.95));
+        assert_eq!(interval_of_shared(true, 1, 30, 100), interval_of_counts(true, 30, 100));
+        assert_eq!(interval_of_shared(true, 2, 60, 200), interval_of_counts(true, 30, 100));
+    }
 
     #[test]
     fn a_median_lies_within_its_interval() {

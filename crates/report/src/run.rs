@@ -10,7 +10,7 @@ use hmac_sha256::Hash as Sha256;
 use rayon::prelude::*;
 use seafix_evaluation::lever_arm_error;
 use seafix_log::{
-    DISPLACED_SUFFIX, FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader,
+    FrameRecord, LogError, Outcome, Reader, Region, SharedStages, TargetRecord, Totals, TrialHeader, displaced_object,
     unchanged,
 };
 
@@ -264,7 +264,7 @@ impl Trial {
                     displaced: record
                         .events
                         .iter()
-                        .filter(|event| event.ends_with(DISPLACED_SUFFIX))
+                        .filter(|event| displaced_object(event).is_some())
                         .cloned()
                         .collect(),
                     step,

@@ -3,6 +3,7 @@
 //! A failed trial has no error; in comparisons its error is infinite. All functions except means depend on ranks only,
 //! so that no failure is averaged away.
 
+mod block_length;
 mod bootstrap;
 mod clustered;
 mod holm;
@@ -12,6 +13,7 @@ mod rate;
 mod recall;
 mod wilcoxon;
 
+pub use block_length::block_length;
 pub use bootstrap::Bootstrap;
 pub use clustered::{clustered, of_blocks};
 pub use holm::holm;

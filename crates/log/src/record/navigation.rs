@@ -5,9 +5,6 @@ use super::{
     mirror::mirror,
 };
 
-/// The end of the event of a displaced object, after the distance.
-pub const DISPLACED_SUFFIX: &str = "m from its place in the survey";
-
 /// The state of the navigation after a frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NavigationRecord {

@@ -5,6 +5,7 @@ use crate::{
     format,
     navigation_quantity::NavigationQuantity,
     number::{Key, Number},
+    paired,
     points_of_interest::PoiQuantity,
     proportion,
     run::{AttemptRow, Trial},
@@ -104,8 +105,9 @@ pub(crate) fn pooled_count(trials: &[&Trial], group: &str, n: usize) -> Number {
 /// The fraction of `group` among the attempts of several trials (%), and the ends of its 95 % interval.
 pub(crate) fn pooled_rate(trials: &[&Trial], group: &str, (k, n): (usize, usize)) -> [Number; 3] {
     let trajectory = trials.iter().any(|trial| proportion::is_trajectory(&trial.header));
-    let (low, high) = if !trajectory || trials.iter().any(|trial| trial.every() > 1) {
-        proportion::interval_of_counts(trajectory, k, n)
+    let sharing = if trials.len() > 1 { paired::sharing(trials.iter().map(|trial| &trial.header)) } else { 1 };
+    let (low, high) = if sharing > 1 || !trajectory || trials.iter().any(|trial| trial.every() > 1) {
+        proportion::interval_of_shared(trajectory, sharing, k, n)
     } else {
         let attempts = trials.iter().flat_map(|trial| trial.attempts());
         proportion::interval(true, &attempts.map(|(_, row)| is_of(row, group)).collect::<Vec<bool>>())
@@ -160,8 +162,21 @@ pub(crate) fn navigated(
     value: Option<f64>,
     (unit, decimals): (Unit, usize),
 ) -> Number {
+    navigated_over(trial, trial.span(), name, quantity, value, (unit, decimals))
+}
+
+/// A statistic of a navigated quantity over the frames of a part of a trial, from its first to its last stamp (ns).
+pub(crate) fn navigated_over(
+    trial: &Trial,
+    span: [u64; 2],
+    name: &str,
+    quantity: NavigationQuantity,
+    value: Option<f64>,
+    (unit, decimals): (Unit, usize),
+) -> Number {
     let what = format!("{name} {} of navigated{}", quantity.name(), unit.suffix());
-    Number::new(value.map(|value| value * unit.scale()), decimals, Key::of(trial, "/referencing/frame", what))
+    let key = Key { span, ..Key::of(trial, "/referencing/frame", what) };
+    Number::new(value.map(|value| value * unit.scale()), decimals, key)
 }
 
 /// A statistic of a point of interest over the frames that have it in view.

@@ -12,9 +12,10 @@ use crate::{
     lever::ARMS,
     navigation_quantity::{Counted, NavigationQuantity},
     number::Key,
-    paired::Statistics,
+    paired::{self, Statistics},
     points_of_interest::{self, PoiQuantity},
     proportion::{self, BORNE},
+    rms,
     verify::logs::{Log, Logs, Row, Seen},
 };
 
@@ -105,6 +106,13 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let counted = Counted::ALL.into_iter().find(|counted| counted.name() == group)?;
             Some(log.sample(span).filter_map(|f| f.navigation.as_deref()).filter(|n| counted.holds(n)).count() as f64)
         }
+        (_, group) if group.ends_with(" with one target") || group.ends_with(" with several targets") => {
+            let several = group.ends_with(" several targets");
+            let own =
+                log.sample(span).filter(|frame| if several { frame.rows.len() > 1 } else { frame.rows.len() == 1 });
+            let events: Vec<bool> = own.map(|frame| frame.rows.iter().any(|row| found(&row.record))).collect();
+            end_of(first, log, &events)
+        }
         ("count", group) if group.ends_with(" targets") => {
             let (which, size) = group.strip_suffix(" targets")?.split_once(" with ")?;
             let size: usize = size.parse().ok()?;
@@ -123,14 +131,21 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             let sum = |field: Field| own().filter_map(|row| field.of(&row.record)).sum::<f64>();
             Some(sum(above) / sum(below))
         }
-        ("rms", of) if of.ends_with(" of navigated") => {
+        ("rms" | "rms-low" | "rms-high", of) if of.ends_with(" of navigated") => {
             let quantity = NavigationQuantity::named(of.strip_suffix(" of navigated")?)?;
-            let values = log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?));
-            let (n, sum) = values.fold((0, 0.0), |(n, sum), v| (n + 1, sum + v * v));
-            (n > 0).then(|| (sum / f64::from(n)).sqrt() * scale)
+            let values: Vec<f64> = log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?)).collect();
+            let n = values.len();
+            let value = match first {
+                "rms-low" => rms::over_frames(&values).map(|ends| ends.0),
+                "rms-high" => rms::over_frames(&values).map(|ends| ends.1),
+                _ => (n > 0).then(|| (values.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt()),
+            };
+            value.map(|value| value * scale)
         }
-        ("rms" | "bound" | "ratio" | "within", of) => totals(first, of, log)?.map(|value| value * scale),
-        ("mean", "nees of judged") => totals(first, rest, log)?,
+        ("rms" | "bound" | "ratio" | "ratio-low" | "ratio-high" | "within", of) => {
+            totals(first, of, span, log)?.map(|value| value * scale)
+        }
+        ("mean", "nees of judged") => totals(first, rest, span, log)?,
         ("value", of) => single(of, span, log)?.map(|value| value * scale),
         (place, of) if place.starts_with("place-") => located(place, of, span, log)?,
         ("area", of) => {
@@ -165,13 +180,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
                 }
                 None => log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect(),
             };
-            let trajectory = proportion::is_trajectory(&log.header);
-            let value = match name {
-                "median-low" => proportion::median_interval(trajectory, &mut { values }).map(|ends| ends.0),
-                "median-high" => proportion::median_interval(trajectory, &mut { values }).map(|ends| ends.1),
-                _ => statistic(name, values)?,
-            };
-            value.map(|value| value * scale)
+            of_median(name, log, values)?.map(|value| value * scale)
         }
     })
 }
@@ -183,7 +192,7 @@ fn poi(name: &str, quantity: &str, point: &str, span: [u64; 2], log: &Log) -> Op
         return Some(Some(own.count() as f64));
     }
     let quantity = PoiQuantity::named(quantity)?;
-    statistic(name, own.filter_map(|seen| quantity.of(seen)).collect())
+    of_median(name, log, own.filter_map(|seen| quantity.of(seen)).collect())
 }
 
 /// The value of `count GROUP on the object NAME` or `NAME FIELD of found on the object NAME`.
@@ -195,11 +204,36 @@ fn on_object(name: &str, of: &str, object: &str, span: [u64; 2], log: &Log) -> O
         "wrong" => |row| row.outcome == Outcome::Fix && !found(row),
         _ => found,
     };
-    if name == "count" {
-        return Some(Some(own().filter(|row| is(&row.record)).count() as f64));
+    match name {
+        "count" => return Some(Some(own().filter(|row| is(&row.record)).count() as f64)),
+        "percent" | "low" | "high" => {
+            return Some(end_of(name, log, &own().map(|row| is(&row.record)).collect::<Vec<bool>>()));
+        }
+        _ => {}
     }
     let field = Field::named(of.strip_suffix(" of found")?)?;
-    statistic(name, own().filter(|row| found(&row.record)).filter_map(|row| value(row, field)).collect())
+    of_median(name, log, own().filter(|row| found(&row.record)).filter_map(|row| value(row, field)).collect())
+}
+
+/// The number of events, their fraction (%), or an end of its interval; `None` for a fraction of none.
+fn end_of(which: &str, log: &Log, events: &[bool]) -> Option<f64> {
+    let rate = proportion::rate(proportion::is_trajectory(&log.header), events);
+    match which {
+        "count" => Some(events.len() as f64),
+        "percent" => rate.map(|rate| rate[0]),
+        "low" => rate.map(|rate| rate[1]),
+        _ => rate.map(|rate| rate[2]),
+    }
+}
+
+/// A statistic of values, or an end of the interval of their median.
+fn of_median(name: &str, log: &Log, mut values: Vec<f64>) -> Option<Option<f64>> {
+    let interval = |values: &mut [f64]| proportion::median_interval(proportion::is_trajectory(&log.header), values);
+    match name {
+        "median-low" => Some(interval(&mut values).map(|ends| ends.0)),
+        "median-high" => Some(interval(&mut values).map(|ends| ends.1)),
+        _ => statistic(name, values),
+    }
 }
 
 fn value(row: &Row, field: Field) -> Option<f64> {
@@ -226,6 +260,10 @@ fn toothed(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
         "path-length" => Some(sum(|fix_interval| fix_interval.path_length)),
         "drift-per-metre" => {
             Some(drift / sum(|fix_interval| fix_interval.path_length)).filter(|drift| drift.is_finite())
+        }
+        "smallest-drift-per-metre" | "largest-drift-per-metre" => {
+            let each = fix_intervals.iter().map(|fix_interval| fix_interval.drift / fix_interval.path_length);
+            each.filter(|drift| drift.is_finite()).reduce(if of.starts_with("smallest") { f64::min } else { f64::max })
         }
         "drift-per-second" => Some(drift / sum(|fix_interval| fix_interval.seconds)).filter(|drift| drift.is_finite()),
         _ => {
@@ -361,6 +399,7 @@ fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Lo
     let group = fixes.or_else(|| group.strip_suffix(" of attempted"))?;
     let all = || logs.iter().flat_map(|log| rows(log, span));
     let trajectory = logs.iter().any(|log| proportion::is_trajectory(&log.header));
+    let sharing = if logs.len() > 1 { paired::sharing(logs.iter().map(|log| &log.header)) } else { 1 };
     let thinned = logs.iter().any(|log| log.totals.as_ref().is_some_and(|totals| totals.every > 1));
     let known = |events: Vec<bool>| {
         let percent = 100.0 * events.iter().filter(|event| **event).count() as f64 / events.len() as f64;
@@ -385,7 +424,7 @@ fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Lo
         }
         return Some(known(errors.into_iter().map(|error| error <= bound).collect()));
     }
-    if which != "percent" && trajectory && !thinned {
+    if which != "percent" && trajectory && !thinned && sharing == 1 {
         let region = Region::ALL.into_iter().find(|region| region.name() == group);
         let is = |row: &TargetRecord| match (group, region) {
             ("found", _) => found(row),
@@ -396,7 +435,7 @@ fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], logs: &[&Lo
         return Some(known(all().map(|row| is(&row.record)).collect()));
     }
     let (k, n) = (pooled(logs, group, span)?, pooled(logs, "attempted", span)?);
-    let (low, high) = proportion::interval_of_counts(trajectory, k, n);
+    let (low, high) = proportion::interval_of_shared(trajectory, sharing, k, n);
     let value = match which {
         "percent" => 100.0 * k as f64 / n as f64,
         "low" => 100.0 * low,
@@ -418,7 +457,7 @@ fn histogram(which: &str, range: &str, span: [u64; 2], logs: &[&Log]) -> Option<
 }
 
 /// RMS errors, bounds and NEES over all frames, logged or not.
-fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
+fn totals(which: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
     let totals = log.totals.as_ref()?;
     let rms = |squares: f64| (squares / totals.judged as f64).sqrt();
     let [tre, tre_crlb, position, position_crlb] =
@@ -431,6 +470,15 @@ fn totals(which: &str, of: &str, log: &Log) -> Option<Option<f64>> {
         ("bound", "position_crlb") => position_crlb,
         ("ratio", "tre_rms") => tre / tre_crlb,
         ("ratio", "position_error") => position / position_crlb,
+        ("ratio-low" | "ratio-high", "position_error") => {
+            let fixes = log.sample(span).flat_map(|frame| &frame.rows).filter(|row| row.record.outcome == Outcome::Fix);
+            let errors: Vec<f64> = fixes.filter_map(|row| Field::Position.of(&row.record)).collect();
+            let trajectory = proportion::is_trajectory(&log.header);
+            let Some((low, high)) = rms::over_fixes(position, totals.judged, trajectory, &errors) else {
+                return Some(None);
+            };
+            (if which == "ratio-low" { low } else { high }) / position_crlb
+        }
         ("mean", "nees") => totals.nees_sum / nees,
         ("within", "nees") => totals.nees_within as f64 / nees,
         _ => return None,

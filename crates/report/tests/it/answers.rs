@@ -24,7 +24,7 @@ fn trial(folder: &Path, index: usize, axes: [(&str, &str); 2], question: &str, r
 }
 
 /// The text of the report's first page after the question; its numbers are verified.
-fn page(folder: &Path) -> String {
+pub(crate) fn page(folder: &Path) -> String {
     let out = folder.join("report");
     report(folder, &out, Forms::ALL).unwrap();
     assert!(verify(folder, &out).unwrap().holds());
@@ -67,6 +67,8 @@ fn methods_that_tolerate_the_same_have_one_clause() {
 }
 
 /// A question about limits of acceptance has the fixes and the wrong ones at each limit.
+///
+/// 40 attempts of a trajectory count as ten blocks of four: no event in ten has the interval [0, 30.8] %.
 #[test]
 fn every_limit_of_acceptance_has_its_fixes() {
     let folder = tempfile::tempdir().unwrap();
@@ -78,10 +80,48 @@ fn every_limit_of_acceptance_has_its_fixes() {
     let page = page(folder.path());
     let place = page.find("At the limit strict, 0.0 % [").unwrap_or_else(|| panic!("{page}"));
     let answer = &page[place..place + 300];
-    assert!(
-        answer.contains("] of 40 attempts have a fix, and 0 of the fixes are wrong; at the limit 0.5, 100.0 % ["),
-        "{answer}"
-    );
+    let expected = "At the limit strict, 0.0 % [0.0, 30.8] of 40 attempts have a fix and 0.0 % [0.0, 30.8] a wrong one; at \
+                    the limit 0.5, 100.0 % [69.2, 100.0] of 40 attempts have a fix and 0.0 % [0.0, 30.8] a wrong one; only \
+                    the rates of fixes differ between strict and 0.5.";
+    assert!(answer.contains(expected), "{answer}");
+    // The table has a line for each limit, with the rate of wrong fixes.
+    assert!(page.contains("wrong (%)") && !page.contains("kabsch 80"), "{page}");
     // A count of none is a word.
     assert!(page.contains(" of 40 pairs only ") && page.contains("has a fix, in none only "), "{page}");
+}
+
+/// Along an axis, errors of several series are those at the same values, and values without a fix are named.
+///
+/// Seen to fail where each series has its own ends.
+#[test]
+fn errors_of_series_are_at_the_same_values() {
+    let folder = tempfile::tempdir().unwrap();
+    let question = "How accurate is a fix from 2 to 4 m?";
+    let mut index = 0;
+    for (solver, rejected) in [("triad", [0, 0, 40]), ("kabsch", [0, 0, 0])] {
+        for (altitude, rejected) in ["2.0", "3.0", "4.0"].into_iter().zip(rejected) {
+            index += 1;
+            let axes = [("source.altitude", altitude), ("pipeline.solver", solver)];
+            trial(folder.path(), index, axes, question, rejected);
+        }
+    }
+    let page = page(folder.path());
+    let sentence = &page[page.find("With triad, the median").unwrap()..];
+    let sentence = &sentence[..sentence.find(" wrong fixes in ").unwrap()];
+    let (triad, kabsch) = sentence.split_once("; with kabsch, ").unwrap();
+    assert!(triad.contains("] at altitude 3.0 m, with no fix at altitude 4.0 m"), "{triad}");
+    assert!(kabsch.contains("] at altitude 3.0 m; 0") && !kabsch.contains("4.0 m"), "{kabsch}");
+}
+
+/// Twelve of forty attempts against none: the intervals of ten blocks each overlap.
+#[test]
+fn overlapping_ends_are_not_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let question = "How much does a current reduce the rate of fixes?";
+    for (index, (speed, rejected)) in [("0.0", 0), ("0.6", 12)].into_iter().enumerate() {
+        let axes = [("source.speed", speed), ("pipeline.solver", "kabsch")];
+        trial(folder.path(), index + 1, axes, question, rejected);
+    }
+    let page = page(folder.path());
+    assert!(page.contains("at speed 0.6 m/s (not told apart, since the intervals overlap)"), "{page}");
 }

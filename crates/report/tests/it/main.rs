@@ -6,6 +6,7 @@ mod answers;
 mod breakdown;
 mod browser;
 mod compared;
+mod dives;
 mod growth;
 mod harmless;
 mod integrity;

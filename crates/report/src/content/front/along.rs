@@ -1,11 +1,15 @@
 //! The answer along a numeric axis: rates or errors at both ends, or the value up to which fixes succeed.
 
 use super::{
+    company,
     kind::Asked,
-    measured::{Sample, capitalised, error, median, wrong},
+    measured::{Measured, Sample, capitalised, error, median_of, wrong},
 };
 use crate::{
-    content::conditions::{axes, labels::Labels},
+    content::{
+        conditions::{axes, labels::Labels},
+        phrases::Unit,
+    },
     document::{Text, text},
     run::Run,
     summary::RunSummary,
@@ -17,7 +21,7 @@ const LISTED: usize = 3;
 const HALF: f64 = 0.5;
 
 pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &str, asked: Asked) -> Option<Text> {
-    let place = |index: usize| axes::on(&summary.rows[index], key).unwrap_or(f64::INFINITY);
+    let place = |index: usize| place(summary, key, index);
     let mut series: Vec<(String, Vec<usize>)> = labels.series(summary);
     for (_, members) in &mut series {
         members.retain(|&index| summary.rows[index].attempted > 0);
@@ -25,15 +29,26 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
     }
     series.retain(|(_, members)| !members.is_empty());
     let named = series.len() > 1;
+    let (_, _, of) = error(summary);
+    let known = |place: f64, members: &[usize]| {
+        members.iter().any(|&index| self::place(summary, key, index) == place && of(&summary.rows[index]).is_some())
+    };
+    // Errors of several series are stated at the same places, so that they can be compared.
+    let mut common: Vec<f64> = series.iter().flat_map(|(_, members)| members).map(|&index| place(index)).collect();
+    common.sort_by(f64::total_cmp);
+    common.dedup();
+    let everywhere = common.clone();
+    common.retain(|&place| series.iter().all(|(_, members)| known(place, members)));
+    let common = if common.is_empty() { everywhere } else { common };
     let mut message = Text::new();
     for (name, members) in chosen(run, summary, series) {
         let mut clauses = Vec::new();
-        let one = Series { run, summary, labels, key, members: &members };
+        let one = Series { run, summary, labels, key, members: &members, effect: asked.effect };
         if asked.rate {
             clauses.push(if asked.threshold { one.threshold() } else { one.rates() });
         }
         if asked.accuracy {
-            clauses.extend(one.errors());
+            clauses.extend(one.errors(&common));
         }
         if clauses.is_empty() {
             continue;
@@ -51,8 +66,16 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
     if message.is_empty() {
         return None;
     }
+    if asked.company {
+        message.extend(company::clause(run, summary, labels));
+    }
     message.extend(wrong(run, summary));
     Some(capitalised(message))
+}
+
+/// The value of a trial on the axis.
+fn place(summary: &RunSummary, key: &str, index: usize) -> f64 {
+    axes::on(&summary.rows[index], key).unwrap_or(f64::INFINITY)
 }
 
 /// The series that the sentence lists.
@@ -75,6 +98,8 @@ struct Series<'a> {
     labels: &'a Labels,
     key: &'a str,
     members: &'a [usize],
+    /// Whether the ends are compared.
+    effect: bool,
 }
 
 impl Series<'_> {
@@ -102,7 +127,18 @@ impl Series<'_> {
             message.extend(self.sample(index).rate());
             message.push(format!("{} at {}", if place > 0 { "" } else { " of the attempts" }, self.at(index)).into());
         }
+        let ends = Self::ends(self.members);
         message
+            .push(self.compared(&ends.iter().map(|&index| self.sample(index).measured()).collect::<Vec<_>>()).into());
+        message
+    }
+
+    /// The words for two ends that are compared and whose intervals overlap.
+    fn compared(&self, ends: &[Measured]) -> &'static str {
+        match ends {
+            [first, last] if self.effect && !first.differs(last) => " (not told apart, since the intervals overlap)",
+            _ => "",
+        }
     }
 
     /// The largest value up to which at least half of the attempts have a fix at every value.
@@ -126,19 +162,41 @@ impl Series<'_> {
             message.push(format!(" at {at}").into());
         }
         message.push(")".into());
+        message.extend(self.surely(count));
         message
     }
 
-    /// The median errors at both ends of the values with fixes; `None` without fixes.
-    fn errors(&self) -> Option<Text> {
-        let (name, _, of) = error(self.summary);
-        let known: Vec<usize> =
-            self.members.iter().copied().filter(|&index| of(&self.summary.rows[index]).is_some()).collect();
+    /// The words on the lower ends of the intervals, if they fall below one half before the value of `count` does.
+    fn surely(&self, count: usize) -> Option<crate::document::Span> {
+        let sure =
+            |index: &&usize| self.sample(**index).measured().interval().is_some_and(|[low, _]| low >= 100.0 * HALF);
+        let surely = self.members.iter().take_while(sure).count();
+        (surely < count).then(|| match surely.checked_sub(1).map(|last| self.members[last]) {
+            Some(last) => format!(", surely up to {} only (lower end of the interval)", self.at(last)).into(),
+            None => ", though the lower end of the interval is below one half at the smallest value already".into(),
+        })
+    }
+
+    /// The median errors at both ends of the `common` places with fixes, and the places without any; `None` without fixes.
+    fn errors(&self, common: &[f64]) -> Option<Text> {
+        let (name, field, of) = error(self.summary);
+        let (known, unknown): (Vec<usize>, Vec<usize>) =
+            self.members.iter().partition(|&&index| of(&self.summary.rows[index]).is_some());
+        let place = |index: usize| place(self.summary, self.key, index);
+        let shared: Vec<usize> = known.iter().copied().filter(|&index| common.contains(&place(index))).collect();
+        let measured =
+            |index: usize| median_of(self.summary, &self.run.trials[index], (field, of), (Unit::Millimetres, " mm"));
+        let ends = Self::ends(if shared.is_empty() { &known } else { &shared });
         let mut message = text![format!("the median {name} is ")];
-        for (place, index) in Self::ends(&known).into_iter().enumerate() {
-            message.push(if place > 0 { " and ".into() } else { "".into() });
-            message.extend(median(self.summary, &self.run.trials[index]));
+        for (order, &index) in ends.iter().enumerate() {
+            message.push(if order > 0 { " and ".into() } else { "".into() });
+            message.extend(measured(index).text());
             message.push(format!(" at {}", self.at(index)).into());
+        }
+        message.push(self.compared(&ends.iter().map(|&index| measured(index)).collect::<Vec<_>>()).into());
+        if !unknown.is_empty() {
+            let places: Vec<String> = unknown.iter().map(|&index| self.at(index)).collect();
+            message.push(format!(", with no fix at {}", places.join(" and ")).into());
         }
         (!known.is_empty()).then_some(message)
     }

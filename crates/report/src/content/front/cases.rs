@@ -1,12 +1,14 @@
-//! The answer over named cases: the highest and the lowest rate of fixes, the smallest and the largest error.
+//! The answer over named cases: rates of fixes and errors, with the differences that their intervals show.
 
 use super::{
     kind::Asked,
-    measured::{Sample, capitalised, error, median, wrong},
+    measured::{DistributionOf, Sample, capitalised, error, median_of, wrong},
+    ranking::{Case, Words, clause, decreasing, of_attempts},
 };
 use crate::{
-    content::conditions::labels::Labels,
+    content::{conditions::labels::Labels, phrases::Unit},
     document::{Text, text},
+    field::Field,
     run::Run,
     summary::RunSummary,
 };
@@ -16,10 +18,22 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, asked: 
     series.retain(|(_, members)| members.iter().any(|&index| summary.rows[index].attempted > 0));
     let mut clauses = Vec::new();
     if asked.rate {
-        clauses.push(rates(run, summary, &series)?);
+        clauses.push(rates(run, summary, &series, asked)?);
+    }
+    if asked.points {
+        let quantity = (Field::Identified, (|row| row.identified) as DistributionOf);
+        let name = "median number of identified points of a fix";
+        clauses.extend(medians(run, summary, &series, (name, quantity, MORE), (Unit::Plain, "")));
     }
     if asked.accuracy {
-        clauses.extend(errors(run, summary, &series));
+        let (name, field, of) = error(summary);
+        let name = format!("median {name}");
+        clauses.extend(medians(run, summary, &series, (&name, (field, of), FEWER), (Unit::Millimetres, " mm")));
+    }
+    if asked.residuals {
+        let quantity = (Field::Fit, (|row| row.fit) as DistributionOf);
+        let name = "median residual of the points (fit RMS)";
+        clauses.extend(medians(run, summary, &series, (name, quantity, FEWER), (Unit::Millimetres, " mm")));
     }
     let mut message = Text::new();
     for (index, clause) in clauses.into_iter().enumerate() {
@@ -34,71 +48,80 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, asked: 
     Some(capitalised(message))
 }
 
+/// The adjectives of a quantity that is better if it is larger.
+const MORE: [&str; 3] = ["highest", "lowest", "lower"];
+/// The adjectives of an error.
+const FEWER: [&str; 3] = ["smallest", "largest", "larger"];
+
+/// The words of a ranking.
+fn words<'a>(quantity: &'a str, [best, worst, worse]: [&'static str; 3]) -> Words<'a> {
+    Words { quantity, best, worst, worse }
+}
+
 /// The clause on the rates; `None` without attempts.
-fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)]) -> Option<Text> {
+fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)], asked: Asked) -> Option<Text> {
     let samples: Vec<(&str, Sample<'_>)> =
         series.iter().map(|(name, members)| (name.as_str(), Sample::of(run, summary, members))).collect();
-    let fractions = || samples.iter().map(|(_, sample)| sample.fraction());
-    let (high, low) = (fractions().reduce(f64::max)?, fractions().reduce(f64::min)?);
-    let first = |fraction: f64| samples.iter().find(|(_, sample)| sample.fraction() == fraction);
-    let (_, best) = first(high)?;
-    if samples.len() == 1 {
-        let mut message = text!["fixes succeed in "];
-        message.extend(best.rate());
-        message.extend(text![" of ", best.n(), " attempts"]);
-        return Some(message);
-    }
-    if high == low {
-        let mut message = text![format!("all {} cases have the same rate of fixes, ", samples.len())];
-        message.extend(best.rate());
-        message.extend(text![" of ", best.n(), " attempts each"]);
-        return Some(message);
-    }
-    let (_, worst) = first(low)?;
-    let names = |fraction: f64| {
-        let own: Vec<String> =
-            samples.iter().filter(|(_, sample)| sample.fraction() == fraction).map(|(name, _)| quoted(name)).collect();
-        match &own[..] {
-            [] => String::new(),
-            [one] => format!("that of {one}"),
-            // As many as one reads at a glance.
-            [first @ .., last] if own.len() <= 4 => format!("that of {} and of {last}", first.join(", of ")),
-            [one, ..] => format!("that of {one} and {} others", own.len() - 1),
-        }
+    let of = |(name, sample): &(&str, Sample<'_>)| Case {
+        name: (*name).to_owned(),
+        value: sample.measured(),
+        tail: of_attempts(sample.n()),
     };
-    let mut message = text!["the highest rate of fixes, "];
-    message.extend(best.rate());
-    message.extend(text![" of ", best.n(), format!(" attempts, is {}, and the lowest, ", names(high))]);
-    message.extend(worst.rate());
-    message.extend(text![" of ", worst.n(), format!(", {}", names(low))]);
+    let suffices = samples.iter().all(|(_, sample)| sample.found > 0 && sample.wrong == 0);
+    let mut message = text![match (asked.suffices, suffices) {
+        (true, true) if samples.len() > 1 => "yes, every case has fixes and no wrong one; ",
+        (true, true) => "yes: ",
+        (true, false) => "no, not in every case: ",
+        (false, _) => "",
+    }];
+    match &samples[..] {
+        [] => return None,
+        [(_, one)] => {
+            message.push("fixes succeed in ".into());
+            message.extend(one.rate());
+            message.extend(of_attempts(one.n()));
+        }
+        all => {
+            let cases = decreasing(all.iter().map(of).collect());
+            message.extend(clause(&cases, &words("rate of fixes", MORE)));
+        }
+    }
     Some(message)
 }
 
-/// A name in a sentence: one of several words in quotation marks, so that it is read as one.
-fn quoted(name: &str) -> String {
-    if name.contains(' ') { format!("“{name}”") } else { name.to_owned() }
-}
+/// A quantity of the fixes with its name and the adjectives of its ranking.
+type Ranked<'a> = (&'a str, (Field, DistributionOf), [&'static str; 3]);
 
-/// The clause on the median errors of cases of one trial each; `None` without fixes.
-fn errors(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)]) -> Option<Text> {
-    let (name, _, of) = error(summary);
+/// The clause on the medians of a quantity over cases of one trial each; `None` without fixes.
+fn medians(
+    run: &Run,
+    summary: &RunSummary,
+    series: &[(String, Vec<usize>)],
+    (name, (field, of), adjectives): Ranked<'_>,
+    unit: (Unit, &'static str),
+) -> Option<Text> {
     let single = series.iter().filter_map(|(name, members)| match members[..] {
-        [index] => Some((name.as_str(), index, of(&summary.rows[index])?.median)),
+        [index] if of(&summary.rows[index]).is_some() => Some((name.clone(), index)),
         _ => None,
     });
-    let known: Vec<(&str, usize, f64)> = single.collect();
-    let smallest = known.iter().min_by(|a, b| a.2.total_cmp(&b.2))?;
-    let largest = known.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let measured = |index: usize| median(summary, &run.trials[index]);
-    if known.len() == 1 {
-        let mut message = text![format!("the median {name} is ")];
-        message.extend(measured(smallest.1));
+    let measured = single.map(|(name, index)| Case {
+        name,
+        value: median_of(summary, &run.trials[index], (field, of), unit),
+        tail: Text::new(),
+    });
+    let mut cases: Vec<Case> = measured.collect();
+    // A value without an interval differs from none.
+    if cases.iter().filter(|case| case.value.interval().is_some()).count() > 1 {
+        cases.retain(|case| case.value.interval().is_some());
+    }
+    let mut cases = decreasing(cases);
+    if adjectives == FEWER {
+        cases.reverse();
+    }
+    if let [one] = &cases[..] {
+        let mut message = text![format!("the {name} is ")];
+        message.extend(one.value.text());
         return Some(message);
     }
-    let mut message = text![format!("the median {name} ranges from ")];
-    message.extend(measured(smallest.1));
-    message.push(format!(" ({}) to ", smallest.0).into());
-    message.extend(measured(largest.1));
-    message.push(format!(" ({})", largest.0).into());
-    Some(message)
+    (!cases.is_empty()).then(|| clause(&cases, &words(name, adjectives)))
 }

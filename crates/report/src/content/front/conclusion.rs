@@ -1,7 +1,7 @@
 //! The conclusion of the first page and its limits.
 
 use crate::{
-    content::sections::significance,
+    content::sections::{navigation, significance},
     document::{Text, bold, text},
     format::counted,
     paired::Comparison,
@@ -37,13 +37,18 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
         0 => ", and every frame has another object".to_owned(),
         targets => format!(", of one site with {}", counted(targets, "target", "targets")),
     };
+    let dives = if run.trials.iter().any(navigation::navigates) {
+        "Each trial is one dive: the intervals of its errors are over blocks of its frames, not over other dives. "
+    } else {
+        ""
+    };
     let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
     let successive = headers().any(proportion::is_trajectory);
     let bound = 100.0 * proportion::interval_of_counts(successive, 0, min).1;
     // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
     let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
     format!(
-        "{data}{site}. The smallest trial has {}{}: without a wrong fix among them, the rate of wrong fixes may still be \
+        "{data}{site}. {dives}The smallest trial has {}{}: without a wrong fix among them, the rate of wrong fixes may still be \
          {bound:.digits$} % (upper end of the 95 % interval). The section on threats to validity lists all limits.",
         counted(min, "attempt", "attempts"),
         if successive { ", which successive frames make dependent" } else { "" }

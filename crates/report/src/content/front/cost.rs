@@ -1,6 +1,6 @@
 //! The answer about the cost of searches: pair tests at the ends of the problem size.
 
-use super::measured::capitalised;
+use super::measured::{Measured, capitalised};
 use crate::{
     content::{
         conditions::{axes, labels::Labels},
@@ -8,7 +8,7 @@ use crate::{
     },
     document::{Text, text},
     field::Field,
-    number::Number,
+    proportion,
     run::{Run, Trial},
     summary::RunSummary,
 };
@@ -19,7 +19,7 @@ use crate::{
 pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
     let key = labels.along.as_ref()?;
     let place = |index: usize| axes::on(&summary.rows[index], key).unwrap_or(f64::INFINITY);
-    let tests = |index: usize| statistic(&run.trials[index], "median", Field::Tests);
+    let tests = |index: usize| median(&run.trials[index], Field::Tests).number();
     let mut known: Vec<(String, usize, usize)> = Vec::new();
     for (name, mut members) in labels.series(summary) {
         members.retain(|&index| tests(index).value.is_some_and(|tests| tests > 0.0));
@@ -36,7 +36,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     let dearest = if known.len() > 1 { known.pop() } else { None };
     let cheapest = known.into_iter().next();
     let (_, first, last) = cheapest.as_ref()?;
-    let candidates = |index: usize| statistic(&run.trials[index], "median", Field::Candidates);
+    let candidates = |index: usize| median(&run.trials[index], Field::Candidates).number();
     let mut message = text![
         "from a median of ",
         candidates(*first),
@@ -46,14 +46,10 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     ];
     for (index, (name, first, last)) in cheapest.into_iter().chain(dearest).enumerate() {
         message.push(format!("{}from ", if index > 0 { ", and " } else { "" }).into());
-        message.extend(text![tests(first), " to ", tests(last)]);
-        message.extend(text![
-            " (5 % to 95 % of the attempts: ",
-            statistic(&run.trials[last], "q5", Field::Tests),
-            " to ",
-            statistic(&run.trials[last], "q95", Field::Tests),
-            format!(") with {name}")
-        ]);
+        message.extend(median(&run.trials[first], Field::Tests).text());
+        message.push(" to ".into());
+        message.extend(median(&run.trials[last], Field::Tests).text());
+        message.push(format!(" with {name}").into());
     }
     for (name, _, last) in &without {
         message.extend(text![format!("; {name} has no fix there after "), tests(*last), " pair tests"]);
@@ -61,14 +57,12 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     Some(capitalised(message))
 }
 
-/// A statistic of a count over all attempts of a trial.
-fn statistic(trial: &Trial, name: &str, field: Field) -> Number {
+/// The median of a count over all attempts of a trial.
+fn median(trial: &Trial, field: Field) -> Measured {
     let mut values: Vec<f64> = trial.attempts().filter_map(|(_, row)| row.get(field)).collect();
-    let p = match name {
-        "median" => 0.5,
-        "q5" => 0.05,
-        _ => 0.95,
-    };
-    let value = (!values.is_empty()).then(|| seafix_evaluation::quantile(&mut values, p));
-    phrases::statistic(trial, name, field, "attempted", value, (Unit::Plain, 0))
+    let interval = proportion::median_interval(proportion::is_trajectory(&trial.header), &mut values);
+    let median = interval.map(|_| seafix_evaluation::quantile(&mut values, 0.5));
+    let ends = [interval.map(|ends| ends.0), interval.map(|ends| ends.1)];
+    let number = |name, value| phrases::statistic(trial, name, field, "attempted", value, (Unit::Plain, 0));
+    Measured::new([number("median", median), number("median-low", ends[0]), number("median-high", ends[1])], "")
 }

@@ -85,6 +85,20 @@ pub(super) struct Asked {
     pub(super) threshold: bool,
     /// The growth of the error between fixes.
     pub(super) drift: bool,
+    /// The effect of a condition, so that both ends of its axis are compared.
+    pub(super) effect: bool,
+    /// Whether fixes keep an error small.
+    pub(super) bounded: bool,
+    /// How much of an error a method removes.
+    pub(super) removal: bool,
+    /// Whether every case suffices.
+    pub(super) suffices: bool,
+    /// The number of identified points.
+    pub(super) points: bool,
+    /// The residuals of the points.
+    pub(super) residuals: bool,
+    /// Whether several objects in view help.
+    pub(super) company: bool,
 }
 
 impl Asked {
@@ -103,6 +117,13 @@ impl Asked {
             accuracy: accuracy || !rate,
             threshold: phrase(&["up to which", "up to what"]),
             drift: stem(&["drift"]),
+            effect: phrase(&["how much"]) || stem(&["grow", "cost", "reduc"]),
+            bounded: phrase(&["fixes bound", "fixes limit", "fixes reduce"]),
+            removal: stem(&["remov"]),
+            suffices: stem(&["suffic"]),
+            points: phrase(&["how many feature points", "how many points"]),
+            residuals: stem(&["residual"]),
+            company: phrase(&["several objects", "several targets"]),
         }
     }
 }
@@ -124,5 +145,18 @@ mod tests {
             [true, true, true]
         );
         assert_eq!(asked("What happens at night?"), [true, true, false]);
+        let more = |question| {
+            let Asked { effect, bounded, removal, suffices, points, residuals, company, .. } = Asked::of(question);
+            [effect, bounded, removal, suffices, points, residuals, company]
+        };
+        assert_eq!(more("How much does a current reduce the rate?"), [true, false, false, false, false, false, false]);
+        assert_eq!(more("Do fixes bound the error?"), [false, true, false, false, false, false, false]);
+        assert_eq!(more("How much drift do key frames remove?"), [true, false, true, false, false, false, false]);
+        assert_eq!(more("Is the prior sufficient?"), [false, false, false, true, false, false, false]);
+        assert_eq!(
+            more("How many feature points appear in the residuals?"),
+            [false, false, false, false, true, true, false]
+        );
+        assert_eq!(more("Do several objects in view help?"), [false, false, false, false, false, false, true]);
     }
 }

@@ -1,12 +1,73 @@
 //! Measured values with their intervals, as pieces of a sentence.
 
 use crate::{
-    content::phrases::{self, Unit},
+    content::{
+        phrases::{self, Unit},
+        sections::navigation,
+    },
     document::{Text, text},
     field::Field,
+    format::counted,
+    navigation_quantity::NavigationQuantity,
+    number::Number,
     run::{Run, Trial},
     summary::{Distribution, Row, RunSummary},
 };
+
+/// Minimum number of values of a median with an interval: all of five lie on one side of it with probability 2 · 2⁻⁵,
+/// above 5 %.
+const MIN_FIXES: usize = 6;
+
+/// A measured value with its 95 % interval.
+#[derive(Debug, Clone)]
+pub(super) struct Measured {
+    value: Number,
+    /// The ends of the interval; unknown for a value without one.
+    ends: [Number; 2],
+    unit: &'static str,
+    /// The words that stand in place of the interval.
+    without: String,
+}
+
+impl Measured {
+    /// The value with the ends of its interval, in a unit with the space before it, such as ` %`.
+    pub(super) fn new([value, low, high]: [Number; 3], unit: &'static str) -> Self {
+        Self { value, ends: [low, high], unit, without: String::new() }
+    }
+
+    /// The value before rounding, in its unit; NaN where it is unknown.
+    pub(super) fn value(&self) -> f64 {
+        self.value.value.unwrap_or(f64::NAN)
+    }
+
+    /// The value alone.
+    pub(super) fn number(&self) -> Number {
+        self.value.clone()
+    }
+
+    /// The ends of the interval, in its unit; `None` for a value without an interval.
+    pub(super) fn interval(&self) -> Option<[f64; 2]> {
+        Some([self.ends[0].value?, self.ends[1].value?]).filter(|_| self.without.is_empty())
+    }
+
+    /// Whether the intervals are disjoint; a value without an interval differs from none.
+    pub(super) fn differs(&self, other: &Self) -> bool {
+        let [Some(a), Some(b)] = [self, other].map(Self::interval) else { return false };
+        a[1] < b[0] || b[1] < a[0]
+    }
+
+    /// The value with its interval: `76.7 % [66.4, 85.2]`.
+    pub(super) fn text(&self) -> Text {
+        let [low, high] = &self.ends;
+        let mut message = text![self.value.clone(), self.unit];
+        match self.interval() {
+            Some(_) => message.extend(text![" [", low.clone(), ", ", high.clone(), "]"]),
+            None if !self.without.is_empty() => message.push(format!(" ({})", self.without).into()),
+            None => {}
+        }
+        message
+    }
+}
 
 /// The trials at `members` as one sample.
 pub(super) struct Sample<'a> {
@@ -32,10 +93,19 @@ impl<'a> Sample<'a> {
         self.found as f64 / self.attempted.max(1) as f64
     }
 
+    /// The rate of fixes.
+    pub(super) fn measured(&self) -> Measured {
+        Measured::new(phrases::pooled_rate(&self.trials, "found", (self.found, self.attempted)), " %")
+    }
+
+    /// The rate of wrong fixes among the attempts.
+    pub(super) fn wrong_rate(&self) -> Measured {
+        Measured::new(phrases::pooled_rate(&self.trials, "wrong", (self.wrong, self.attempted)), " %")
+    }
+
     /// The rate of fixes with its 95 % interval: `76.7 % [66.4, 85.2]`.
     pub(super) fn rate(&self) -> Text {
-        let [percent, low, high] = phrases::pooled_rate(&self.trials, "found", (self.found, self.attempted));
-        text![percent, " % [", low, ", ", high, "]"]
+        self.measured().text()
     }
 
     /// The number of attempts.
@@ -59,9 +129,25 @@ pub(super) fn error(summary: &RunSummary) -> (&'static str, Field, DistributionO
 /// The median error of a trial with its 95 % interval: `1.2 mm [1.0, 1.5]`.
 pub(super) fn median(summary: &RunSummary, trial: &Trial) -> Text {
     let (_, field, of) = error(summary);
-    let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
-    let [median, low, high] = phrases::median(trial, field, (Unit::Millimetres, digits));
-    text![median, " mm [", low, ", ", high, "]"]
+    median_of(summary, trial, (field, of), (Unit::Millimetres, " mm")).text()
+}
+
+/// The median of a quantity over the fixes of a trial; too few fixes are named in place of an interval.
+pub(super) fn median_of(
+    summary: &RunSummary,
+    trial: &Trial,
+    (field, of): (Field, DistributionOf),
+    (unit, suffix): (Unit, &'static str),
+) -> Measured {
+    let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), unit);
+    let count = trial.attempts().filter(|(_, row)| row.found() && row.get(field).is_some()).count();
+    let without = if count < MIN_FIXES { counted(count, "fix", "fixes") } else { String::new() };
+    Measured { without, ..Measured::new(phrases::median(trial, field, (unit, digits)), suffix) }
+}
+
+/// The root mean square of a navigated error over the frames of a part of a trial.
+pub(super) fn navigated_rms(trial: &Trial, quantity: NavigationQuantity, span: [u64; 2]) -> Measured {
+    Measured::new(navigation::rms(trial, quantity, span), " mm RMS")
 }
 
 /// The clause on the wrong fixes of a run: `; 1 wrong fix in 671 attempts`; empty without ground truth.

@@ -3,8 +3,11 @@
 mod acceptance;
 mod along;
 mod cases;
+mod company;
 mod conclusion;
 mod cost;
+mod diverging;
+mod drifted;
 mod figure;
 mod kind;
 mod limits;
@@ -13,6 +16,7 @@ mod navigated;
 mod objects;
 mod outliers;
 mod points;
+mod ranking;
 mod table;
 mod tolerance;
 

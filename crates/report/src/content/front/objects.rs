@@ -1,6 +1,6 @@
 //! The answer about displaced objects and their neighbours.
 
-use super::measured::{capitalised, wrong};
+use super::measured::{Measured, capitalised, wrong};
 use crate::{
     content::{
         conditions::labels::Labels,
@@ -8,7 +8,6 @@ use crate::{
     },
     document::{Text, text},
     field::Field,
-    number::Number,
     run::{Run, Trial},
     summary::RunSummary,
 };
@@ -21,34 +20,36 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     let (here, there) = (name(summary.rows.len() - 1), name(0));
     let mut message = Text::new();
     for object in &moved {
-        let [attempted, found, ..] = GROUPS.map(|group| objects::count(last, object, group));
-        let [before, had, ..] = GROUPS.map(|group| objects::count(first, object, group));
-        message.extend(text![
-            if message.is_empty() {
-                format!("at {here} the displaced {object} has ")
-            } else {
-                format!("; {object} has ")
-            },
-            found,
-            " fixes in ",
-            attempted,
-            format!(" attempts, at {there} "),
-            had,
-            " in ",
-            before
-        ]);
+        let [now, before] = [last, first].map(|trial| Measured::new(objects::rate(trial, object), " %"));
+        let attempts = |trial| objects::count(trial, object, GROUPS[0]);
+        let answer = match (now.value() > 0.0, now.differs(&before) && now.value() < before.value()) {
+            (false, _) => "no fix",
+            (true, true) => "fixes, but fewer than in its place",
+            (true, false) => "fixes, not shown to be fewer than in its place",
+        };
+        let begin = match (message.is_empty(), now.value() > 0.0) {
+            (true, true) => "yes, ",
+            (true, false) => "no, ",
+            (false, _) => "; ",
+        };
+        message.push(format!("{begin}the displaced {object} gets {answer}: at {here} in ").into());
+        message.extend(now.text());
+        message.extend(text![" of ", attempts(last), format!(" attempts, at {there} in ")]);
+        message.extend(before.text());
+        message.extend(text![" of ", attempts(first)]);
     }
     if message.is_empty() {
         return None;
     }
     if let (Some(now), Some(then)) = (worst_neighbour(last, &moved), worst_neighbour(first, &moved)) {
-        message.extend(text![
-            "; the largest median position error of another object is ",
-            now,
-            format!(" mm at {here} and "),
-            then,
-            format!(" mm at {there}")
-        ]);
+        let misled = now.differs(&then) && now.value() > then.value();
+        let answer =
+            if misled { "its neighbours are less accurate" } else { "that it misleads its neighbours is not shown" };
+        message.push(format!("; {answer}: their largest median position error is ").into());
+        message.extend(now.text());
+        message.push(format!(" at {here} and ").into());
+        message.extend(then.text());
+        message.push(format!(" at {there}").into());
     }
     message.extend(wrong(run, summary));
     Some(capitalised(message))
@@ -63,11 +64,8 @@ fn displaced(trial: &Trial) -> Vec<String> {
 }
 
 /// The largest median position error among the objects that were not displaced.
-fn worst_neighbour(trial: &Trial, moved: &[String]) -> Option<Number> {
+fn worst_neighbour(trial: &Trial, moved: &[String]) -> Option<Measured> {
     let others = objects::objects(trial).into_iter().filter(|object| !moved.contains(object));
-    let errors = others.map(|object| objects::error(trial, &object, "median", Field::Position));
-    errors.filter(|error| error.value.is_some()).max_by(|a, b| {
-        let value = |number: &Number| number.value.unwrap_or(f64::NEG_INFINITY);
-        value(a).total_cmp(&value(b))
-    })
+    let errors = others.map(|object| Measured::new(objects::median(trial, &object, Field::Position), " mm"));
+    errors.filter(|error| error.value().is_finite()).max_by(|a, b| a.value().total_cmp(&b.value()))
 }

@@ -1,14 +1,17 @@
 //! The answer about robust methods: the fraction of wrong pairs that each tolerates.
 
-use super::measured::{capitalised, error, median, wrong};
+use super::{
+    measured::{Sample, capitalised, error, median_of, wrong},
+    ranking::{self, Case, Words},
+};
 use crate::{
     content::{
         conditions::{axes, labels::Labels},
-        phrases,
+        phrases::Unit,
         sections::breakdown::{self, Step},
     },
     document::{Text, text},
-    format::{short, unit},
+    format::{short, trimmed, unit},
     number::Number,
     proportion::BORNE,
     run::Run,
@@ -69,44 +72,51 @@ fn list(names: &[&str]) -> String {
     }
 }
 
-/// The clause on the highest and the lowest rate of fixes at the largest fraction.
+/// The clause on the rates of fixes at the largest fraction.
 fn at_the_largest(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
     let at = summary.rows.iter().filter_map(|row| axes::on(row, key)).reduce(f64::max)?;
-    let rate = |index: usize| summary.rows[index].found as f64 / summary.rows[index].attempted as f64;
-    let mut known: Vec<usize> = (0..summary.rows.len())
-        .filter(|&index| axes::on(&summary.rows[index], key) == Some(at) && summary.rows[index].attempted > 0)
-        .collect();
-    known.sort_by(|&a, &b| rate(b).total_cmp(&rate(a)));
-    let (best, worst) = (*known.first()?, *known.last()?);
-    let percent = |index: usize| {
-        let row = &summary.rows[index];
-        phrases::percent(&run.trials[index], "found", row.found, row.attempted)
-    };
-    let series = |index: usize| labels.of_series(&summary.rows[index]);
-    let mut message = text![format!("; at {} the attempts with a fix are ", labels.place(&summary.rows[best], key))];
-    message.extend(text![percent(best), format!(" % with {}", series(best))]);
-    if rate(worst) < rate(best) {
-        message.extend(text![" and ", percent(worst), format!(" % with {}", series(worst))]);
+    let known = (0..summary.rows.len())
+        .filter(|&index| axes::on(&summary.rows[index], key) == Some(at) && summary.rows[index].attempted > 0);
+    let cases = known.map(|index| Case {
+        name: labels.of_series(&summary.rows[index]),
+        value: Sample::of(run, summary, &[index]).measured(),
+        tail: Text::new(),
+    });
+    let cases = ranking::decreasing(cases.collect());
+    if cases.len() < 2 {
+        return None;
     }
+    let words = Words { quantity: "rate of fixes", best: "highest", worst: "lowest", worse: "lower" };
+    let mut message = text![format!("; at {} ", fraction(&trimmed(at), key))];
+    message.extend(ranking::clause(&cases, &words));
     Some(message)
 }
 
-/// The clause on the smallest and the largest median error at the smallest fraction.
+/// A value of the fraction with its unit: `95 % outliers`.
+fn fraction(value: &str, key: &str) -> String {
+    let unit = unit(key).map_or_else(String::new, |unit| format!(" {unit}"));
+    format!("{value}{unit} {}", short(key))
+}
+
+/// The clause on the median errors at the smallest fraction.
 fn loss(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
-    let (name, _, of) = error(summary);
+    let (name, field, of) = error(summary);
     let values = || summary.rows.iter().filter_map(|row| axes::on(row, key));
     let at = values().reduce(f64::min)?;
-    let mut known: Vec<(usize, f64)> = (0..summary.rows.len())
-        .filter(|&index| axes::on(&summary.rows[index], key) == Some(at))
-        .filter_map(|index| Some((index, of(&summary.rows[index])?.median)))
-        .collect();
-    known.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let (best, worst) = (known.first()?.0, known.last()?.0);
-    let series = |index: usize| labels.of_series(&summary.rows[index]);
-    let mut message = text![format!("; at {} the median {name} is from ", labels.place(&summary.rows[best], key))];
-    message.extend(median(summary, &run.trials[best]));
-    message.push(format!(" ({}) to ", series(best)).into());
-    message.extend(median(summary, &run.trials[worst]));
-    message.push(format!(" ({})", series(worst)).into());
+    let known = (0..summary.rows.len()).filter(|&index| axes::on(&summary.rows[index], key) == Some(at));
+    let cases = known.filter(|&index| of(&summary.rows[index]).is_some()).map(|index| Case {
+        name: labels.of_series(&summary.rows[index]),
+        value: median_of(summary, &run.trials[index], (field, of), (Unit::Millimetres, " mm")),
+        tail: Text::new(),
+    });
+    let mut cases = ranking::decreasing(cases.collect());
+    cases.reverse();
+    if cases.len() < 2 {
+        return None;
+    }
+    let quantity = format!("median {name}");
+    let words = Words { quantity: &quantity, best: "smallest", worst: "largest", worse: "larger" };
+    let mut message = text![format!("; at {} ", fraction(&trimmed(at), key))];
+    message.extend(ranking::clause(&cases, &words));
     Some(message)
 }

@@ -4,7 +4,7 @@ use super::measured::{Sample, capitalised};
 use crate::{
     content::{conditions::axes, figures::tolerance::Identified},
     document::{Text, text},
-    format::{placed, trimmed},
+    format::{placed, trimmed, unit},
     number::{Key, Number},
     run::Run,
     summary::RunSummary,
@@ -23,8 +23,8 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
     }
     let mut message = Text::new();
     for end in ends {
-        let here = all.iter().filter(|(index, _)| at(*index) == end);
-        let (index, identified) = here.max_by(|a, b| a.1.f1().total_cmp(&b.1.f1()))?;
+        let here = || all.iter().filter(|(index, _)| at(*index) == end);
+        let (index, identified) = here().max_by(|a, b| a.1.f1().total_cmp(&b.1.f1()))?;
         let (row, trial) = (&summary.rows[*index], &run.trials[*index]);
         let number = |over: &str, value: f64| {
             let what = format!("sum correct_pairs by {over}");
@@ -35,19 +35,40 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
         let tolerance = axes::on(row, key)?;
         message.extend(text![
             format!(
-                "{}{condition}the best points are those of {} with {}, of precision ",
+                "{}{condition}the points have the largest F1 score with {} and {}, at a precision of ",
                 if message.is_empty() { "" } else { "; " },
                 row.search,
                 placed(key, &trimmed(tolerance))
             ),
             number("identified of fixes", identified.precision),
-            " and recall ",
+            " and a recall of ",
             number("visible", identified.recall),
             ", with fixes in "
         ]);
         let sample = Sample::of(run, summary, &[*index]);
-        message.extend(sample.rate());
+        let best = sample.measured();
+        message.extend(best.text());
         message.extend(text![" of ", sample.n(), " attempts"]);
+        let search = |index: usize| &summary.rows[index].search;
+        let others = here().filter(|(other, _)| other != index && search(*other) == search(*index));
+        let close = others.filter(|(other, _)| !Sample::of(run, summary, &[*other]).measured().differs(&best));
+        let close: Vec<f64> = close.filter_map(|(other, _)| axes::on(&summary.rows[*other], key)).collect();
+        message.extend(not_told_apart(close, key));
     }
     (!message.is_empty()).then(|| capitalised(message))
+}
+
+/// The words on tolerances of the same search whose rates have overlapping intervals; `None` without any.
+fn not_told_apart(mut close: Vec<f64>, key: &str) -> Option<crate::document::Span> {
+    close.sort_by(f64::total_cmp);
+    let unit = unit(key).map_or_else(String::new, |unit| format!(" {unit}"));
+    let [first, .., last] = close[..] else {
+        let one = trimmed(*close.first()?);
+        return Some(format!(", a rate not told apart from that at {one}{unit}").into());
+    };
+    let (first, last) = (trimmed(first), trimmed(last));
+    Some(
+        format!(", a rate not told apart from those of {} other tolerances from {first} to {last}{unit}", close.len())
+            .into(),
+    )
 }

@@ -9,6 +9,7 @@ use crate::{
     format::distinct,
     number::{Key, Number},
     points_of_interest::PoiQuantity,
+    proportion,
     run::{Run, Trial},
     summary::RunSummary,
 };
@@ -102,8 +103,21 @@ pub(crate) fn extremes(trial: &Trial) -> Option<[String; 2]> {
     Some([best.clone(), worst.clone()])
 }
 
+/// The median error at one point of interest (mm), and the ends of its 95 % interval.
+pub(crate) fn median(trial: &Trial, point: &str) -> [Number; 3] {
+    let interval = proportion::median_interval(proportion::is_trajectory(&trial.header), &mut errors(trial, point));
+    // Medians of few tenths of a millimetre need two decimals to differ from the ends of their intervals.
+    let unit = (Unit::Millimetres, 2);
+    let of = |name: &str, value| phrases::poi(trial, name, (PoiQuantity::Error, point), value, unit);
+    [
+        number(trial, point, "median", PoiQuantity::Error, errors(trial, point), unit),
+        of("median-low", interval.map(|ends| ends.0)),
+        of("median-high", interval.map(|ends| ends.1)),
+    ]
+}
+
 /// A statistic of the error at one point of interest (mm).
-pub(crate) fn error(trial: &Trial, point: &str, statistic: &str) -> Number {
+fn error(trial: &Trial, point: &str, statistic: &str) -> Number {
     number(trial, point, statistic, PoiQuantity::Error, errors(trial, point), (Unit::Millimetres, 1))
 }
 

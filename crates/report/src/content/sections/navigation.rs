@@ -1,5 +1,7 @@
 //! The section on navigation: the error of the navigated pose from fix to fix.
 
+use seafix_log::displaced_object;
+
 use crate::{
     content::{
         conditions::columns,
@@ -7,9 +9,10 @@ use crate::{
         phrases::{self, Unit},
     },
     document::{Block, Head, Section, Table, Text, text},
-    fix_intervals::{drift, fix_intervals},
+    fix_intervals::{drift, extreme_drifts, fix_intervals},
     navigation_quantity::{Counted, NavigationQuantity},
     number::{Key, Number},
+    rms,
     run::{Run, Trial},
     summary::RunSummary,
 };
@@ -195,7 +198,7 @@ fn displaced(run: &Run, name: &dyn Fn(usize) -> String) -> Vec<Text> {
         let mut quoted = Vec::new();
         for frame in trial.sample() {
             for event in frame.navigated.iter().flat_map(|navigated| &navigated.displaced) {
-                let object = event.split(" is ").next().unwrap_or(event);
+                let object = displaced_object(event).unwrap_or(event);
                 if !objects.contains(&object) {
                     objects.push(object);
                     quoted.push(format!("at frame {}, “{event}”", frame.number));
@@ -234,18 +237,53 @@ fn count(trial: &Trial, counted: Counted) -> Number {
     Number::count(n, Key::of(trial, "/referencing/frame", format!("count {}", counted.name())))
 }
 
-/// The drift between fixes (mm per metre of path); `None` for fewer than two fix intervals.
-pub(crate) fn drift_per_metre(trial: &Trial) -> Option<Number> {
+/// The drift between fixes (mm per metre of path), its smallest and its largest value over single fix intervals, and the
+/// number of these; `None` for fewer than two fix intervals.
+pub(crate) fn drift_per_metre(trial: &Trial) -> Option<[Number; 4]> {
     let steps = trial.sample().filter_map(|frame| frame.navigated.as_ref()).map(|navigated| navigated.step.as_ref());
     let intervals = fix_intervals(steps);
-    let drift = drift(&intervals, |interval| interval.path_length).filter(|_| intervals.len() > 1)?;
-    let key = Key::of(trial, "/referencing/frame", "intervals drift-per-metre of navigated in mm");
-    Some(Number::new(Some(drift * Unit::Millimetres.scale()), 2, key))
+    let all = drift(&intervals, |interval| interval.path_length).filter(|_| intervals.len() > 1)?;
+    let [smallest, largest] = extreme_drifts(&intervals)?;
+    let number = |what: &str, value: f64, decimals| {
+        let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated"));
+        Number::new(Some(value), decimals, key)
+    };
+    let drift = |what: &str, value: f64| {
+        let key = Key::of(trial, "/referencing/frame", format!("intervals {what} of navigated in mm"));
+        Number::new(Some(value * Unit::Millimetres.scale()), 2, key)
+    };
+    let count = number("count", intervals.len() as f64, 0);
+    Some([
+        drift("drift-per-metre", all),
+        drift("smallest-drift-per-metre", smallest),
+        drift("largest-drift-per-metre", largest),
+        count,
+    ])
+}
+
+/// The root mean square of a quantity over the frames of a part of a trial (mm), with the ends of its 95 % interval.
+pub(crate) fn rms(trial: &Trial, quantity: NavigationQuantity, span: [u64; 2]) -> [Number; 3] {
+    let interval = rms::over_frames(&over(trial, quantity, span));
+    let ends = [("rms-low", interval.map(|ends| ends.0)), ("rms-high", interval.map(|ends| ends.1))];
+    let unit = (Unit::Millimetres, 1);
+    let [low, high] = ends.map(|(name, value)| phrases::navigated_over(trial, span, name, quantity, value, unit));
+    [statistic_over(trial, span, "rms", quantity, Unit::Millimetres), low, high]
+}
+
+/// The values of a quantity from the first to the last stamp of a part of a trial (ns).
+fn over(trial: &Trial, quantity: NavigationQuantity, [from, to]: [u64; 2]) -> Vec<f64> {
+    let frames = trial.sample().filter(|frame| (from..=to).contains(&frame.stamp_ns));
+    frames.filter_map(|frame| frame.navigated.as_ref()?.get(quantity)).collect()
 }
 
 /// A statistic of a quantity over the frames that have it.
 pub(crate) fn statistic(trial: &Trial, name: &str, quantity: NavigationQuantity, unit: Unit) -> Number {
-    let mut values: Vec<f64> = trial.sample().filter_map(|frame| frame.navigated.as_ref()?.get(quantity)).collect();
+    statistic_over(trial, trial.span(), name, quantity, unit)
+}
+
+/// A statistic of a quantity over the frames of a part of a trial that have it.
+fn statistic_over(trial: &Trial, span: [u64; 2], name: &str, quantity: NavigationQuantity, unit: Unit) -> Number {
+    let mut values = over(trial, quantity, span);
     let n = values.len() as f64;
     let value = match name {
         "last" => values.last().copied(),
@@ -256,5 +294,5 @@ pub(crate) fn statistic(trial: &Trial, name: &str, quantity: NavigationQuantity,
         "median" => Some(seafix_evaluation::quantile(&mut values, 0.5)),
         _ => Some(seafix_evaluation::quantile(&mut values, 0.95)),
     };
-    phrases::navigated(trial, name, quantity, value, (unit, 1))
+    phrases::navigated_over(trial, span, name, quantity, value, (unit, 1))
 }

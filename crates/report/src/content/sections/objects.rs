@@ -10,7 +10,8 @@ use crate::{
     document::{Block, Head, Section, Table, Text, text},
     field::Field,
     number::{Key, Number},
-    run::{AttemptRow, Run, Trial},
+    proportion,
+    run::{AttemptRow, Frame, Run, Trial},
     summary::RunSummary,
 };
 
@@ -120,6 +121,47 @@ pub(crate) fn company(run: &Run, name: &dyn Fn(usize) -> String) -> Option<Text>
     }
     message.push(".".into());
     Some(message)
+}
+
+/// The frames with attempts on several objects, or on one.
+pub(crate) fn in_company(trial: &Trial, several: bool) -> impl Iterator<Item = &Frame> {
+    let matches = move |size: usize| if several { size > 1 } else { size == 1 };
+    trial.sample().filter(move |frame| matches(trial.attempts_of(frame).count()))
+}
+
+/// The fraction of frames with a fix among those [`in_company`] (%), the ends of its interval, and their number.
+pub(crate) fn fixed_in_company(trial: &Trial, several: bool) -> ([Number; 3], Number) {
+    let events: Vec<bool> =
+        in_company(trial, several).map(|frame| trial.attempts_of(frame).any(AttemptRow::found)).collect();
+    let group = if several { "several targets" } else { "one target" };
+    let key = |what: &str| Key::of(trial, TOPIC, format!("{what} with {group}"));
+    let rate = with_interval(trial, &events, |what| key(&format!("{what} fixed-frames")));
+    (rate, Number::count(events.len(), key("count frames")))
+}
+
+/// The fraction of events (%), and the ends of its 95 % interval.
+fn with_interval(trial: &Trial, events: &[bool], key: impl Fn(&str) -> Key) -> [Number; 3] {
+    let rate = proportion::rate(proportion::is_trajectory(&trial.header), events);
+    let number = |(place, what): (usize, &str)| Number::new(rate.map(|rate| rate[place]), 1, key(what));
+    [(0, "percent"), (1, "low"), (2, "high")].map(number)
+}
+
+/// The fraction of fixes among the attempts on an object (%), and the ends of its 95 % interval.
+pub(crate) fn rate(trial: &Trial, object: &str) -> [Number; 3] {
+    let events: Vec<bool> = own(trial, object).map(AttemptRow::found).collect();
+    with_interval(trial, &events, |what| Key::of(trial, TOPIC, format!("{what} found on the object {object}")))
+}
+
+/// The median of an error of the fixes on an object (mm), and the ends of its 95 % interval.
+pub(crate) fn median(trial: &Trial, object: &str, field: Field) -> [Number; 3] {
+    let mut values: Vec<f64> = own(trial, object).filter(|row| row.found()).filter_map(|row| row.get(field)).collect();
+    let interval = proportion::median_interval(proportion::is_trajectory(&trial.header), &mut values);
+    let end = |name: &str, value: Option<f64>| {
+        let what = format!("{name} {} of found on the object {object} in mm", field.name());
+        Number::new(value.map(|value| value * Unit::Millimetres.scale()), 1, Key::of(trial, field.topic(), what))
+    };
+    let ends = interval.map_or([None; 2], |(low, high)| [Some(low), Some(high)]);
+    [error(trial, object, "median", field), end("median-low", ends[0]), end("median-high", ends[1])]
 }
 
 /// The searched objects by name.
