@@ -46,37 +46,34 @@ const NORMAL: f64 = 1.959_963_984_540_054;
 mod tests {
     use super::*;
 
-    /// 600 errors of 0 or 2 cm in runs of 20 frames, half of each on the average: the mean square is 2 cm², and that of
-    /// 30 independent runs has a standard error of 2/√30 cm².
+    /// Errors of 0 or 2 cm in a hundred runs of 20 frames: the mean square of 4 p cm² has the standard error of a hundred
+    /// independent runs, 4 √(p (1 − p)/100) cm².
     ///
-    /// Seen to fail with blocks of ⌈n^⅓⌉ frames, whose interval is half as wide.
+    /// Seen to fail with blocks of ⌈n^⅓⌉ frames, whose interval has 0.7 of this width.
     #[test]
     fn runs_of_equal_errors_count_once() {
-        // Fifteen runs of each kind, without a period.
-        let runs: u32 = 0b01_1010_0110_1110_0010_1100_1001_0110;
-        let errors: Vec<f64> = (0..600).map(|i| 0.02 * f64::from(runs >> (i / 20) & 1)).collect();
-        let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / 600.0;
-        assert_eq!(runs.count_ones(), 15);
-        let (low, high) = over_frames(&errors).expect("600 frames have an interval");
-        let half = 1.96 * 2e-4 / 30_f64.sqrt();
-        let [expected_low, expected_high] = [mean_square - half, mean_square + half].map(f64::sqrt);
-        assert!((low - expected_low).abs() < 0.15 * expected_low, "{low} {expected_low}");
-        assert!((high - expected_high).abs() < 0.1 * expected_high, "{high} {expected_high}");
+        let large = |run: u64| (run * run * 40_503 + 12_345) % 65_537 > 32_768;
+        let errors: Vec<f64> = (0..2000).map(|i| if large(i / 20) { 0.02 } else { 0.0 }).collect();
+        let p = (0..100).filter(|run| large(*run)).count() as f64 / 100.0;
+        let (low, high) = over_frames(&errors).expect("2000 frames have an interval");
+        let half = 0.5 * (high * high - low * low);
+        let expected = 1.96 * 4e-4 * (p * (1.0 - p) / 100.0).sqrt();
+        assert!((half / expected - 1.0).abs() < 0.15, "{half} {expected}");
+        assert!(low * low < 4e-4 * p && 4e-4 * p < high * high, "{low} {high}");
         assert_eq!(over_frames(&[0.01; 9]), None);
         let (low, high) = over_frames(&[0.01; 20]).expect("20 frames have an interval");
         assert!((low - 0.01).abs() < 1e-12 && (high - 0.01).abs() < 1e-12, "{low} {high}");
     }
 
-    /// Normal errors of one axis: squares of mean 1 and variance 2.
+    /// Errors of 1 and 2 in turn: the squares have mean 5/2 and standard deviation 3/2.
     ///
     /// Seen to fail where the errors take the place of their squares.
     #[test]
     fn independent_fixes_have_the_interval_of_a_mean_square() {
-        // ±√3 and 0 with probabilities 1/6, 1/6 and 2/3 have the first five moments of a normal distribution.
-        let errors: Vec<f64> = (0..600).map(|i| [3_f64.sqrt(), -(3_f64.sqrt()), 0.0, 0.0, 0.0, 0.0][i % 6]).collect();
+        let errors: Vec<f64> = (0..1000).map(|i| f64::from(i % 2 + 1)).collect();
         let (low, high) = over_fixes(1.0, 10_000, false, &errors).expect("there are fixes");
-        let half = 1.959_963_984_540_054 * 2_f64.sqrt() / 100.0;
-        assert!((low - (1.0 - half).sqrt()).abs() < 1e-4 && (high - (1.0 + half).sqrt()).abs() < 1e-4, "{low} {high}");
+        let half = 1.96 * 0.6 / 100.0_f64;
+        assert!((low - (1.0 - half).sqrt()).abs() < 1e-5 && (high - (1.0 + half).sqrt()).abs() < 1e-5, "{low} {high}");
         let wider = over_fixes(1.0, 10_000, true, &errors).expect("there are fixes");
         assert!(wider.0 < low && high < wider.1, "successive frames say less");
         assert_eq!(over_fixes(1.0, 1, false, &[1.0]), None);

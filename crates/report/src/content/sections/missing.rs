@@ -21,13 +21,14 @@ pub(crate) fn sentence(trial: &Trial, frame: &Frame, row: &AttemptRow) -> Text {
     let value = |field, unit, digits| phrases::value(trial, place, field, row.get(field), (unit, digits));
     let count = |field| value(field, Unit::Plain, 0);
     let known = |field| row.get(field).is_some();
-    let mut message = text![if row.wrong() { "wrong fix of " } else { "fix of " }, count(Field::Identified)];
+    // Edges alone may give a fix.
+    let by_edges = row.get(Field::Identified) == Some(0.0);
+    let mut message = text![if row.wrong() { "wrong fix" } else { "fix" }];
+    message.extend(if by_edges { text![" by edges alone"] } else { text![" of ", count(Field::Identified), " points"] });
     if known(Field::Visible) {
-        message.extend(text![" points, ", count(Field::Visible), " in view"]);
-    } else {
-        message.push(" points".into());
+        message.extend(text![", ", count(Field::Visible), if by_edges { " points in view" } else { " in view" }]);
     }
-    if known(Field::Correct) {
+    if known(Field::Correct) && !by_edges {
         message.extend(text!["; ", count(Field::Correct), " of its pairs are correct"]);
     }
     match (row.get(Field::Position), row.get(Field::Level)) {
