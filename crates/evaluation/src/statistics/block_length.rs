@@ -46,9 +46,9 @@ pub fn block_length(values: &[f64]) -> usize {
     let width = quiet.map_or(lags, |lag| (2 * lag.max(1)).min(lags));
     let window = |lag: usize| (2.0 * (1.0 - lag as f64 / width as f64)).min(1.0);
     let (mut level, mut slope) = (spread, 0.0);
-    for lag in 1..=width {
-        level += 2.0 * window(lag) * covariances[lag];
-        slope += 2.0 * window(lag) * lag as f64 * covariances[lag];
+    for (lag, covariance) in covariances.iter().enumerate().take(width + 1).skip(1) {
+        level += 2.0 * window(lag) * covariance;
+        slope += 2.0 * window(lag) * lag as f64 * covariance;
     }
     let longest = (3.0 * real.sqrt()).min(real / 3.0).ceil();
     let length = (1.5 * (slope / level).powi(2) * real).cbrt();

@@ -1,5 +1,6 @@
 //! Verification of reports: every printed number is computed again from the logs.
 
+mod counts;
 mod evaluate;
 mod logs;
 

@@ -15,4 +15,5 @@ mod objects;
 mod paper;
 mod reach;
 mod rows;
+mod sentences;
 mod verified;

@@ -24,7 +24,11 @@ pub(crate) fn sentence(trial: &Trial, frame: &Frame, row: &AttemptRow) -> Text {
     // Edges alone may give a fix.
     let by_edges = row.get(Field::Identified) == Some(0.0);
     let mut message = text![if row.wrong() { "wrong fix" } else { "fix" }];
-    message.extend(if by_edges { text![" by edges alone"] } else { text![" of ", count(Field::Identified), " points"] });
+    message.extend(if by_edges {
+        text![" by edges alone"]
+    } else {
+        text![" of ", count(Field::Identified), " points"]
+    });
     if known(Field::Visible) {
         message.extend(text![", ", count(Field::Visible), if by_edges { " points in view" } else { " in view" }]);
     }

@@ -116,6 +116,14 @@ pub(crate) fn section(run: &Run, comparisons: &[Comparison]) -> Section {
             ],
         ));
     }
+    if run.trials.iter().any(navigates) {
+        terms.push((
+            text![italic("RMS of a dive")],
+            text![
+                "Root mean square of the navigated position error over the frames with a pose. Its 95 % interval is a percentile interval of the circular block bootstrap over these frames; the block length follows from the autocorrelation of the squared errors (Politis and White, 2004). It covers the variation within the dive, not that between dives."
+            ],
+        ));
+    }
     if run.header().axes.iter().any(|axis| harder(&axis.key)) {
         terms.push((
             text![italic("break-down point")],
