@@ -67,7 +67,7 @@ fn whether_fixes_bound_the_error_is_answered() {
         "{text}"
     );
     let folder = tempfile::tempdir().unwrap();
-    let wave = |number: u64| if number / 10 % 2 == 0 { 0.004 } else { 0.020 };
+    let wave = |number: u64| if (number / 10).is_multiple_of(2) { 0.004 } else { 0.020 };
     trial(folder.path(), 1, ["navigation", "often"], question, |number| [wave(number), wave(number + 10)]);
     trial(folder.path(), 2, ["navigation", "seldom"], question, |_| [0.007, 0.020]);
     let text = page(folder.path());
