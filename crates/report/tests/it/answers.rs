@@ -119,7 +119,7 @@ fn errors_of_series_are_at_the_same_values() {
 
 /// Twelve of forty attempts against none: the intervals of ten blocks each overlap.
 #[test]
-fn overlapping_ends_are_not_told_apart() {
+fn overlapping_ends_do_not_differ() {
     let folder = tempfile::tempdir().unwrap();
     let question = "How much does a current reduce the rate of fixes?";
     for (index, (speed, rejected)) in [("0.0", 0), ("0.6", 12)].into_iter().enumerate() {

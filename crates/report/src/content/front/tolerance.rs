@@ -53,13 +53,13 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
         let others = here().filter(|(other, _)| other != index && search(*other) == search(*index));
         let close = others.filter(|(other, _)| !Sample::of(run, summary, &[*other]).measured().differs(&best));
         let close: Vec<f64> = close.filter_map(|(other, _)| axes::on(&summary.rows[*other], key)).collect();
-        message.extend(not_told_apart(close, key));
+        message.extend(similar_tolerances(close, key));
     }
     (!message.is_empty()).then(|| capitalised(message))
 }
 
 /// The words on tolerances of the same search whose rates have overlapping intervals; `None` without any.
-fn not_told_apart(mut close: Vec<f64>, key: &str) -> Option<crate::document::Span> {
+fn similar_tolerances(mut close: Vec<f64>, key: &str) -> Option<crate::document::Span> {
     close.sort_by(f64::total_cmp);
     let unit = unit(key).map_or_else(String::new, |unit| format!(" {unit}"));
     let [first, .., last] = close[..] else {
