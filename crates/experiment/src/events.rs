@@ -18,8 +18,6 @@ mod tests {
     use super::*;
 
     /// The logged sentence is the printed one, and a log is searched for this event alone.
-    ///
-    /// Seen to fail with "from its survey" in the printed sentence.
     #[test]
     fn a_displaced_object_is_found_in_the_log() {
         let object = || "tree-b".to_owned();

@@ -48,8 +48,6 @@ mod tests {
 
     /// Errors of 0 or 2 cm in a hundred runs of 20 frames: the mean square of 4 p cm² has the standard error of a hundred
     /// independent runs, 4 √(p (1 − p)/100) cm².
-    ///
-    /// Seen to fail with blocks of ⌈n^⅓⌉ frames, whose interval has 0.7 of this width.
     #[test]
     fn runs_of_equal_errors_count_once() {
         let large = |run: u64| (run * run * 40_503 + 12_345) % 65_537 > 32_768;
@@ -66,8 +64,6 @@ mod tests {
     }
 
     /// Errors of 1 and 2 in turn: the squares have mean 5/2 and standard deviation 3/2.
-    ///
-    /// Seen to fail where the errors take the place of their squares.
     #[test]
     fn independent_fixes_have_the_interval_of_a_mean_square() {
         let errors: Vec<f64> = (0..1000).map(|i| f64::from(i % 2 + 1)).collect();

@@ -80,8 +80,6 @@ mod tests {
     }
 
     /// The lengths of `arch.bootstrap.optimal_block_length` (arch 7.2), rounded.
-    ///
-    /// Seen to fail with the constant of the stationary bootstrap, 1 instead of 3/2.
     #[test]
     fn lengths_are_those_of_arch() {
         let known = [(200, 0.0, 1), (200, 0.5, 6), (1000, 0.9, 47), (600, 0.98, 46), (37, 0.8, 4), (12, 0.3, 1)];
@@ -92,8 +90,6 @@ mod tests {
     }
 
     /// The interval of a root mean square of correlated errors covers it nearly as often as it states.
-    ///
-    /// Seen to fail with blocks of ⌈n^⅓⌉ values: they cover it in 68 % of the series.
     #[test]
     fn an_interval_over_these_blocks_covers_a_root_mean_square() {
         let mut random = ChaCha8Rng::seed_from_u64(4);

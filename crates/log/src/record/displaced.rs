@@ -28,7 +28,6 @@ pub fn displaced_object(event: &str) -> Option<&str> {
 mod tests {
     use super::*;
 
-    /// Seen to fail where the first ` is ` ends the name.
     #[test]
     fn a_name_may_have_the_words_of_the_event() {
         let name = "what is 1.000 m from its place in the survey is";

@@ -70,7 +70,7 @@ fn methods_that_tolerate_the_same_have_one_clause() {
 ///
 /// Two solvers share 40 frames, which count as ten blocks of four: no event in ten has the interval [0, 30.8] %.
 ///
-/// Seen to fail with a table by solver, and where shared frames count twice.
+/// The table is by limit, not by solver.
 #[test]
 fn every_limit_of_acceptance_has_its_fixes() {
     let folder = tempfile::tempdir().unwrap();

@@ -49,8 +49,6 @@ fn reject(frame: &mut FrameRecord, place: usize) {
 }
 
 /// No fix in forty attempts, which count as ten, is below all of them: [0, 30.8] and [69.2, 100] %.
-///
-/// Seen to fail where the rates are those of all objects.
 #[test]
 fn a_displaced_object_and_its_neighbours_are_answered_apart() {
     let folder = tempfile::tempdir().unwrap();
@@ -73,8 +71,6 @@ fn a_displaced_object_and_its_neighbours_are_answered_apart() {
 }
 
 /// Frames with two objects have a fix, those with one have none; both kinds stand in runs of ten frames.
-///
-/// Seen to fail where attempts count instead of frames.
 #[test]
 fn company_in_view_is_answered() {
     let folder = tempfile::tempdir().unwrap();
