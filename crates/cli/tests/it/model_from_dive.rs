@@ -236,11 +236,44 @@ fn proposals_are_marks_and_a_page() {
         DIVE.replace("frames = 6\nrate = 0.8", "frames = 24\nrate = 0.0").replace("altitude = 2.5", "altitude = 3.0");
     fs::write(here.join("orbit.toml"), orbit).unwrap();
     ended_with(0, program().current_dir(here).args(["dive", "orbit.toml", "--out", "orbit"]));
-    command.current_dir(here).args(["model", "orbit", "--propose", "12", "--page", "page.html"]);
+    command.current_dir(here).args(["model", "orbit", "--propose", "24", "--page", "page.html"]);
     ended_with(0, command.arg("--out").arg(&out));
     let marks = fs::read_to_string(&out).unwrap();
-    assert!(marks.starts_with(HEADER) && (2..=13).contains(&marks.lines().count()), "{marks}");
+    assert!(marks.starts_with(HEADER) && marks.lines().count() == 25, "{marks}");
     assert!(fs::read_to_string(here.join("page.html")).unwrap().contains("data:image/png;base64,"));
+    // Most of the eight points of the object are among them: 8 when this was written.
+    let found = proposed_points(&here.join("orbit"), &marks);
+    assert!(found.len() >= 7, "{found:?} of {marks}");
+}
+
+/// The points of the object within 2 px of a mark in its pair.
+fn proposed_points(dive: &Path, marks: &str) -> Vec<String> {
+    let dataset = Dataset::open(dive).unwrap();
+    let object = dataset.site.as_ref().unwrap().object("manifold").unwrap();
+    let world_from_object = object.world_from_object.unwrap();
+    let near = |point: &&seafix_referencing::ModelPoint| {
+        marks.lines().skip(1).any(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let frame = dataset.frames.iter().find(|frame| frame.stamp_ns.to_string() == cells[0]).unwrap();
+            let at = frame.truth.unwrap().inverse() * (world_from_object * point.at);
+            let mark = Pixel { u: cells[2].parse().unwrap(), v: cells[3].parse().unwrap() };
+            dataset.rig.project(&at).is_some_and(|pixels| pixels.left.distance(&mark) <= 2.0)
+        })
+    };
+    object.points.iter().filter(near).map(|point| point.id.clone()).collect()
+}
+
+/// Without an odometry one pair stands alone: what it shows best is proposed.
+#[test]
+fn one_pair_alone_has_proposals() {
+    let folder = TempDir::new().unwrap();
+    let out = folder.path().join("marks.csv");
+    let mut command = program();
+    command.arg("model").arg(dive().join("dive")).args(["--propose", "9", "--odometry", "none", "--out"]);
+    ended_with(0, command.arg(&out));
+    let marks = fs::read_to_string(out).unwrap();
+    let pairs: std::collections::BTreeSet<&str> = marks.lines().skip(1).map(|line| &line[..19]).collect();
+    assert!(marks.lines().count() == 10 && pairs.len() == 1, "{marks}");
 }
 
 /// A recording and the log of a run give the model of their images.
@@ -292,6 +325,9 @@ fn edges_of_a_dive_are_those_of_the_object() {
     let source = dive().join("dive");
     let json = model(here, &source, &table(&marks()), &["--edges", "--json", "--out", "a.toml"], 0).out;
     ended_with(0, program().arg("check").arg(here.join("a.toml")));
+    // A built site that is read and written again has the same bytes.
+    let text = fs::read_to_string(here.join("a.toml")).unwrap();
+    assert_eq!(Site::parse(&text, Path::new("a.toml")).unwrap().to_toml(), text);
     let read = |file: &Path| {
         Site::from_file(file).unwrap().objects.into_iter().find(|object| object.id == "manifold").unwrap()
     };

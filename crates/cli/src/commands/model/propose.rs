@@ -7,7 +7,7 @@ use seafix_vision::FrontEnd;
 use super::{arguments::Model, dive, page};
 use crate::{
     atomic_file::AtomicFile,
-    exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
+    exit::{DONE, Ended, Failure, INPUT, OUTPUT},
     terminal::{Progress, notify, print},
 };
 
@@ -17,21 +17,21 @@ const INTRODUCTION: &str = "Delete the lines of features that the object should 
 /// Proposes features, and writes them as marks and as a page of pictures.
 pub(super) fn execute(model: &Model, count: usize, front_end: &FrontEnd) -> Ended {
     let pairs = dive::opened(model)?;
-    let Some(odometry) = model.dive.odometry(&pairs)? else {
-        let message =
-            "cannot propose features without an odometry: views of one feature are found by it; omit --odometry none";
-        return Err(Failure::new(USAGE, message));
-    };
+    let odometry = model.dive.odometry(&pairs)?;
     let inputs = [&*model.left];
     let out = model.out.as_deref().map(|path| AtomicFile::begin(path, model.replacing, &inputs)).transpose()?;
     let sheet = model.dive.page.as_deref().map(|path| AtomicFile::begin(path, model.replacing, &inputs)).transpose()?;
-    let proposer = Proposer { front_end, odometry: &*odometry, count };
+    let proposer = Proposer { front_end, odometry: odometry.as_deref(), reach: model.reach, count };
     let progress = Progress::new();
     progress.expect(pairs.stamps().len());
     let (proposals, unread) = model.dive.pool()?.install(|| proposer.propose(&pairs, &mut || progress.step("")));
     progress.end();
     unread.iter().for_each(|fault| notify(&format!("warning: {fault}")));
     if proposals.is_empty() {
+        if odometry.is_none() {
+            let fault = Fault::new("no feature to propose: no pair shows a corner in both images", pairs.path());
+            return Err(Failure::new(INPUT, fault.remedy("mark features by hand")));
+        }
         let fault = Fault::new(
             "no feature to propose: none has five pairs, a parallax of 15° and a standard deviation of 2 mm",
             pairs.path(),

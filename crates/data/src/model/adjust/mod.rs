@@ -13,7 +13,7 @@ mod observation;
 mod switch;
 
 use faer::{Mat, Side, linalg::solvers::Solve};
-use nalgebra::{DMatrix, Matrix4, Matrix6, Vector4};
+use nalgebra::{DMatrix, Matrix3, Matrix4, Matrix6, Vector4};
 use seafix_geometry::{Camera, Point, StereoRig, Transform, World};
 
 use self::{
@@ -119,6 +119,18 @@ impl Adjustment<'_> {
     /// The number of measurements minus the number of unknowns.
     pub(super) fn dof(&self) -> usize {
         (4 * self.observations.len() + 6 * self.motions.len()).saturating_sub(self.state().unknowns())
+    }
+
+    /// The information of each point (m⁻²) with all poses as exact; the observations without it are left out.
+    pub(super) fn information_of_points(&self, excess: &Excess) -> Vec<Matrix3<f64>> {
+        let state = self.state();
+        let mut all = vec![Matrix3::zeros(); self.points.len()];
+        for (observation, information) in self.informed(excess).unwrap_or_default() {
+            if let Some(Linearised { by_point, .. }) = state.linearise(&observation) {
+                all[observation.point] += by_point.transpose() * information * by_point;
+            }
+        }
+        all
     }
 
     /// The covariance of the points at the solution, with the first pose as exact.

@@ -21,7 +21,6 @@ mod method;
 mod operator;
 mod parallax;
 mod picture;
-mod plane;
 mod progress;
 mod propose;
 mod recover;
