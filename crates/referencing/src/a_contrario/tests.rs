@@ -1,4 +1,4 @@
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Covariance6, Point, Transform, UncertainPoint};
@@ -254,4 +254,45 @@ fn an_object_that_fills_its_cloud_is_no_impossible_accident() {
         let expected = expected_sets_as_good(&frame.problem(0.05), &found);
         assert!(expected > 0.0 && expected < 1e-6, "{expected}");
     }
+}
+
+/// Four points of one row of a chessboard, found by a tight prior, have a number of false alarms although they determine
+/// no rotation about their line.
+#[test]
+fn pairs_on_a_line_have_a_number() {
+    let model: Vec<ModelPoint> = (0..54)
+        .map(|i| ModelPoint::exact("", Point::new(0.025 * f64::from(i % 9), -0.025 * f64::from(i / 9), 0.0)))
+        .collect();
+    // Measured places (m), and the upper triangles of their covariances (m²).
+    let rows = [
+        ([0.18900, -0.09149, 0.96332], [1.949e-6, -1.0614e-6, 1.131e-5, 6.839e-7, -6.4431e-6, 6.839e-5]),
+        ([0.16543, -0.09563, 0.95781], [1.383e-6, -9.138e-7, 9.2283e-6, 7.1304e-7, -6.4578e-6, 6.505e-5]),
+        ([0.14105, -0.09907, 0.94806], [9.255e-7, -7.547e-7, 7.2734e-6, 7.3355e-7, -6.4165e-6, 6.173e-5]),
+        ([0.11730, -0.10325, 0.94340], [5.764e-7, -5.951e-7, 5.4767e-6, 7.6676e-7, -6.4218e-6, 5.895e-5]),
+    ];
+    let cloud: Vec<MeasuredPoint> = rows
+        .iter()
+        .map(|(at, [xx, xy, xz, yy, yz, zz])| {
+            let covariance = Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz);
+            MeasuredPoint { position: UncertainPoint { at: Point::from(*at), covariance }, pixels: None }
+        })
+        .collect();
+    let attitude = Matrix3::new(0.04393, 0.95287, 0.3002, 0.7658, 0.16085, -0.62264, -0.64158, 0.25724, -0.72263);
+    let attitude = UnitQuaternion::from_matrix(&attitude);
+    let camera_from_object = Transform::new(attitude, Vector3::new(0.20538, -0.23966, 1.09938));
+    let bound = PriorBound::Gaussian(Covariance6::isotropic(0.2_f64.to_radians(), 0.0015));
+    let prior = Prior { object_from_camera: camera_from_object.inverse(), bound };
+    let row = |i: usize| if i % 9 == 8 && (1..5).contains(&(i / 9)) { vec![i / 9 - 1] } else { Vec::new() };
+    let candidates = Candidates { lists: (0..54).map(row).collect() };
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Sigmas(3.0),
+        prior: Some(&prior),
+        edges: Default::default(),
+    };
+    let pairs: Vec<Correspondence> = (0..4).map(|k| Correspondence { model: 9 * (k + 1) + 8, cloud: k }).collect();
+    let nfa = expected_sets_as_good(&problem, &pairs);
+    assert!(nfa >= 0.0, "{nfa}");
 }

@@ -50,6 +50,9 @@ pub struct Posterior {
     /// ln evidence (nats) of a pattern like the object's in its place, without the object; `None` for an object without
     /// a pattern.
     pub pattern_alone: Option<f64>,
+    /// ln evidence (nats) of the object's own pattern with the object at another of its shifts; `None` for an object
+    /// without a pattern.
+    pub pattern_shifted: Option<f64>,
     /// The strongest evidence of structured clutter, which resembles the object; `None` without any.
     pub structured_clutter: Option<StructuredClutter>,
     /// A pose elsewhere beyond those of `explanations` and `beside`, for comparison with the answer.
@@ -145,6 +148,7 @@ impl Posterior {
     /// (m, RMS over the model points) of the best count as one with it. Further hypotheses:
     ///
     /// - A pattern like the object's is in its place, without the object.
+    /// - The object's own pattern is in its place, and the object at another shift of it: the object is elsewhere.
     /// - A pose beside the best, in points that the best does not use, shows how much evidence clutter of this cloud
     ///   produces. Without the object, clutter would have produced the best pose with the same probability.
     /// - Structured clutter ([`StructuredClutter`]): if another pose shows that clutter resembles the object, the best
@@ -154,14 +158,15 @@ impl Posterior {
             return PosteriorProbabilities { map_estimate: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
         };
         let pattern = self.pattern_alone.unwrap_or(f64::NEG_INFINITY);
+        let shifted = self.pattern_shifted.unwrap_or(f64::NEG_INFINITY);
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
         let clutter = if beside > ACCIDENT { beside } else { 0.0 };
         // The object beside structured clutter, and structured clutter alone.
         let among =
             self.structured_clutter.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_RESEMBLES);
         let imitated = self.structured_clutter.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);
-        let max = [clutter, pattern, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
-        let (mut map_estimate, mut elsewhere) = (0.0, 0.0);
+        let max = [clutter, pattern, shifted, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
+        let (mut map_estimate, mut elsewhere) = (0.0, libm::exp(shifted - max));
         for other in &self.explanations {
             // Structured clutter may be beside the object wherever the object is.
             let less = other.ln_evidence - best.ln_evidence;

@@ -114,7 +114,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 5;
+    const VERSION: u32 = 6;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -215,7 +215,7 @@ impl Search for RigidConsensus {
         swept.modes.truncate(MAX_COMPARED);
         weighted(&mut swept);
         largest_evidence_first(&mut swept.modes);
-        let pattern_alone =
+        let continued =
             pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
         let ended = |best: usize, pair_tests| Rejected::Budget { budget: self.budget, best, bound, pair_tests };
         let Some(best) = swept.modes.first() else {
@@ -332,7 +332,8 @@ impl Search for RigidConsensus {
                 explanations: explain(&swept),
                 beside: explain(&beside),
                 copies_sought,
-                pattern_alone,
+                pattern_alone: continued.map(|continued| continued.alone),
+                pattern_shifted: continued.map(|continued| continued.shifted),
                 structured_clutter,
                 unlikely: unlikely.as_ref().map(explanation),
                 evidence_gap,

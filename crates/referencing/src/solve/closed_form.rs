@@ -28,7 +28,7 @@ pub(crate) fn fit_weighted(points: &[Observation], weight: impl Fn(usize) -> f64
     Transform::new(rotation, model - rotation * measured)
 }
 
-/// The rotation R that maximises tr(Rᵀ M).
+/// The rotation R that maximises tr(Rᵀ M); any of them for points on a line, which have many.
 ///
 /// One-sided Jacobi (Hestenes, 1958): rotations from the right make the columns of M orthogonal, M V = U S, without the
 /// loss of precision of MᵀM in the weaker directions. The two stronger columns of U and V are kept and the third is
@@ -59,10 +59,28 @@ fn rotation_of(m: &Matrix3<f64>) -> Matrix3<f64> {
     let weakest = (0..3).fold(0, |min, k| if size[k] < size[min] { k } else { min });
     // Cyclic order: the third is the cross product of the two after it.
     let (i, j) = ((weakest + 1) % 3, (weakest + 2) % 3);
-    let (u1, u2) = (a[i].normalize(), a[j].normalize());
+    let (u1, u2) = axes(&a[i], &a[j]);
     u1 * v[i].transpose() + u2 * v[j].transpose() + u1.cross(&u2) * v[i].cross(&v[j]).transpose()
 }
 
+/// The directions of two orthogonal columns; for a column without length any direction across the other.
+fn axes(a: &Vector3<f64>, b: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let (long, short) = (a.norm_squared().max(b.norm_squared()), a.norm_squared().min(b.norm_squared()));
+    if short > LENGTHLESS * long {
+        return (a.normalize(), b.normalize());
+    }
+    let across = |u: &Vector3<f64>| u.cross(&Vector3::ith(u.iamin(), 1.0)).normalize();
+    if a.norm_squared() >= b.norm_squared() {
+        let u = a.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        (u, across(&u))
+    } else {
+        let u = b.normalize();
+        (across(&u), u)
+    }
+}
+
+/// The squared length of a column, as a fraction of the longer one's, that is rounding alone.
+const LENGTHLESS: f64 = 1e-30;
 /// Cosine below which two columns count as orthogonal.
 const ORTHOGONAL: f64 = 1e-15;
 /// Maximum number of sweeps; three or four suffice, as convergence is quadratic.
@@ -137,6 +155,13 @@ mod tests {
             assert!((r.transpose() * m).trace() / max - 1.0 > -1e-14, "{values:?}: {}", (r.transpose() * m).trace());
             assert!((r.transpose() * r - Matrix3::identity()).amax() < 1e-14, "{values:?}");
             assert!((r.determinant() - 1.0).abs() < 1e-14, "{values:?}");
+        }
+        // Points on a line, along an axis and oblique, and no points.
+        let line = u.column(0) * v.column(1).transpose();
+        for m in [Matrix3::from_diagonal(&Vector3::new(0.0, 2.0, 0.0)), line, line * 1e-9, Matrix3::zeros()] {
+            let r = rotation_of(&m);
+            assert!((r.transpose() * r - Matrix3::identity()).amax() < 1e-14 && r.determinant() > 0.0, "{m}: {r}");
+            assert!((r.transpose() * m).trace() >= m.norm() * (1.0 - 1e-14), "{m}: {r}");
         }
     }
 }

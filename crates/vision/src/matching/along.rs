@@ -1,6 +1,6 @@
 //! Mutual nearest neighbours among admissible pairs, with the support of neighbouring pairs.
 
-use super::{nearest::Nearest, support::MatchCandidates};
+use super::{domains::Domains, nearest::Nearest, support::MatchCandidates};
 use crate::detect::Keypoint;
 
 /// The working memory of the search.
@@ -10,6 +10,8 @@ pub(super) struct Along {
     candidates: MatchCandidates,
     pairs: Vec<(usize, usize)>,
     ambiguous: Vec<bool>,
+    domains: Domains,
+    decisions: Vec<Option<usize>>,
 }
 
 /// The criteria of a match.
@@ -39,7 +41,7 @@ impl Along {
         mut accept: impl FnMut(usize, usize, f32),
     ) {
         let [left, right] = keypoints;
-        let Self { nearest, candidates, pairs, ambiguous } = self;
+        let Self { nearest, candidates, pairs, ambiguous, domains, decisions } = self;
         nearest.reset(left.len(), right.len());
         let (supported, clear) = (test.neighbours > 0, test.squared_ratio);
         if supported {
@@ -59,10 +61,29 @@ impl Along {
         ambiguous.resize(pairs.len(), false);
         if supported && clear < 1.0 && !test.patterns {
             candidates.ambiguous(pairs, clear, ambiguous);
-            candidates.spread(left, pairs, test.neighbours, ambiguous);
+            if candidates.spread(left, pairs, test.neighbours, ambiguous) {
+                domains.decide(candidates, keypoints, decisions);
+                resolve(decisions, right.len(), pairs, ambiguous);
+            }
         }
         for (&(i, j), _) in pairs.iter().zip(ambiguous).filter(|(_, ambiguous)| !**ambiguous) {
             accept(i, j, squared(i, j));
         }
     }
+}
+
+/// Sets the pairs of the decided left key points, and drops other pairs of their right ones.
+fn resolve(decisions: &[Option<usize>], right: usize, pairs: &mut Vec<(usize, usize)>, ambiguous: &mut Vec<bool>) {
+    let mut matched = vec![false; right];
+    let mut resolved: Vec<((usize, usize), bool)> = Vec::new();
+    for (i, decision) in decisions.iter().enumerate() {
+        if let Some(j) = *decision {
+            matched[j] = true;
+            resolved.push(((i, j), false));
+        }
+    }
+    let others = pairs.iter().copied().zip(ambiguous.iter().copied());
+    resolved.extend(others.filter(|&((i, j), _)| decisions[i].is_none() && !matched[j]));
+    resolved.sort_unstable();
+    (*pairs, *ambiguous) = resolved.into_iter().unzip();
 }

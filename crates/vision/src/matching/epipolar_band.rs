@@ -22,8 +22,10 @@ use crate::workspace::Workspace;
 /// The distance is Euclidean between numbers and Hamming between bits. A pair passes if its distance is less than
 /// `ratio` times the distance to the second nearest, seen from either side. With `neighbours`, pairs compete by weight
 /// instead: the inverse squared distance times the support of the pairs around it (relaxation labelling). A pair is
-/// rejected as ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; so are the
-/// pairs around it that seem unambiguous.
+/// ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; so are the pairs around it
+/// that seem unambiguous. Where many are, the pattern is matched as one: each shift by a period is a domain, and the one
+/// whose borders or descriptors fit three standard errors better than any other is taken. If there is none, the pairs
+/// are rejected.
 ///
 /// Limit: descriptors of different kinds or lengths do not match.
 ///
@@ -67,6 +69,7 @@ impl Component for EpipolarBand {
     const NAME: &'static str = "epipolar-band";
     const SUMMARY: &'static str = "mutual nearest neighbours along the epipolar band, supported by neighbouring pairs";
     const SOURCE: &'static str = "Barnard and Thompson, Disparity analysis of images, PAMI 1980";
+    const VERSION: u32 = 2;
 
     fn check(&self) -> Result<(), String> {
         let Self { ratio, max_distance, max_hamming, epipolar_px, min_depth, max_depth, neighbours } = *self;

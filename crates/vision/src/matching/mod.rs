@@ -3,6 +3,8 @@
 mod along;
 pub(crate) mod correlate;
 mod curve;
+mod domain_evidence;
+mod domains;
 mod epipolar;
 mod epipolar_band;
 mod exhaustive;

@@ -7,7 +7,7 @@ use crate::detect::Keypoint;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MatchCandidate {
     /// The index of the left key point.
-    left: usize,
+    pub(super) left: usize,
     /// The index of the right key point.
     pub(super) right: usize,
     /// The squared distance of the descriptors.
@@ -15,9 +15,16 @@ pub(super) struct MatchCandidate {
     /// The weight of the candidate: inverse squared distance times all support.
     pub(super) weight: f32,
     /// The weight as a fraction of the weights of all candidates of either key point.
-    fraction: f32,
+    pub(super) fraction: f32,
     /// The displacement from the left to the right key point (px).
-    displacement: [f32; 2],
+    pub(super) displacement: [f32; 2],
+}
+
+impl MatchCandidate {
+    /// The index of the key point in the left (0) or the right image (1).
+    pub(super) fn of_side(&self, side: usize) -> usize {
+        if side == 0 { self.left } else { self.right }
+    }
 }
 
 /// The candidates of each left key point, nearest descriptors first, and their support.
@@ -42,11 +49,11 @@ pub(super) struct MatchCandidates {
 
 /// A link to an agreeing candidate of a neighbour.
 #[derive(Debug, Clone, Copy)]
-struct Link {
-    candidate: u32,
-    agreement: f32,
+pub(super) struct Link {
+    pub(super) candidate: u32,
+    pub(super) agreement: f32,
     /// The neighbour's rank by distance.
-    rank: u16,
+    pub(super) rank: u16,
 }
 
 /// The maximum number of candidates of a left key point.
@@ -56,7 +63,7 @@ const MAX: usize = 8;
 /// On a repeated pattern the wrong position often looks a few times more similar than the right one; neighbours decide.
 const FURTHEST: f32 = 4.0;
 /// The squared distance below which descriptors count as equally near.
-const NEAREST: f32 = 1e-6;
+pub(super) const NEAREST: f32 = 1e-6;
 /// The number of relaxation rounds.
 const ROUNDS: usize = 10;
 /// The maximum gradient of the displacement with support, that of a surface at a grazing angle.
@@ -73,7 +80,7 @@ const ALTERNATIVE: f32 = 0.5;
 /// pixel grid has a similar effect on patterns a period apart.
 const CLEARLY: f32 = 6.0;
 /// The minimum number of neighbours for a standard error.
-const FEW: usize = 4;
+pub(super) const FEW: usize = 4;
 
 /// The reciprocal of the fraction of ambiguous pairs that indicates a pattern.
 ///
@@ -112,6 +119,28 @@ impl MatchCandidates {
     /// The candidates of left key point `i`.
     pub(super) fn of(&self, i: usize) -> &[MatchCandidate] {
         &self.all[self.starts[i]..self.starts[i + 1]]
+    }
+
+    /// The number of candidates.
+    pub(super) fn len(&self) -> usize {
+        self.all.len()
+    }
+
+    /// The candidate with an index.
+    pub(super) fn candidate(&self, c: u32) -> &MatchCandidate {
+        &self.all[c as usize]
+    }
+
+    /// The indices of the candidates of left key point `i`.
+    pub(super) fn indices_of(&self, i: usize) -> std::ops::Range<usize> {
+        self.starts[i]..self.starts[i + 1]
+    }
+
+    /// The preference for a candidate to none: ln of the squared distance at which candidates are dropped, over its own.
+    pub(super) fn preference_to_none(&self, c: u32) -> f32 {
+        let candidate = self.candidate(c);
+        let nearest = self.of(candidate.left)[0].squared.max(NEAREST);
+        libm::logf(FURTHEST * FURTHEST * nearest / candidate.squared.max(NEAREST))
     }
 
     /// Shifts weight to the candidates that agree with those of the `neighbours` nearest left key points.
@@ -181,9 +210,9 @@ impl MatchCandidates {
         pairs: &[(usize, usize)],
         neighbours: usize,
         ambiguous: &mut [bool],
-    ) {
+    ) -> bool {
         if !ambiguous.contains(&true) {
-            return;
+            return false;
         }
         let Self { occupied, grid, near, spread, .. } = self;
         occupied.clear();
@@ -199,7 +228,9 @@ impl MatchCandidates {
         };
         spread.clear();
         spread.extend(pairs.iter().map(in_pattern));
+        let pattern = spread.contains(&true);
         ambiguous.iter_mut().zip(spread).for_each(|(own, around)| *own |= *around);
+        pattern
     }
 
     /// Whether `competitor` is as good a candidate as `chosen`, of the same left key point.
@@ -242,7 +273,7 @@ impl MatchCandidates {
     }
 
     /// The links of a candidate, grouped by neighbour.
-    fn neighbours_of(&self, candidate: usize) -> impl Iterator<Item = &[Link]> {
+    pub(super) fn neighbours_of(&self, candidate: usize) -> impl Iterator<Item = &[Link]> {
         let links = &self.links[self.link_starts[candidate]..self.link_starts[candidate + 1]];
         links.chunk_by(|a, b| a.rank == b.rank)
     }

@@ -57,8 +57,10 @@ pub(in crate::search) struct Pattern {
 /// ln evidence of a pattern that continues beyond the object at a pose, relative to clutter alone (nats).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::search) struct Continued {
-    /// The pattern alone: the object is absent.
+    /// Another pattern with the same steps: the object is absent.
     pub(in crate::search) alone: f64,
+    /// The object's own pattern, which holds the object at another shift.
+    pub(in crate::search) shifted: f64,
     /// The pattern around the object.
     pub(in crate::search) around: f64,
     /// The evidence without the edges and the numbers of seen and unseen points of the pattern.
@@ -159,14 +161,14 @@ impl Pattern {
     /// decide their residuals. A complete identification with few of the places beyond it seen shows that the pattern
     /// ends there, and evidence decides.
     ///
-    /// Returns the evidence of the pattern without the object at the best mode; `None` without modes.
+    /// Returns the evidence of the pattern at the best mode; `None` without modes.
     pub(in crate::search) fn weigh(
         &self,
         problem: &Problem<'_>,
         parts: (&Terms, &PriorTerms, &ConsistencyGraph),
         edges: Option<&EdgeTerms<'_>>,
         modes: &mut Vec<Mode>,
-    ) -> Option<f64> {
+    ) -> Option<Continued> {
         let shifts = self.shifts_from_first(modes);
         let add = |(at, mut mode): (usize, Mode)| {
             let others = shifts[at].iter().flat_map(|own| shifts.iter().flatten().map(move |other| other - own));
@@ -193,9 +195,9 @@ impl Pattern {
             }
             ranked[1..].sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
         }
-        let alone = ranked.first().map(|(_, continued, _)| continued.alone);
+        let of_best = ranked.first().map(|(_, continued, _)| *continued);
         modes.extend(ranked.into_iter().map(|(mode, ..)| mode));
-        alone
+        of_best
     }
 
     /// The shift of each mode from the first, if it is one: the same attitude, and a step onto the pattern itself.
@@ -236,8 +238,8 @@ impl Pattern {
     /// with one visible fraction, B(k + m, n + M), since the object ends nowhere in it; around the object it has a
     /// fraction of its own, B(k, n)·B(m, M). Points outside the pattern belong to the object only.
     ///
-    /// A pattern without the object is one of two. The object's own pattern may hold the object at another shift: that
-    /// has the prior probability of the other shifts ([`ln_shifted`]). If points of the object are unseen while the
+    /// A pattern without the object in this place is one of two. The object's own pattern may hold the object at another
+    /// shift, so that the pose is not unique: that has the prior probability of the other shifts ([`ln_shifted`]). If points of the object are unseen while the
     /// pattern continues, both are equally likely, since matchers lose a pattern in blocks: only a complete
     /// identification shows where the object ends. Another pattern with the same steps has the prior probability of
     /// structured clutter ([`LN_RESEMBLES`]), and its phase is uniform ([`ln_phase`]).
@@ -283,14 +285,14 @@ impl Pattern {
         let incomplete = seen < all && further > 0;
         let own_pattern = if incomplete { likely.max(around - own) } else { likely };
         let another = likely + LN_RESEMBLES + ln_phase(&self.basis, prior_terms, &mode.motion);
-        let alone = another.max(own_pattern + ln_shifted(&self.basis, prior_terms, &mode.motion));
+        let shifted = own_pattern + ln_shifted(&self.basis, prior_terms, &mode.motion);
         let of_points = mode.ln_evidence - by_edges.all;
         let in_blocks = of_points - ln_fraction(k, n) + ln_fraction(k - seen, n - all) + gains + by_edges.distinctive;
         let ln_prior = prior_terms.known.as_ref().map_or(0.0, |_| prior_terms.ln_density(&mode.motion));
         let ln_prior = ln_prior + by_edges.distinctive;
         let ln_ends = ln_fraction(seen, all) + ln_fraction(further, beyond) - ln_fraction(seen + further, all + beyond);
         let continues = further > 0 && !(seen == all && ln_ends >= ENDS);
-        Continued { alone, around, in_blocks, ln_prior, identifies: k > seen, continues }
+        Continued { alone: another, shifted, around, in_blocks, ln_prior, identifies: k > seen, continues }
     }
 }
 
