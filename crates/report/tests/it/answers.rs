@@ -129,3 +129,20 @@ fn overlapping_ends_do_not_differ() {
     let page = page(folder.path());
     assert!(page.contains("at speed 0.6 m/s (not told apart, since the intervals overlap)"), "{page}");
 }
+
+/// Repetitions differ by their seed, which is a name and no quantity: the answer runs over the other condition.
+#[test]
+fn a_seed_is_no_axis() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut index = 0;
+    for seed in ["1", "4"] {
+        for (altitude, rejected) in [("2", 0), ("6", 20)] {
+            index += 1;
+            let axes = [("seed", seed), ("source.altitude", altitude)];
+            trial(folder.path(), index, axes, "How many attempts succeed, by altitude?", rejected);
+        }
+    }
+    let page = page(folder.path());
+    assert!(!page.contains("at seed") && page.contains("altitude 2") && page.contains("altitude 6"), "{page}");
+    assert!(page.contains("seed 1") && page.contains("seed 4"), "{page}");
+}

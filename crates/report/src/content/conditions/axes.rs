@@ -10,14 +10,15 @@ pub(crate) fn numeric(summary: &RunSummary) -> Option<String> {
     keys(summary).into_iter().next()
 }
 
-/// All numeric conditions that vary.
+/// All numeric conditions that vary. A seed is a name of a repetition, no quantity.
 pub(crate) fn keys(summary: &RunSummary) -> Vec<String> {
     let axes = summary.rows.first().into_iter().flat_map(Row::conditions);
     let varies = |key: &String| {
         let values: Vec<Option<f64>> = summary.rows.iter().map(|row| on(row, key)).collect();
         values.iter().all(Option::is_some) && values.iter().any(|value| *value != values[0])
     };
-    axes.map(|axis| axis.key.clone()).filter(varies).collect()
+    let quantities = axes.map(|axis| axis.key.clone()).filter(|key| short(key) != "seed");
+    quantities.filter(varies).collect()
 }
 
 /// The value of a row on an axis.

@@ -33,7 +33,11 @@ impl Labels {
 
     /// The name of the series that holds `row`.
     pub(crate) fn of_series(&self, row: &Row) -> String {
-        let values: Vec<String> = self.apart.iter().map(|key| value(row, key)).collect();
+        let named = |key: &String| match format::short(key) {
+            "seed" => format!("seed {}", value(row, key)),
+            _ => value(row, key),
+        };
+        let values: Vec<String> = self.apart.iter().map(named).collect();
         if values.is_empty() { row.method() } else { values.join(", ") }
     }
 
