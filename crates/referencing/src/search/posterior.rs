@@ -197,6 +197,17 @@ mod tests {
     use super::*;
     use seafix_geometry::Transform;
 
+    /// The object at another shift of its pattern is as probable as this pose if the evidence is equal, and not absent.
+    #[test]
+    fn a_shift_within_the_pattern_is_elsewhere() {
+        let pose = Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::zeros());
+        let (pairs, edges) = (Vec::new(), Vec::new());
+        let best = Explanation { pairs, edges, object_from_camera: pose, ln_evidence: 40.0, ln_clutter_density: 0.0 };
+        let posterior = Posterior { explanations: vec![best], pattern_shifted: Some(40.0), ..Posterior::default() };
+        let found = posterior.probabilities(&[ModelPoint::exact("", [0.0; 3].into())], 0.1);
+        assert!((found.elsewhere - 0.5).abs() < 1e-12 && found.absent < 1e-12, "{found:?}");
+    }
+
     #[test]
     fn a_copy_is_elsewhere_and_suffices() {
         let pose = |x: f64| Transform::new(nalgebra::UnitQuaternion::identity(), nalgebra::Vector3::new(x, 0.0, 0.0));

@@ -40,9 +40,10 @@ const GROW: u16 = 12;
 /// where both compete.
 const AROUND: usize = 8;
 const BESIDE: usize = 2;
-/// The square of the number of standard errors by which a domain must exceed another.
+/// The square of the number of standard errors by which a domain must exceed another: three.
 ///
-/// A finite pattern of n points that a shift leaves without a partner has n; chance seldom has nine.
+/// If a shift leaves n points without a partner and the other domain none, the sign test has z² = n. This limit and the
+/// numbers above were tried on the chessboards of seven real rigs and on tiled planes before six simulated ones.
 const DECISIVE: f32 = 9.0;
 
 impl Domains {

@@ -24,8 +24,8 @@ use crate::workspace::Workspace;
 /// instead: the inverse squared distance times the support of the pairs around it (relaxation labelling). A pair is
 /// ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; so are the pairs around it
 /// that seem unambiguous. Where many are, the pattern is matched as one: each shift by a period is a domain, and the one
-/// whose borders or descriptors fit three standard errors better than any other is taken. If there is none, the pairs
-/// are rejected.
+/// whose borders or descriptors fit three standard errors better than any other is taken. Where there is none, each
+/// neighbourhood decides as before, and ambiguous pairs are rejected.
 ///
 /// Limit: descriptors of different kinds or lengths do not match.
 ///

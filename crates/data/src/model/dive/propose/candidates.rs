@@ -28,7 +28,7 @@ pub(super) struct Candidate {
     pub(super) pairs: usize,
 }
 
-/// The variance (px²) of a corner's position that tells a fitted corner from a detector's maximum.
+/// The variance (px²) of a corner's position above which a corner is a detector's maximum and no fit.
 const FITTED: f64 = 0.25;
 /// The drift of an odometry (m) over the pairs that show one feature.
 const DRIFT: f64 = 5e-3;

@@ -52,7 +52,7 @@ pub struct Proposal {
     pub parallax: f64,
     /// The standard deviation of a coordinate (m), with the poses as exact.
     pub sigma: f64,
-    /// Its surroundings; `None` for an image that cannot be read again.
+    /// Its surroundings; `None` if the image is no longer readable.
     pub picture: Option<Picture>,
 }
 
