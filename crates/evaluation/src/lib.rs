@@ -37,7 +37,7 @@ pub use fix::{alert_limit, attitude_error, lever_arm_error, nees, position_error
 pub use model::{ModelDifference, compare_models};
 pub use solved::Solved;
 pub use statistics::{
-    Bootstrap, SignedRank, block_length, clopper_pearson, clustered, holm, mcnemar, median, of_blocks, quantile,
-    recall_area, signed_rank,
+    Bootstrap, Difference, SignedRank, block_length, clopper_pearson, clustered, holm, mcnemar, median, of_blocks,
+    quantile, recall_area, signed_rank,
 };
 pub use surface::{mean_distance, mean_nearest_distance, symmetric_distance, symmetric_projection_distance};

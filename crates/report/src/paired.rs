@@ -8,7 +8,7 @@ use seafix_log::{Axis, TrialHeader};
 use crate::{
     field::Field,
     format::{self, distinct},
-    run::{Run, Trial},
+    run::{AttemptRow, Run, Trial},
     summary::RunSummary,
 };
 
@@ -225,14 +225,7 @@ fn within(run: &Run, groups: &[Vec<usize>]) -> Vec<Comparison> {
 /// Frame k of every trial is generated from the same random numbers, so attempts are paired by frame and target. Trials
 /// with different seeds or targets are not compared.
 fn between(run: &Run) -> Vec<Comparison> {
-    let alike = |trial: &Trial| {
-        let targets: Vec<String> = trial.header.targets.iter().map(|target| target.id.clone()).collect();
-        (trial.header.seeds.clone(), targets, trial.count(), trial.every())
-    };
-    let first = alike(&run.trials[0]);
-    // Recorded frames have no random numbers in common.
-    let plotted = !run.header().configuration.contains("name = \"dataset\"");
-    if run.joined || !plotted || first.0.is_empty() || run.trials.iter().any(|trial| alike(trial) != first) {
+    if run.joined || run.trials.iter().any(|trial| !alike(&run.trials[0], trial)) {
         return Vec::new();
     }
     let members: Vec<usize> = (0..run.trials.len()).collect();
@@ -249,14 +242,35 @@ fn between(run: &Run) -> Vec<Comparison> {
     found
 }
 
+/// Whether the frames of two trials are generated from the same random numbers, frame by frame.
+fn alike(first: &Trial, second: &Trial) -> bool {
+    let drawn = |trial: &Trial| {
+        let targets: Vec<String> = trial.header.targets.iter().map(|target| target.id.clone()).collect();
+        (trial.header.seeds.clone(), targets, trial.count(), trial.every())
+    };
+    // Recorded frames have no random numbers in common.
+    let simulated = !first.header.configuration.contains("name = \"dataset\"");
+    simulated && !first.header.seeds.is_empty() && drawn(first) == drawn(second)
+}
+
+/// Whether attempts of two trials can be compared in pairs: they have the same frames, or the same random numbers.
+pub(crate) fn comparable(run: &Run, first: &Trial, second: &Trial) -> bool {
+    data(first, run.joined) == data(second, run.joined) || !run.joined && alike(first, second)
+}
+
 /// The TREs (m) of both on their common attempts, in order of time.
 ///
 /// The TRE of a rejected attempt or a wrong fix is infinite.
 pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
-    fn keyed(trial: &Trial) -> Vec<(u64, &str, f64)> {
+    values(first, second, |row| row.error_or_failure(Field::Tre))
+}
+
+/// A value of both on their common attempts, in order of time.
+pub(crate) fn values(first: &Trial, second: &Trial, of: impl Fn(&AttemptRow) -> f64) -> Vec<(f64, f64)> {
+    let keyed = |trial: &Trial| -> Vec<(u64, String, f64)> {
         let attempts = trial.attempts();
-        attempts.map(|(frame, row)| (frame.number, trial.object(row), row.error_or_failure(Field::Tre))).collect()
-    }
+        attempts.map(|(frame, row)| (frame.number, trial.object(row).to_owned(), of(row))).collect()
+    };
     matched(keyed(first), keyed(second))
 }
 

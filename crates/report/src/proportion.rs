@@ -21,12 +21,17 @@ pub(crate) fn is_trajectory(header: &TrialHeader) -> bool {
     !header.targets.is_empty() && !header.configuration.contains("name = \"virtual-layouts\"")
 }
 
+/// The number of successive attempts, of `n` in all, that count as one: one for independent draws.
+pub(crate) fn block(trajectory: bool, n: usize) -> usize {
+    if trajectory { Bootstrap::of(n, SEED).block } else { 1 }
+}
+
 /// The 95 % Clopper–Pearson interval of the fraction of events among the attempts, in order of time.
 ///
 /// Independent draws have the exact interval; a trajectory has that for the effective number of attempts.
 pub(crate) fn interval(trajectory: bool, events: &[bool]) -> (f64, f64) {
     if trajectory && !events.is_empty() {
-        return clustered(events, Bootstrap::of(events.len(), SEED).block, 0.95);
+        return clustered(events, block(trajectory, events.len()), 0.95);
     }
     clopper_pearson(events.iter().filter(|event| **event).count(), events.len(), 0.95)
 }
@@ -42,16 +47,14 @@ pub(crate) fn rate(trajectory: bool, events: &[bool]) -> Option<[f64; 3]> {
 ///
 /// Their correlation is unknown, so every block of a trajectory counts as one attempt.
 pub(crate) fn interval_of_counts(trajectory: bool, k: usize, n: usize) -> (f64, f64) {
-    let block = if trajectory { Bootstrap::of(n, SEED).block } else { 1 };
-    of_blocks(k, n, block, 0.95)
+    of_blocks(k, n, block(trajectory, n), 0.95)
 }
 
 /// The 95 % interval of `k` of `n` attempts of several trials, `sharing` of which have the same frames.
 ///
 /// Attempts at one target of one frame are not independent: those of all trials that share it count as one.
 pub(crate) fn interval_of_shared(trajectory: bool, sharing: usize, k: usize, n: usize) -> (f64, f64) {
-    let block = if trajectory { Bootstrap::of(n / sharing.max(1), SEED).block } else { 1 };
-    of_blocks(k, n, block * sharing.max(1), 0.95)
+    of_blocks(k, n, block(trajectory, n / sharing.max(1)) * sharing.max(1), 0.95)
 }
 
 /// The 95 % interval of the median: the quantiles at the ends of the interval of one half.
@@ -90,7 +93,7 @@ pub(crate) fn band(trajectory: bool, errors: &[f64]) -> Vec<(f64, f64)> {
 /// The name of the intervals of these trials in captions.
 pub(crate) fn called<'a>(mut headers: impl Iterator<Item = &'a TrialHeader>) -> &'static str {
     if headers.any(is_trajectory) {
-        "95 % intervals (for the effective number of attempts)"
+        "95 % intervals (wider where successive frames succeed or fail together)"
     } else {
         "exact 95 % intervals"
     }

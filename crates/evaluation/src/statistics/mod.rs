@@ -6,6 +6,7 @@
 mod block_length;
 mod bootstrap;
 mod clustered;
+mod difference;
 mod holm;
 mod mcnemar;
 pub(crate) mod quantile;
@@ -16,6 +17,7 @@ mod wilcoxon;
 pub use block_length::block_length;
 pub use bootstrap::Bootstrap;
 pub use clustered::{clustered, of_blocks};
+pub use difference::Difference;
 pub use holm::holm;
 pub use mcnemar::mcnemar;
 pub use quantile::{median, quantile};

@@ -28,7 +28,8 @@ impl Unit {
         }
     }
 
-    fn suffix(self) -> &'static str {
+    /// The end of a key with the unit.
+    pub(crate) fn suffix(self) -> &'static str {
         match self {
             Self::Plain => "",
             Self::Millimetres => " in mm",

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, rc::Rc};
 
-use seafix_evaluation::{holm, mcnemar, quantile};
+use seafix_evaluation::{Difference, holm, mcnemar, quantile};
 use seafix_log::{FrameTimes, Outcome, TargetRecord};
 
 use crate::{
@@ -70,6 +70,9 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     }
     if let Some((of, object)) = rest.split_once(" on the object ") {
         return Some(on_object(first, of, object, span, log)?.map(|value| value * scale));
+    }
+    if let Some(what) = rest.strip_suffix(" over pairs") {
+        return Some(in_pairs(first, what, logs, span).map(|value| scale * value));
     }
     if let Some((_, over)) = rest.split_once(" over ") {
         return compared(first, over, logs, span);
@@ -327,14 +330,16 @@ fn totals(which: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64
         ("bound", "position_crlb") => position_crlb,
         ("ratio", "tre_rms") => tre / tre_crlb,
         ("ratio", "position_error") => position / position_crlb,
-        ("ratio-low" | "ratio-high", "position_error") => {
+        ("ratio-low" | "ratio-high", what @ ("position_error" | "tre_rms")) => {
+            let (rms, bound) = if what == "tre_rms" { (tre, tre_crlb) } else { (position, position_crlb) };
+            let field = Field::named(what)?;
             let fixes = log.sample(span).flat_map(|frame| &frame.rows).filter(|row| row.record.outcome == Outcome::Fix);
-            let errors: Vec<f64> = fixes.filter_map(|row| Field::Position.of(&row.record)).collect();
+            let errors: Vec<f64> = fixes.filter_map(|row| field.of(&row.record)).collect();
             let trajectory = proportion::is_trajectory(&log.header);
-            let Some((low, high)) = rms::over_fixes(position, totals.judged, trajectory, &errors) else {
+            let Some((low, high)) = rms::over_fixes(rms, totals.judged, trajectory, &errors) else {
                 return Some(None);
             };
-            (if which == "ratio-low" { low } else { high }) / position_crlb
+            (if which == "ratio-low" { low } else { high }) / bound
         }
         ("mean", "nees") => totals.nees_sum / nees,
         ("within", "nees") => totals.nees_within as f64 / nees,
@@ -398,6 +403,41 @@ fn compared(what: &str, over: &str, logs: &[&Log], span: [u64; 2]) -> Option<Opt
         "mcnemar" => mcnemar(statistics.alone[0], statistics.alone[1]),
         _ => return None,
     }))
+}
+
+/// A difference of the rates of fixes (points), or of a quantity of the fixes of both, over the common attempts of
+/// paired logs, first and second alternating.
+fn in_pairs(which: &str, what: &str, logs: &[&Log], span: [u64; 2]) -> Option<f64> {
+    let trajectory = logs.iter().any(|log| proportion::is_trajectory(&log.header));
+    let field = Field::named(what);
+    let of = |record: &TargetRecord, is_fix: bool| match field {
+        None => Some(f64::from(u8::from(is_fix))),
+        Some(field) => field.of(record).filter(|_| is_fix),
+    };
+    let keyed = |log: &Log| -> BTreeMap<(u64, String), Option<f64>> {
+        let rows = log.sample(span).flat_map(|frame| frame.rows.iter().map(move |row| (frame.number, row)));
+        rows.map(|(number, row)| ((number, row.record.object.clone()), of(&row.record, found(&row.record)))).collect()
+    };
+    let paired = |logs: &[&Log]| -> Vec<(f64, f64)> {
+        let theirs = keyed(logs[1]);
+        keyed(logs[0]).into_iter().filter_map(|(key, own)| Some((own?, (*theirs.get(&key)?)?))).collect()
+    };
+    let pairs: Vec<(f64, f64)> = logs.chunks_exact(2).flat_map(paired).collect();
+    let block = proportion::block(trajectory, pairs.len());
+    let (difference, scale) = match field {
+        None => {
+            let events: Vec<(bool, bool)> = pairs.iter().map(|(a, b)| (*a > 0.5, *b > 0.5)).collect();
+            (Difference::of_rates(&events, block, 0.95), 100.0)
+        }
+        Some(_) => (Difference::of_values(&pairs, block, 0.95)?, 1.0),
+    };
+    Some(match which {
+        "pairs" => pairs.len() as f64,
+        "difference" => scale * difference.value,
+        "difference-low" => scale * difference.interval[0],
+        "difference-high" => scale * difference.interval[1],
+        _ => return None,
+    })
 }
 
 /// The number of pairs and their statistics, resampled once for all numbers of a comparison.

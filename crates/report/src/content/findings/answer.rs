@@ -40,6 +40,7 @@ pub(crate) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
     message.extend(objects::company(run, &name));
     message.extend(wrong(run, summary, &labels));
     message.extend(significance::sentences(run, comparisons, DIFFERENCES));
+    message.extend(significance::others(comparisons, DIFFERENCES));
     message
 }
 

@@ -1,53 +1,53 @@
 //! The answer about the limit of the probability of a wrong answer: fixes and wrong fixes at each value.
 
-use super::measured::{Measured, Sample, capitalised};
+use super::measured::{Sample, capitalised};
 use crate::{
     content::conditions::labels::value,
     document::{Text, text},
-    format::distinct,
+    format::{distinct, short},
     run::Run,
     summary::RunSummary,
 };
 
-/// Each value of the axis `key` with its trials, in the order of the run.
-pub(super) fn limits(summary: &RunSummary, key: &str) -> Vec<(String, Vec<usize>)> {
-    let members = |limit: &String| {
-        (0..summary.rows.len()).filter(|&index| value(&summary.rows[index], key) == *limit).collect::<Vec<usize>>()
-    };
-    distinct(summary.rows.iter().map(|row| value(row, key)))
-        .into_iter()
-        .map(|limit| (limit.clone(), members(&limit)))
-        .collect()
+/// The trials at a limit: those of frames with the object, and those of frames without it.
+pub(super) struct Limit {
+    pub(super) name: String,
+    pub(super) present: Vec<usize>,
+    pub(super) absent: Vec<usize>,
 }
 
-/// The rates of fixes and of wrong fixes at each value, and whether those of neighbours differ.
+/// Each value of the axis `key` with its trials, in the order of the run.
+pub(super) fn limits(summary: &RunSummary, key: &str) -> Vec<Limit> {
+    let is_absent = |index: &usize| {
+        summary.rows[*index].axes.iter().any(|axis| short(&axis.key) == "absent" && axis.value == "true")
+    };
+    let of = |name: String| {
+        let members = (0..summary.rows.len()).filter(|&index| value(&summary.rows[index], key) == name);
+        let (absent, present) = members.partition(is_absent);
+        Limit { name, present, absent }
+    };
+    distinct(summary.rows.iter().map(|row| value(row, key))).into_iter().map(of).collect()
+}
+
+/// The rates of fixes and of wrong fixes among frames with the object, and that of answers among those without it.
 pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Text> {
     let mut message = Text::new();
-    let mut known: Vec<(String, [Measured; 2])> = Vec::new();
-    for (limit, members) in limits(summary, key) {
-        let sample = Sample::of(run, summary, &members);
-        if sample.attempted == 0 {
+    for limit in limits(summary, key) {
+        let [present, absent] = [&limit.present, &limit.absent].map(|members| Sample::of(run, summary, members));
+        if present.attempted == 0 {
             continue;
         }
-        let [fixes, wrong] = [sample.measured(), sample.wrong_rate()];
-        message.push(format!("{}at the limit {limit}, ", if message.is_empty() { "" } else { "; " }).into());
-        message.extend(fixes.text());
-        message.extend(text![" of ", sample.n(), " attempts have a fix and "]);
-        message.extend(wrong.text());
+        let begin = if message.is_empty() { "" } else { "; " };
+        message.push(format!("{begin}at the limit {}, ", limit.name).into());
+        message.extend(present.rate());
+        message.extend(text![" of ", present.n(), " objects in view have a fix and "]);
+        message.extend(present.wrong_rate().text());
         message.push(" a wrong one".into());
-        known.push((limit, [fixes, wrong]));
+        if absent.attempted > 0 {
+            message.push(", and ".into());
+            message.extend(absent.wrong_rate().text());
+            message.extend(text![" of ", absent.n(), " frames without the object are answered"]);
+        }
     }
-    message.extend(compared(&known).map(Into::into));
     (!message.is_empty()).then(|| capitalised(message))
-}
-
-/// The words on the rates that differ between the first and the last limit; `None` for a single limit.
-fn compared(known: &[(String, [Measured; 2])]) -> Option<String> {
-    let [(first, a), .., (last, b)] = known else { return None };
-    Some(match [0, 1].map(|which| a[which].differs(&b[which])) {
-        [true, true] => format!("; both rates differ between {first} and {last}"),
-        [true, false] => format!("; only the rates of fixes differ between {first} and {last}"),
-        [false, true] => format!("; only the rates of wrong fixes differ between {first} and {last}"),
-        [false, false] => format!("; neither rate of {first} is told apart from that of {last}"),
-    })
 }

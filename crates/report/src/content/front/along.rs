@@ -2,13 +2,14 @@
 
 use super::{
     company,
+    contrast::Contrast,
     kind::Asked,
-    measured::{Measured, Sample, capitalised, error, median_of, wrong},
+    measured::{Sample, capitalised, error, median_of, wrong},
 };
 use crate::{
     content::{
         conditions::{axes, labels::Labels},
-        phrases::Unit,
+        phrases::{self, Unit},
     },
     document::{Text, text},
     run::Run,
@@ -127,18 +128,11 @@ impl Series<'_> {
             message.extend(self.sample(index).rate());
             message.push(format!("{} at {}", if place > 0 { "" } else { " of the attempts" }, self.at(index)).into());
         }
-        let ends = Self::ends(self.members);
-        message
-            .push(self.compared(&ends.iter().map(|&index| self.sample(index).measured()).collect::<Vec<_>>()).into());
-        message
-    }
-
-    /// The words for two ends that are compared and whose intervals overlap.
-    fn compared(&self, ends: &[Measured]) -> &'static str {
-        match ends {
-            [first, last] if self.effect && !first.differs(last) => " (not told apart, since the intervals overlap)",
-            _ => "",
+        if let [first, last] = Self::ends(self.members)[..] {
+            let contrast = Contrast { run: self.run, summary: self.summary };
+            message.extend(self.effect.then(|| contrast.change_of_rate(first, last)).flatten().unwrap_or_default());
         }
+        message
     }
 
     /// The largest value up to which at least half of the attempts have a fix at every value.
@@ -172,8 +166,10 @@ impl Series<'_> {
             |index: &&usize| self.sample(**index).measured().interval().is_some_and(|[low, _]| low >= 100.0 * HALF);
         let surely = self.members.iter().take_while(sure).count();
         (surely < count).then(|| match surely.checked_sub(1).map(|last| self.members[last]) {
-            Some(last) => format!(", surely up to {} only (lower end of the interval)", self.at(last)).into(),
-            None => ", though the lower end of the interval is below one half at the smallest value already".into(),
+            Some(last) => {
+                format!(", where the lower end of the interval is above one half up to {} only", self.at(last)).into()
+            }
+            None => ", where the lower end of the interval is below one half at every value".into(),
         })
     }
 
@@ -186,14 +182,29 @@ impl Series<'_> {
         let shared: Vec<usize> = known.iter().copied().filter(|&index| common.contains(&place(index))).collect();
         let measured =
             |index: usize| median_of(self.summary, &self.run.trials[index], (field, of), (Unit::Millimetres, " mm"));
-        let ends = Self::ends(if shared.is_empty() { &known } else { &shared });
+        let mut ends = Self::ends(if shared.is_empty() { &known } else { &shared });
+        // A series that reaches farther than the others has its own end as well.
+        ends.extend(known.last().copied().filter(|last| !ends.contains(last)));
         let mut message = text![format!("the median {name} is ")];
         for (order, &index) in ends.iter().enumerate() {
-            message.push(if order > 0 { " and ".into() } else { "".into() });
+            message.push(
+                match order {
+                    0 => "",
+                    _ if order + 1 == ends.len() => " and ",
+                    _ => ", ",
+                }
+                .into(),
+            );
             message.extend(measured(index).text());
             message.push(format!(" at {}", self.at(index)).into());
         }
-        message.push(self.compared(&ends.iter().map(|&index| measured(index)).collect::<Vec<_>>()).into());
+        if let [first, last] = ends[..] {
+            let contrast = Contrast { run: self.run, summary: self.summary };
+            let digits =
+                phrases::decimals(self.summary.rows.iter().map(|row| of(row).map(|s| s.median)), Unit::Millimetres);
+            let change = self.effect.then(|| contrast.change_of_value(field, first, last, digits)).flatten();
+            message.extend(change.unwrap_or_default());
+        }
         if !unknown.is_empty() {
             let places: Vec<String> = unknown.iter().map(|&index| self.at(index)).collect();
             message.push(format!(", with no fix at {}", places.join(" and ")).into());

@@ -1,6 +1,7 @@
 //! The answer over named cases: rates of fixes and errors, with the differences that their intervals show.
 
 use super::{
+    contrast::{Contrast, Ranked},
     kind::Asked,
     measured::{DistributionOf, Sample, capitalised, error, median_of, wrong},
     ranking::{Case, Words, clause, decreasing, of_attempts},
@@ -30,11 +31,6 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, asked: 
         let name = format!("median {name}");
         clauses.extend(medians(run, summary, &series, (&name, (field, of), FEWER), (Unit::Millimetres, " mm")));
     }
-    if asked.residuals {
-        let quantity = (Field::Fit, (|row| row.fit) as DistributionOf);
-        let name = "median residual of the points (fit RMS)";
-        clauses.extend(medians(run, summary, &series, (name, quantity, FEWER), (Unit::Millimetres, " mm")));
-    }
     let mut message = Text::new();
     for (index, clause) in clauses.into_iter().enumerate() {
         message.extend(text![if index > 0 { "; " } else { "" }]);
@@ -60,14 +56,15 @@ fn words<'a>(quantity: &'a str, [best, worst, worse]: [&'static str; 3]) -> Word
 
 /// The clause on the rates; `None` without attempts.
 fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)], asked: Asked) -> Option<Text> {
-    let samples: Vec<(&str, Sample<'_>)> =
-        series.iter().map(|(name, members)| (name.as_str(), Sample::of(run, summary, members))).collect();
-    let of = |(name, sample): &(&str, Sample<'_>)| Case {
-        name: (*name).to_owned(),
-        value: sample.measured(),
-        tail: of_attempts(sample.n()),
+    let sample = |members: &[usize]| Sample::of(run, summary, members);
+    let samples: Vec<Sample<'_>> = series.iter().map(|(_, members)| sample(members)).collect();
+    let of = |(name, members): &(String, Vec<usize>)| Case {
+        name: name.clone(),
+        value: sample(members).measured(),
+        members: members.clone(),
+        tail: of_attempts(sample(members).n()),
     };
-    let suffices = samples.iter().all(|(_, sample)| sample.found > 0 && sample.wrong == 0);
+    let suffices = samples.iter().all(|sample| sample.found > 0 && sample.wrong == 0);
     let mut message = text![match (asked.suffices, suffices) {
         (true, true) if samples.len() > 1 => "yes, every case has fixes and no wrong one; ",
         (true, true) => "yes: ",
@@ -76,28 +73,27 @@ fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)], asked
     }];
     match &samples[..] {
         [] => return None,
-        [(_, one)] => {
+        [one] => {
             message.push("fixes succeed in ".into());
             message.extend(one.rate());
             message.extend(of_attempts(one.n()));
         }
-        all => {
-            let cases = decreasing(all.iter().map(of).collect());
-            message.extend(clause(&cases, &words("rate of fixes", MORE)));
+        _ => {
+            let cases = decreasing(series.iter().map(of).collect());
+            let contrast = Contrast { run, summary };
+            let differs = |a: &Case, b: &Case| contrast.rates_differ(&a.members, &b.members, cases.len());
+            message.extend(clause(&cases, &words("rate of fixes", MORE), &differs));
         }
     }
     Some(message)
 }
-
-/// A quantity of the fixes with its name and the adjectives of its ranking.
-type Ranked<'a> = (&'a str, (Field, DistributionOf), [&'static str; 3]);
 
 /// The clause on the medians of a quantity over cases of one trial each; `None` without fixes.
 fn medians(
     run: &Run,
     summary: &RunSummary,
     series: &[(String, Vec<usize>)],
-    (name, (field, of), adjectives): Ranked<'_>,
+    (name, (field, of), adjectives): (&str, Ranked, [&'static str; 3]),
     unit: (Unit, &'static str),
 ) -> Option<Text> {
     let single = series.iter().filter_map(|(name, members)| match members[..] {
@@ -107,6 +103,7 @@ fn medians(
     let measured = single.map(|(name, index)| Case {
         name,
         value: median_of(summary, &run.trials[index], (field, of), unit),
+        members: vec![index],
         tail: Text::new(),
     });
     let mut cases: Vec<Case> = measured.collect();
@@ -123,5 +120,7 @@ fn medians(
         message.extend(one.value.text());
         return Some(message);
     }
-    (!cases.is_empty()).then(|| clause(&cases, &words(name, adjectives)))
+    let contrast = Contrast { run, summary };
+    let differs = |a: &Case, b: &Case| contrast.values_differ((field, of), [a, b], cases.len());
+    (!cases.is_empty()).then(|| clause(&cases, &words(name, adjectives), &differs))
 }

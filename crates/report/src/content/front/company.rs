@@ -22,7 +22,7 @@ pub(super) fn clause(run: &Run, summary: &RunSummary, labels: &Labels) -> Text {
         (Measured::new(rate, " %"), n)
     });
     let verdict = match (several.0.differs(&one.0), several.0.value() > one.0.value()) {
-        (false, _) => "that several objects in view help is not shown, since the intervals overlap",
+        (false, _) => "that several objects in view help is not shown, since the difference is not significant",
         (true, true) => "several objects in view help",
         (true, false) => "several objects in view do not help",
     };

@@ -1,7 +1,19 @@
 //! The conclusion of the first page and its limits.
 
+use super::{
+    acceptance,
+    contrast::Contrast,
+    cost,
+    kind::{Asked, Kind},
+    measured::Sample,
+    navigated, ranking,
+};
 use crate::{
-    content::sections::{navigation, significance},
+    content::{
+        conditions::labels::Labels,
+        phrases::Unit,
+        sections::{navigation, significance},
+    },
     document::{Text, bold, text},
     format::counted,
     paired::Comparison,
@@ -10,15 +22,84 @@ use crate::{
     summary::RunSummary,
 };
 
-/// The clearest difference between trials, the published figures of the experiment, and the limits of the result.
+/// The clearest difference of what the question asks for, the published figures of the experiment, and the limits of the
+/// result.
 pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
-    let mut conclusion = text![bold("Conclusion. ")];
-    match significance::sentences(run, comparisons, 1).into_iter().next() {
-        Some(sentence) => conclusion.extend(sentence),
-        None => conclusion.push("No two trials share their frames, so no difference is tested.".into()),
+    let (kind, asked) = (Kind::of(run, summary), Asked::of(&summary.question));
+    let mut shown: Vec<Text> = Vec::new();
+    if asked.rate {
+        shown.extend(rates(run, summary, &kind));
     }
-    conclusion.extend(summary.published.iter().map(|sentence| format!(" {sentence}").into()));
-    vec![conclusion, text![bold("Limits. "), limits(run, summary)]]
+    shown.extend(match kind {
+        Kind::Navigation => navigated::conclusion(run, summary),
+        Kind::Cost => cost::conclusion(run, summary),
+        _ => None,
+    });
+    let accuracy = matches!(kind, Kind::Limits | Kind::Outliers(_) | Kind::Along(_) | Kind::Cases) && asked.accuracy;
+    if accuracy {
+        shown.extend(significance::sentences(run, comparisons, 1));
+    }
+    let mut paragraphs = Vec::new();
+    let concludes = !shown.is_empty();
+    shown.extend(summary.published.iter().map(|sentence| text![sentence.clone()]));
+    if !shown.is_empty() {
+        let mut conclusion = text![if concludes { bold("Conclusion.") } else { "".into() }];
+        shown.into_iter().for_each(|sentence| {
+            conclusion.push(" ".into());
+            conclusion.extend(sentence);
+        });
+        paragraphs.push(conclusion);
+    }
+    paragraphs.push(text![bold("Limits. "), limits(run, summary)]);
+    paragraphs
+}
+
+/// The difference between the highest and the lowest rate of fixes, over common attempts; `None` without any.
+///
+/// Along an axis these are the ends of a single series.
+fn rates(run: &Run, summary: &RunSummary, kind: &Kind) -> Option<Text> {
+    let labels = Labels::of(summary);
+    let series = || -> Vec<(String, Vec<usize>)> {
+        let named = |(name, members): (String, _)| (format!("with {}", ranking::quoted(&name)), members);
+        labels.series(summary).into_iter().map(named).collect()
+    };
+    let mut cases = match kind {
+        Kind::Acceptance(key) => {
+            let limits = acceptance::limits(summary, key).into_iter();
+            limits.map(|limit| (format!("at the limit {}", limit.name), limit.present)).collect()
+        }
+        Kind::Along(key) if labels.series(summary).len() == 1 => {
+            let place = |index: usize| format!("at {}", labels.place(&summary.rows[index], key));
+            (0..summary.rows.len()).map(|index| (place(index), vec![index])).collect()
+        }
+        Kind::Along(_) | Kind::Families(_) | Kind::Cases | Kind::Outliers(_) => series(),
+        _ => return None,
+    };
+    let fraction = |case: &(String, Vec<usize>)| Sample::of(run, summary, &case.1).fraction();
+    cases.sort_by(|a, b| fraction(b).total_cmp(&fraction(a)));
+    let [highest, .., lowest] = &cases[..] else { return None };
+    let contrast = Contrast { run, summary };
+    let found = contrast.of_rates(&highest.1, &lowest.1, 0.95)?;
+    let [pairs, value, low, high] = contrast.numbers([&highest.1, &lowest.1], "found", (found, Unit::Plain, 1));
+    if found.value == 0.0 {
+        return Some(text![
+            "Over ",
+            pairs,
+            format!(" common attempts, the rates of fixes {} and {} are equal.", highest.0, lowest.0)
+        ]);
+    }
+    let significant = if found.significant() { "a significant difference" } else { "which is not significant" };
+    Some(text![
+        "Over ",
+        pairs,
+        " common attempts, the rate of fixes is ",
+        value,
+        " points [",
+        low,
+        ", ",
+        high,
+        format!("] higher {} than {}, {significant}.", highest.0, lowest.0)
+    ])
 }
 
 /// The conditions beyond which the result says nothing, in two sentences.
@@ -48,8 +129,8 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
     // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
     let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
     format!(
-        "{data}{site}. {dives}The smallest trial has {}{}: without a wrong fix among them, the rate of wrong fixes may still be \
-         {bound:.digits$} % (upper end of the 95 % interval). The section on threats to validity lists all limits.",
+        "{data}{site}. {dives}The smallest trial has {}{}: even if none of them is a wrong fix, the rate of wrong fixes may be up \
+         to {bound:.digits$} % (95 % interval). The section on threats to validity lists all limits.",
         counted(min, "attempt", "attempts"),
         if successive { ", which successive frames make dependent" } else { "" }
     )

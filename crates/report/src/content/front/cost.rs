@@ -1,6 +1,10 @@
 //! The answer about the cost of searches: pair tests at the ends of the problem size.
 
-use super::measured::{Measured, capitalised};
+use super::{
+    contrast::Contrast,
+    measured::{Measured, capitalised},
+    ranking::{self, Case, Words},
+};
 use crate::{
     content::{
         conditions::{axes, labels::Labels},
@@ -8,12 +12,13 @@ use crate::{
     },
     document::{Text, text},
     field::Field,
+    format::placed,
     proportion,
     run::{Run, Trial},
     summary::RunSummary,
 };
 
-/// The cheapest and the dearest search at the largest size, each at both ends of the sizes.
+/// Every search at both ends of the sizes, the cheapest at the largest size first.
 ///
 /// A search without a fix at the largest size ends at its limit of work, which says nothing about its growth: it is named.
 pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
@@ -33,9 +38,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     let (mut known, without): (Vec<_>, Vec<_>) =
         known.into_iter().partition(|(_, _, last)| summary.rows[*last].found > 0);
     known.sort_by(|a, b| tests(a.2).value.unwrap_or(0.0).total_cmp(&tests(b.2).value.unwrap_or(0.0)));
-    let dearest = if known.len() > 1 { known.pop() } else { None };
-    let cheapest = known.into_iter().next();
-    let (_, first, last) = cheapest.as_ref()?;
+    let (_, first, last) = known.first().or(without.first())?;
     let candidates = |index: usize| median(&run.trials[index], Field::Candidates).number();
     let mut message = text![
         "from a median of ",
@@ -44,17 +47,50 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
         candidates(*last),
         ", the median number of pair tests grows "
     ];
-    for (index, (name, first, last)) in cheapest.into_iter().chain(dearest).enumerate() {
-        message.push(format!("{}from ", if index > 0 { ", and " } else { "" }).into());
-        message.extend(median(&run.trials[first], Field::Tests).text());
-        message.push(" to ".into());
-        message.extend(median(&run.trials[last], Field::Tests).text());
+    for (index, (name, first, last)) in known.iter().enumerate() {
+        message.extend(text![format!("{}from ", if index > 0 { ", " } else { "" }), tests(*first), " to "]);
+        message.extend(median(&run.trials[*last], Field::Tests).text());
         message.push(format!(" with {name}").into());
     }
-    for (name, _, last) in &without {
-        message.extend(text![format!("; {name} has no fix there after "), tests(*last), " pair tests"]);
+    for (index, (name, _, last)) in without.iter().enumerate() {
+        let begin = if index == 0 { "; without a fix there, at their limit of work, end " } else { " and " };
+        message.extend(text![
+            format!("{begin}{name} after "),
+            tests(*last),
+            if index == 0 { " pair tests" } else { "" }
+        ]);
     }
     Some(capitalised(message))
+}
+
+/// The ranking of the searches that have fixes at the largest size; `None` without two of them.
+pub(super) fn conclusion(run: &Run, summary: &RunSummary) -> Option<Text> {
+    let labels = Labels::of(summary);
+    let key = labels.along.as_ref()?;
+    let place = |index: usize| axes::on(&summary.rows[index], key).unwrap_or(f64::NEG_INFINITY);
+    let largest = (0..summary.rows.len()).map(place).reduce(f64::max)?;
+    let own = (0..summary.rows.len()).filter(|&index| place(index) == largest && summary.rows[index].found > 0);
+    let case = |index: usize| Case {
+        name: labels.of_series(&summary.rows[index]),
+        value: median(&run.trials[index], Field::Tests),
+        members: vec![index],
+        tail: Text::new(),
+    };
+    let mut cases = ranking::decreasing(own.map(case).collect());
+    cases.retain(|case| case.value.value() > 0.0);
+    cases.reverse();
+    let contrast = Contrast { run, summary };
+    let differs = |a: &Case, b: &Case| contrast.values_differ((Field::Tests, |_| None), [a, b], cases.len());
+    let words = Words { quantity: "number of pair tests", best: "smallest", worst: "largest", worse: "larger" };
+    let mut message = text![format!("at {} ", placed(key, &crate::format::trimmed(largest)))];
+    message.extend(ranking::clause(&cases, &words, &differs));
+    message.push(".".into());
+    (cases.len() > 1).then(|| capitalised(message))
+}
+
+/// The median number of pair tests of a trial.
+pub(super) fn tests(trial: &Trial) -> Text {
+    text![median(trial, Field::Tests).number()]
 }
 
 /// The median of a count over all attempts of a trial.

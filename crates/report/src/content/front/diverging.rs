@@ -62,7 +62,7 @@ fn parting(first: &Trial, second: &Trial) -> Option<(u64, u64)> {
 /// The answer whether the error of the second trial is smaller.
 fn verdict(without: &Measured, with: &Measured) -> Text {
     match (without.differs(with), with.value() < without.value()) {
-        (false, _) => text!["no effect is shown, the intervals overlap: "],
+        (false, _) => text!["no significant effect: "],
         (true, true) => text!["the error becomes smaller: "],
         (true, false) => text!["none, the error becomes larger: "],
     }

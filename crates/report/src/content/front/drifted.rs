@@ -32,7 +32,7 @@ pub(super) fn clause(trials: &[(String, &Trial)]) -> Text {
     }
     let disjoint = |a: &[f64; 2], b: &[f64; 2]| a[1] < b[0] || b[1] < a[0];
     if ranges.len() > 1 && !ranges.iter().any(|a| ranges.iter().any(|b| disjoint(a, b))) {
-        message.push(", which are not told apart".into());
+        message.push(", ranges that overlap".into());
     }
     message
 }

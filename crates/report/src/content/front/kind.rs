@@ -2,7 +2,8 @@
 
 use crate::{
     content::{
-        conditions::axes,
+        conditions::{axes, labels::Labels},
+        front::families,
         sections::{inspection, navigation, objects},
     },
     format::short,
@@ -31,6 +32,8 @@ pub(super) enum Kind {
     Acceptance(String),
     /// Fixes along the numeric axis of this key.
     Along(String),
+    /// Methods over kinds of problems, on the axis of this key.
+    Families(String),
     /// Fixes in named cases, or in a single trial.
     Cases,
 }
@@ -53,7 +56,7 @@ impl Kind {
             (Some(key), ..) => Self::Tolerance(key.clone()),
             (_, Some(key), _) => Self::Outliers(key.clone()),
             (.., Some(key)) => Self::Along(key.clone()),
-            _ => Self::Cases,
+            _ => families::kinds(summary, &Labels::of(summary)).map_or(Self::Cases, Self::Families),
         }
     }
 
@@ -66,8 +69,10 @@ impl Kind {
             Self::Tolerance(_) => &["precision-recall"],
             Self::Acceptance(_) => &["rates", "success", "recall"],
             Self::Outliers(_) => &["success", "error-over-condition", "recall"],
-            Self::Along(_) | Self::Cases if !asked.accuracy => &["rates", "success", "error-over-condition", "recall"],
-            Self::Along(_) | Self::Cases => {
+            Self::Along(_) | Self::Families(_) | Self::Cases if !asked.accuracy => {
+                &["rates", "success", "error-over-condition", "recall"]
+            }
+            Self::Along(_) | Self::Families(_) | Self::Cases => {
                 &["error-over-condition", "rates", "success", "distribution", "error-over-frames", "recall"]
             }
         }
@@ -95,8 +100,8 @@ pub(super) struct Asked {
     pub(super) suffices: bool,
     /// The number of identified points.
     pub(super) points: bool,
-    /// The residuals of the points.
-    pub(super) residuals: bool,
+    /// The cases that do not make the pose worse, and those that the residuals of the points show.
+    pub(super) tolerates: bool,
     /// Whether several objects in view help.
     pub(super) company: bool,
 }
@@ -122,7 +127,7 @@ impl Asked {
             removal: stem(&["remov"]),
             suffices: stem(&["suffic"]),
             points: phrase(&["how many feature points", "how many points"]),
-            residuals: stem(&["residual"]),
+            tolerates: stem(&["tolerat"]) && stem(&["residual"]),
             company: phrase(&["several objects", "several targets"]),
         }
     }
@@ -146,15 +151,15 @@ mod tests {
         );
         assert_eq!(asked("What happens at night?"), [true, true, false]);
         let more = |question| {
-            let Asked { effect, bounded, removal, suffices, points, residuals, company, .. } = Asked::of(question);
-            [effect, bounded, removal, suffices, points, residuals, company]
+            let Asked { effect, bounded, removal, suffices, points, tolerates, company, .. } = Asked::of(question);
+            [effect, bounded, removal, suffices, points, tolerates, company]
         };
         assert_eq!(more("How much does a current reduce the rate?"), [true, false, false, false, false, false, false]);
         assert_eq!(more("Do fixes bound the error?"), [false, true, false, false, false, false, false]);
         assert_eq!(more("How much drift do key frames remove?"), [true, false, true, false, false, false, false]);
         assert_eq!(more("Is the prior sufficient?"), [false, false, false, true, false, false, false]);
         assert_eq!(
-            more("How many feature points appear in the residuals?"),
+            more("How many feature points does a fix tolerate, and which errors appear in the residuals?"),
             [false, false, false, false, true, true, false]
         );
         assert_eq!(more("Do several objects in view help?"), [false, false, false, false, false, false, true]);

@@ -1,5 +1,7 @@
 //! Measured values with their intervals, as pieces of a sentence.
 
+use seafix_evaluation::Difference;
+
 use crate::{
     content::{
         phrases::{self, Unit},
@@ -50,10 +52,16 @@ impl Measured {
         Some([self.ends[0].value?, self.ends[1].value?]).filter(|_| self.without.is_empty())
     }
 
-    /// Whether the intervals are disjoint; a value without an interval differs from none.
+    /// Whether the difference of two independent values is significant; a value without an interval differs from none.
     pub(super) fn differs(&self, other: &Self) -> bool {
-        let [Some(a), Some(b)] = [self, other].map(Self::interval) else { return false };
-        a[1] < b[0] || b[1] < a[0]
+        let [Some(a), Some(b)] = [self, other].map(Self::with_ends) else { return false };
+        Difference::of_independent(a, b).significant()
+    }
+
+    /// The value with the ends of its interval, in its unit; `None` for a value without an interval.
+    pub(super) fn with_ends(&self) -> Option<[f64; 3]> {
+        let [low, high] = self.interval()?;
+        Some([self.value(), low, high])
     }
 
     /// The value with its interval: `76.7 % [66.4, 85.2]`.
@@ -108,8 +116,13 @@ impl<'a> Sample<'a> {
         self.measured().text()
     }
 
+    /// The number of wrong fixes.
+    pub(super) fn wrong_count(&self) -> Number {
+        phrases::pooled_count(&self.trials, "wrong", self.wrong)
+    }
+
     /// The number of attempts.
-    pub(super) fn n(&self) -> crate::number::Number {
+    pub(super) fn n(&self) -> Number {
         phrases::pooled_count(&self.trials, "attempted", self.attempted)
     }
 }
@@ -156,8 +169,13 @@ pub(super) fn wrong(run: &Run, summary: &RunSummary) -> Text {
     if summary.rows.iter().all(|row| row.unjudged == row.found) && all.found > 0 {
         return Text::new();
     }
-    let count = phrases::pooled_count(&all.trials, "wrong", all.wrong);
-    text!["; ", count, if all.wrong == 1 { " wrong fix in " } else { " wrong fixes in " }, all.n(), " attempts"]
+    text![
+        "; ",
+        all.wrong_count(),
+        if all.wrong == 1 { " wrong fix in " } else { " wrong fixes in " },
+        all.n(),
+        " attempts"
+    ]
 }
 
 /// A text that begins with a capital letter.

@@ -5,11 +5,15 @@ mod along;
 mod cases;
 mod company;
 mod conclusion;
+mod contrast;
 mod cost;
 mod diverging;
 mod drifted;
+mod families;
 mod figure;
+mod grid;
 mod kind;
+mod limited;
 mod limits;
 mod measured;
 mod navigated;
@@ -19,6 +23,7 @@ mod points;
 mod ranking;
 mod table;
 mod tolerance;
+mod tolerated;
 
 use crate::{
     content::conditions::labels::Labels,
@@ -60,6 +65,8 @@ pub(crate) fn answer(run: &Run, summary: &RunSummary) -> Text {
         Kind::Acceptance(key) => acceptance::sentence(run, summary, &key),
         Kind::Outliers(key) => outliers::sentence(run, summary, &labels, &key),
         Kind::Along(key) => along::sentence(run, summary, &labels, &key, asked),
+        Kind::Families(key) => families::sentence(run, summary, &labels, &key),
+        Kind::Cases if asked.tolerates => tolerated::sentence(run, summary, &labels),
         Kind::Cases => None,
     };
     let mut text = special.or_else(|| cases::sentence(run, summary, &labels, asked)).unwrap_or_else(|| {

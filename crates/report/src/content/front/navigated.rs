@@ -4,12 +4,13 @@ use super::{
     diverging, drifted,
     kind::Asked,
     measured::{Measured, capitalised, navigated_rms},
+    ranking::{self, Case, Words},
 };
 use crate::{
     content::conditions::{axes, labels::Labels},
     document::{Text, text},
     navigation_quantity::NavigationQuantity,
-    run::Run,
+    run::{Run, Trial},
     summary::RunSummary,
 };
 
@@ -74,6 +75,25 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, asked: 
     (!message.is_empty()).then(|| capitalised(message))
 }
 
+/// The ranking of the trials by their navigated error; `None` for a single trial.
+pub(super) fn conclusion(run: &Run, summary: &RunSummary) -> Option<Text> {
+    let labels = Labels::of(summary);
+    let case = |(index, trial): (usize, &Trial)| Case {
+        name: labels.of_trial(&summary.rows[index]),
+        value: navigated_rms(trial, NavigationQuantity::Position, trial.span()),
+        members: vec![index],
+        tail: Text::new(),
+    };
+    let mut cases = ranking::decreasing(run.trials.iter().enumerate().map(case).collect());
+    cases.retain(|case| case.value.value().is_finite());
+    cases.reverse();
+    let words =
+        Words { quantity: "navigated camera position error", best: "smallest", worst: "largest", worse: "larger" };
+    let mut message = ranking::clause(&cases, &words, &|a, b| a.value.differs(&b.value));
+    message.push(".".into());
+    (cases.len() > 1).then(|| capitalised(message))
+}
+
 /// The trials that the sentence lists, in their order.
 ///
 /// Along an axis these are its ends and the trial with the largest error, otherwise the extremes of the error.
@@ -99,7 +119,7 @@ fn verdict(known: &[Dive]) -> Text {
     } else if known.iter().any(larger) {
         text!["no, odometry alone has a smaller error in some trials: "]
     } else {
-        text!["not shown, since some intervals overlap with those of odometry alone: "]
+        text!["not shown, since some differences from odometry alone are not significant: "]
     }
 }
 
@@ -107,10 +127,10 @@ fn verdict(known: &[Dive]) -> Text {
 fn compared(first: &Dive, last: &Dive, known: &[Dive], along: bool) -> &'static str {
     let any = known.iter().any(|a| known.iter().any(|b| a.navigated.differs(&b.navigated)));
     match (first.navigated.differs(&last.navigated), any, known.len()) {
-        (false, false, 2) => ", which are not told apart: the intervals overlap",
-        (false, false, _) => ", which are not told apart: all intervals overlap",
+        (false, false, 2) => ", without a significant difference",
+        (false, false, _) => ", without a significant difference",
         (true, _, 3..) if along && !known[1].navigated.differs(&last.navigated) => {
-            ", of which the last two are not told apart"
+            ", where the last two do not differ significantly"
         }
         _ => "",
     }

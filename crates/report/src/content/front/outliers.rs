@@ -1,6 +1,7 @@
 //! The answer about robust methods: the fraction of wrong pairs that each tolerates.
 
 use super::{
+    contrast::Contrast,
     measured::{Sample, capitalised, error, median_of, wrong},
     ranking::{self, Case, Words},
 };
@@ -38,7 +39,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
     let same = |a: &Borne, b: &Borne| (a.1.value, a.2.value) == (b.1.value, b.2.value);
     for (place, group) in known.chunk_by(same).enumerate() {
         message.push(if place > 0 { ", " } else { "" }.into());
-        let names = list(&group.iter().map(|borne| borne.0.as_str()).collect::<Vec<_>>());
+        let names = ranking::names(group.iter().map(|borne| borne.0.as_str()));
         let (_, point, surely) = &group[0];
         if point.value.is_none() {
             message.push(format!("at none of the tested fractions with {names}").into());
@@ -48,9 +49,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
         // The interval states more than the rate only where its lower end is below the limit earlier.
         if surely.value.is_some() && surely.value != point.value {
             message.extend(text![
-                " (surely to ",
+                " (the lower end of the 95 % interval stays there up to ",
                 surely.clone(),
-                format!("{end}, by the lower end of the 95 % interval)")
+                format!("{end})")
             ]);
         }
     }
@@ -63,15 +64,6 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
 /// A method, the largest fraction that it tolerates, and the same by the lower ends of the intervals.
 type Borne = (String, Number, Number);
 
-/// Names in a sentence: `a, b and c`.
-fn list(names: &[&str]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => (*one).to_owned(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
-}
-
 /// The clause on the rates of fixes at the largest fraction.
 fn at_the_largest(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
     let at = summary.rows.iter().filter_map(|row| axes::on(row, key)).reduce(f64::max)?;
@@ -80,6 +72,7 @@ fn at_the_largest(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -
     let cases = known.map(|index| Case {
         name: labels.of_series(&summary.rows[index]),
         value: Sample::of(run, summary, &[index]).measured(),
+        members: vec![index],
         tail: Text::new(),
     });
     let cases = ranking::decreasing(cases.collect());
@@ -88,7 +81,9 @@ fn at_the_largest(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -
     }
     let words = Words { quantity: "rate of fixes", best: "highest", worst: "lowest", worse: "lower" };
     let mut message = text![format!("; at {} ", fraction(&trimmed(at), key))];
-    message.extend(ranking::clause(&cases, &words));
+    let contrast = Contrast { run, summary };
+    let differs = |a: &Case, b: &Case| contrast.rates_differ(&a.members, &b.members, cases.len());
+    message.extend(ranking::clause(&cases, &words, &differs));
     Some(message)
 }
 
@@ -107,6 +102,7 @@ fn loss(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<T
     let cases = known.filter(|&index| of(&summary.rows[index]).is_some()).map(|index| Case {
         name: labels.of_series(&summary.rows[index]),
         value: median_of(summary, &run.trials[index], (field, of), (Unit::Millimetres, " mm")),
+        members: vec![index],
         tail: Text::new(),
     });
     let mut cases = ranking::decreasing(cases.collect());
@@ -117,6 +113,8 @@ fn loss(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<T
     let quantity = format!("median {name}");
     let words = Words { quantity: &quantity, best: "smallest", worst: "largest", worse: "larger" };
     let mut message = text![format!("; at {} ", fraction(&trimmed(at), key))];
-    message.extend(ranking::clause(&cases, &words));
+    let contrast = Contrast { run, summary };
+    let differs = |a: &Case, b: &Case| contrast.values_differ((field, of), [a, b], cases.len());
+    message.extend(ranking::clause(&cases, &words, &differs));
     Some(message)
 }

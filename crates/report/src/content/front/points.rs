@@ -29,7 +29,14 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     }
     if let [first, second] = &largest[..] {
         let differ = first.differs(second);
-        message.push(if differ { ", and the largest differ" } else { ", and the largest are not told apart" }.into());
+        message.push(
+            if differ {
+                ", and the largest differ significantly"
+            } else {
+                ", and the largest do not differ significantly"
+            }
+            .into(),
+        );
     }
     message.retain(|span| !span.plain().is_empty());
     (!message.is_empty()).then(|| capitalised(message))

@@ -10,6 +10,8 @@ const LISTED: usize = 4;
 pub(super) struct Case {
     pub(super) name: String,
     pub(super) value: Measured,
+    /// The trials that the value pools.
+    pub(super) members: Vec<usize>,
     /// The words after the value: its number of attempts.
     pub(super) tail: Text,
 }
@@ -24,16 +26,15 @@ pub(super) struct Words<'a> {
 
 /// The clause on `cases`, the best first; two at least.
 ///
-/// Cases whose intervals overlap are not told apart. A case that differs from the best is named with its value, or the
-/// worst of them if they are many.
-pub(super) fn clause(cases: &[Case], words: &Words<'_>) -> Text {
+/// A case whose difference from the best is significant by `differs` is named with its value, or the worst of them if they
+/// are many.
+pub(super) fn clause(cases: &[Case], words: &Words<'_>, differs: &dyn Fn(&Case, &Case) -> bool) -> Text {
     let [best, .., last] = cases else { return Text::new() };
     let Words { quantity, best: superlative, worst, worse } = words;
     let ties =
         |of: &Case| -> Vec<&Case> { cases.iter().filter(|case| case.value.value() == of.value.value()).collect() };
     let firsts = ties(best);
-    let (apart, close): (Vec<&Case>, Vec<&Case>) =
-        cases[firsts.len()..].iter().partition(|case| case.value.differs(&best.value));
+    let (apart, close): (Vec<&Case>, Vec<&Case>) = cases[firsts.len()..].iter().partition(|case| differs(case, best));
     let named = |case: &Case| {
         let mut message = case.value.text();
         message.extend(case.tail.clone());
@@ -47,18 +48,17 @@ pub(super) fn clause(cases: &[Case], words: &Words<'_>) -> Text {
     }
     if apart.is_empty() {
         let lasts = ties(last);
-        message.push(format!("no difference of the {quantity} is shown: it ranges from ").into());
+        message.push(format!("no difference of the {quantity} is significant: it ranges from ").into());
         message.extend(named(last));
-        message.push(format!(" with {} to ", names(&lasts)).into());
+        message.push(format!(" with {} to ", some_names(&lasts)).into());
         message.extend(named(best));
-        message
-            .push(format!(" with {}, and all intervals overlap with that of the {superlative}", names(&firsts)).into());
+        message.push(format!(" with {}", some_names(&firsts)).into());
         return message;
     }
-    message.push(format!("the {quantity} is {superlative} with {}, ", names(&firsts)).into());
+    message.push(format!("the {quantity} is {superlative} with {}, ", some_names(&firsts)).into());
     message.extend(named(best));
     if !close.is_empty() {
-        message.push(format!(", not told apart from {}", names(&close)).into());
+        message.push(format!(", not significantly different from {}", some_names(&close)).into());
     }
     if apart.len() <= LISTED {
         message.push(format!(", and {worse} with ").into());
@@ -69,7 +69,7 @@ pub(super) fn clause(cases: &[Case], words: &Words<'_>) -> Text {
             message.push(")".into());
         }
     } else {
-        message.push(format!(", and {worst} with {}, ", names(&ties(last))).into());
+        message.push(format!(", and {worst} with {}, ", some_names(&ties(last))).into());
         message.extend(named(last));
     }
     message
@@ -84,13 +84,18 @@ fn separator(place: usize, count: usize) -> &'static str {
     }
 }
 
-/// The names of cases in a sentence: `a, b and c`, or the first of many.
-fn names(cases: &[&Case]) -> String {
-    if cases.len() > LISTED {
-        return format!("{} and {} others", quoted(&cases[0].name), cases.len() - 1);
+/// The names of cases in a sentence, or the first of many.
+fn some_names(cases: &[&Case]) -> String {
+    match cases {
+        [first, ..] if cases.len() > LISTED => format!("{} and {} others", quoted(&first.name), cases.len() - 1),
+        _ => names(cases.iter().map(|case| case.name.as_str())),
     }
-    let each = cases.iter().enumerate();
-    each.map(|(place, case)| format!("{}{}", separator(place, cases.len()), quoted(&case.name))).collect()
+}
+
+/// Names in a sentence: `a, b and c`.
+pub(super) fn names<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
+    let count = names.len();
+    names.enumerate().map(|(place, name)| format!("{}{}", separator(place, count), quoted(name))).collect()
 }
 
 /// A name in a sentence: one of several words in quotation marks, so that it is read as one.
@@ -123,22 +128,21 @@ mod tests {
             Number::new(Some(value), 0, key)
         };
         let value = Measured::new([value, low, high].map(number), " %");
-        Case { name: name.to_owned(), value, tail: Text::new() }
+        Case { name: name.to_owned(), value, members: Vec::new(), tail: Text::new() }
     }
 
     fn read(cases: Vec<Case>) -> String {
         let words = Words { quantity: "rate", best: "highest", worst: "lowest", worse: "lower" };
-        clause(&decreasing(cases), &words).iter().map(Span::plain).collect()
+        clause(&decreasing(cases), &words, &|a, b| a.value.differs(&b.value)).iter().map(Span::plain).collect()
     }
 
     /// Each test of this sentence was seen to fail where the values alone decide.
     #[test]
-    fn overlapping_intervals_do_not_differ() {
+    fn small_differences_are_not_significant() {
         let cases = vec![case("a", 70.0, [50.0, 85.0]), case("b", 73.0, [53.0, 88.0]), case("c", 56.0, [37.0, 74.0])];
         assert_eq!(
             read(cases),
-            "no difference of the rate is shown: it ranges from 56 % [37, 74] with c to 73 % [53, 88] with b, and all \
-             intervals overlap with that of the highest"
+            "no difference of the rate is significant: it ranges from 56 % [37, 74] with c to 73 % [53, 88] with b"
         );
     }
 
@@ -153,7 +157,7 @@ mod tests {
         ];
         assert_eq!(
             read(cases),
-            "the rate is highest with “a b” and c, 74 % [69, 80], not told apart from d, and lower with f (60 % [52, \
+            "the rate is highest with “a b” and c, 74 % [69, 80], not significantly different from d, and lower with f (60 % [52, \
              68]) and e (17 % [13, 22])"
         );
     }

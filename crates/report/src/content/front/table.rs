@@ -1,61 +1,102 @@
-//! The small table of the first page: rates and errors with their intervals, one line for every trial or series.
+//! The small table of the first page: rates and errors with their intervals, one line for every trial.
+//!
+//! A longer run has a [`grid`] of its two conditions, or a line for every series.
 
 use super::{
-    acceptance,
+    contrast::Contrast,
+    grid,
     kind::Kind,
+    limited,
     measured::{Measured, Sample, error, median, navigated_rms},
 };
 use crate::{
-    content::{conditions::labels::Labels, phrases, sections::navigation},
-    document::{Block, Cell, Head, Table, text},
+    content::{
+        conditions::labels::{Labels, value},
+        phrases::{self, Unit},
+        sections::navigation,
+    },
+    document::{Block, Cell, Head, Table, Text, text},
     navigation_quantity::NavigationQuantity,
     run::Run,
     summary::RunSummary,
 };
 
-/// Maximum number of lines; a longer run has a line for every series.
-const LINES: usize = 12;
+/// Maximum number of lines.
+pub(super) const LINES: usize = 12;
 
 /// The table; `None` if even the series are too many, or nothing was attempted.
 pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
-    let labels = Labels::of(summary);
-    let trials = || -> Vec<(String, Vec<usize>)> {
-        (0..summary.rows.len()).map(|index| (labels.of_trial(&summary.rows[index]), vec![index])).collect()
-    };
-    let lines: Vec<(String, Vec<usize>)> = match Kind::of(run, summary) {
-        Kind::Acceptance(key) => acceptance::limits(summary, &key),
-        _ if summary.rows.len() <= LINES => trials(),
-        _ => labels.series(summary),
-    };
-    if lines.len() > LINES || summary.rows.iter().all(|row| row.attempted == 0) {
+    if summary.rows.iter().all(|row| row.attempted == 0) {
         return None;
     }
+    let kind = Kind::of(run, summary);
+    if let Kind::Acceptance(key) = &kind {
+        return limited::table(run, summary, key);
+    }
+    let labels = Labels::of(summary);
+    if summary.rows.len() > LINES
+        && let Some(grid) = grid::table(run, summary, &labels, &kind)
+    {
+        return Some(grid);
+    }
+    let lines: Vec<(String, Vec<usize>)> = match summary.rows.len() <= LINES {
+        true => (0..summary.rows.len()).map(|index| (labels.of_trial(&summary.rows[index]), vec![index])).collect(),
+        false => labels.series(summary),
+    };
+    (lines.len() <= LINES).then(|| Block::Table(table(run, summary, lines)))
+}
+
+fn table(run: &Run, summary: &RunSummary, lines: Vec<(String, Vec<usize>)>) -> Table {
     let single = lines.iter().all(|(_, members)| members.len() == 1);
     let navigates = run.trials.iter().any(navigation::navigates);
+    let contrast = Contrast { run, summary };
+    let bases = bases(summary);
+    let changes = |index: usize| contrast.of_rates(&[index], &[bases[index]], 0.95);
+    let others = || lines.iter().map(|(_, own)| own[0]).filter(|&index| bases[index] != index);
+    let compared = single
+        && !navigates
+        && others().count() > 0
+        && others().all(|index| changes(index).is_some())
+        && others().any(|index| changes(index).is_some_and(|change| change.value != 0.0));
     let mut heads = vec![Head::words(""), Head::numbers("attempts"), Head::numbers("fixes (%)")];
-    let rated = matches!(Kind::of(run, summary), Kind::Acceptance(_));
-    heads.push(Head::numbers(if rated { "wrong (%)" } else { "wrong" }));
+    if compared {
+        heads.push(Head::numbers("change (points)"));
+    }
+    heads.push(Head::numbers("wrong"));
     if single {
-        heads.push(Head::numbers(format!(
-            "median {} (mm)",
-            if navigates { "error of fixes" } else { error(summary).0 }
-        )));
+        let what = if navigates { "error of fixes" } else { error(summary).0 };
+        heads.push(Head::numbers(format!("median {what} (mm)")));
     }
     if navigates && single {
         heads.push(Head::numbers("navigated error RMS (mm)"));
     }
     let errors = if single { " and median errors" } else { "" };
-    let wrong = if rated { " and wrong fixes" } else { "" };
-    let caption = text![format!("Fixes{wrong} in % of the attempts{errors}, with 95 % intervals.")];
-    let mut table = Table::new("answer", caption, heads);
+    let change = match compared {
+        true if bases.iter().all(|&base| base == 0) => {
+            " Change: the difference of the rate from that of the first line, over their common attempts; each interval holds alone."
+        }
+        true => {
+            " Change: the difference of the rate from that of the dash above, over their common attempts; each interval holds alone."
+        }
+        false => "",
+    };
+    let caption = format!("Fixes in % of the attempts{errors}, with 95 % intervals.{change}");
+    let mut table = Table::new("answer", text![caption], heads);
     for (name, members) in lines {
         let sample = Sample::of(run, summary, &members);
         let mut cells: Vec<Cell> = vec![name.into(), sample.n().into()];
-        cells.push(Cell { text: of_attempts(&sample, sample.measured()), ..Cell::default() });
-        cells.push(match rated {
-            true => Cell { text: of_attempts(&sample, sample.wrong_rate()), ..Cell::default() },
-            false => phrases::pooled_count(&sample.trials, "wrong", sample.wrong).into(),
-        });
+        cells.push(Cell { text: rate_of(&sample, sample.measured()), ..Cell::default() });
+        if compared {
+            let (own, base) = (members[0], bases[members[0]]);
+            cells.push(match changes(own).filter(|_| own != base) {
+                Some(change) => {
+                    let [_, value, low, high] = contrast.numbers([&[own], &[base]], "found", (change, Unit::Plain, 1));
+                    Cell { text: text![value, " [", low, ", ", high, "]"], ..Cell::default() }
+                }
+                None => "–".into(),
+            });
+        }
+        cells.push(phrases::pooled_count(&sample.trials, "wrong", sample.wrong).into());
         if let ([index], true) = (&members[..], single) {
             let known = (error(summary).2)(&summary.rows[*index]).is_some();
             let shown = if known { without_unit(median(summary, &run.trials[*index])) } else { text!["–"] };
@@ -69,16 +110,28 @@ pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
         }
         table.line(false, cells);
     }
-    Some(Block::Table(table))
+    table
+}
+
+/// The trial that each trial is compared with: the first at the same place of the axis, or the first of a single series.
+fn bases(summary: &RunSummary) -> Vec<usize> {
+    let labels = Labels::of(summary);
+    let place = |index: usize| labels.along.as_ref().map(|key| value(&summary.rows[index], key));
+    let series = labels.series(summary).len();
+    let base = |index: usize| match series {
+        1 => 0,
+        _ => (0..index).find(|&other| place(other) == place(index)).unwrap_or(index),
+    };
+    (0..summary.rows.len()).map(base).collect()
 }
 
 /// The rate without its sign; a dash without attempts.
-fn of_attempts(sample: &Sample<'_>, rate: Measured) -> crate::document::Text {
+pub(super) fn rate_of(sample: &Sample<'_>, rate: Measured) -> Text {
     if sample.attempted == 0 { text!["–"] } else { without_unit(rate.text()) }
 }
 
 /// A measured value whose unit the head of its column states.
-fn without_unit(text: crate::document::Text) -> crate::document::Text {
+fn without_unit(text: Text) -> Text {
     let strip = |span| match span {
         crate::document::Span::Plain(words) => {
             crate::document::Span::Plain(words.replace(" mm RMS", "").replace(" mm", "").replace(" %", ""))

@@ -1,6 +1,9 @@
 //! The answer about the tolerance of distances: the one with the largest F1 score at the ends of the other condition.
 
-use super::measured::{Sample, capitalised};
+use super::{
+    contrast::Contrast,
+    measured::{Sample, capitalised},
+};
 use crate::{
     content::{conditions::axes, figures::tolerance::Identified},
     document::{Text, text},
@@ -51,24 +54,26 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
         message.extend(text![" of ", sample.n(), " attempts"]);
         let search = |index: usize| &summary.rows[index].search;
         let others = here().filter(|(other, _)| other != index && search(*other) == search(*index));
-        let close = others.filter(|(other, _)| !Sample::of(run, summary, &[*other]).measured().differs(&best));
-        let close: Vec<f64> = close.filter_map(|(other, _)| axes::on(&summary.rows[*other], key)).collect();
+        let others: Vec<usize> = others.map(|(other, _)| *other).collect();
+        let contrast = Contrast { run, summary };
+        let close = others.iter().filter(|&&other| !contrast.rates_differ(&[other], &[*index], others.len() + 1));
+        let close: Vec<f64> = close.filter_map(|&other| axes::on(&summary.rows[other], key)).collect();
         message.extend(similar_tolerances(close, key));
     }
     (!message.is_empty()).then(|| capitalised(message))
 }
 
-/// The words on tolerances of the same search whose rates have overlapping intervals; `None` without any.
+/// The words on tolerances of the same search whose rates do not differ significantly; `None` without any.
 fn similar_tolerances(mut close: Vec<f64>, key: &str) -> Option<crate::document::Span> {
     close.sort_by(f64::total_cmp);
     let unit = unit(key).map_or_else(String::new, |unit| format!(" {unit}"));
     let [first, .., last] = close[..] else {
         let one = trimmed(*close.first()?);
-        return Some(format!(", a rate not told apart from that at {one}{unit}").into());
+        return Some(format!(", a rate that does not differ significantly from that at {one}{unit}").into());
     };
     let (first, last) = (trimmed(first), trimmed(last));
     Some(
-        format!(", a rate not told apart from those of {} other tolerances from {first} to {last}{unit}", close.len())
+        format!(", a rate that does not differ significantly from those at {} other tolerances from {first} to {last}{unit}", close.len())
             .into(),
     )
 }

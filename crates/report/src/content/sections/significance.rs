@@ -83,6 +83,13 @@ pub(crate) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Ve
     sure.into_iter().take(max).map(as_number).collect()
 }
 
+/// The sentence on the number of significant differences beyond the first `max`; `None` without any.
+pub(crate) fn others(comparisons: &[Comparison], max: usize) -> Option<Text> {
+    let more = comparisons.iter().filter(|comparison| comparison.better().is_some()).count().checked_sub(max + 1)? + 1;
+    let are = if more == 1 { "difference is" } else { "differences are" };
+    Some(text![format!("{more} more {are} significant; the table of comparisons lists all.")])
+}
+
 /// The sentence on a comparison with an infinite difference or interval.
 ///
 /// One of the trials often fails then.
