@@ -40,7 +40,7 @@ pub fn of_blocks(k: usize, n: usize, block: usize, confidence: f64) -> (f64, f64
 }
 
 /// The design effect, between 1 and the block length; `k` trials are events.
-fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
+pub(super) fn design_effect(events: &[bool], k: usize, block: usize) -> f64 {
     let n = events.len();
     let (longest, fraction) = (block as f64, k as f64 / n as f64);
     let rarer = 2 * k <= n;

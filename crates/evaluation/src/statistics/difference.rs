@@ -3,10 +3,11 @@
 //! Attempts on the same frames are compared in pairs: what both have in common, such as a difficult view, cancels. Two
 //! intervals that overlap say little: the difference may be significant all the same.
 
+use statrs::distribution::{ContinuousCDF, Normal};
+
 use super::{
-    clustered::of_blocks,
+    clustered::{design_effect, of_blocks},
     quantile::{median, quantile},
-    rate::real_clopper_pearson,
 };
 
 /// A difference first − second with its interval.
@@ -23,31 +24,42 @@ pub struct Difference {
 impl Difference {
     /// The difference of the rates of two events over the same trials, in order of time; zero and (−1, 1) without trials.
     ///
-    /// With d of n trials in which only one event happens, a of them the first, it is (d/n)(2a/d − 1). The interval follows
-    /// from that of a/d by Clopper and Pearson, which is the inversion of McNemar's exact test. Successive trials depend on
-    /// each other: of those in one block of `block` trials all count as one, and `block` 1 are independent trials. Without
-    /// such a trial the interval is that of no event in n.
+    /// Of n trials only the first event happens in b, only the second in c; the difference is (b − c)/n. The interval holds
+    /// each δ that the score test of Tango does not reject: (b − c − n δ)² ≤ z² n (2 q + δ (1 − δ)), where q is the most
+    /// likely probability of "only the second" under δ. At δ = 0 it is McNemar's test. Successive trials depend on each other:
+    /// all counts are divided by the design effect of [`clustered`](super::clustered) for the trials with one event only,
+    /// with blocks of `block` trials; `block` 1 are independent trials.
+    ///
+    /// Source: Tango, *Equivalence test and confidence interval for the difference in proportions for the paired-sample
+    /// design*, Statistics in Medicine 17, 1998.
     ///
     /// ```
     /// use seafix_evaluation::Difference;
     /// let pairs: Vec<(bool, bool)> = (0..40).map(|i| (true, i >= 6)).collect();
-    /// let found = Difference::of_rates(&pairs, 1, 0.95); // six trials against none: p = 2 · 2⁻⁶ = 0.031
+    /// let found = Difference::of_rates(&pairs, 1, 0.95); // six trials against none: z = √6
     /// assert!(found.value == 0.15 && found.significant());
     /// ```
     pub fn of_rates(pairs: &[(bool, bool)], block: usize, confidence: f64) -> Self {
-        let (n, block) = (pairs.len(), block.max(1));
-        let alone = |a: bool| pairs.iter().filter(|pair| **pair == (a, !a)).count();
-        let (first, second) = (alone(true), alone(false));
-        let d = first + second;
-        if d == 0 {
-            let high = of_blocks(0, n, block, confidence).1;
-            return Self { value: 0.0, interval: [-high, high], pairs: Some(n) };
+        let n = pairs.len();
+        if n == 0 {
+            return Self { value: 0.0, interval: [-1.0, 1.0], pairs: Some(0) };
         }
-        let blocks = pairs.chunks(block).filter(|block| block.iter().any(|(a, b)| a != b)).count() as f64;
-        let part = first as f64 / d as f64;
-        let (low, high) = real_clopper_pearson(part * blocks, blocks, confidence);
-        let of = |part: f64| d as f64 / n as f64 * (2.0 * part - 1.0);
-        Self { value: of(part), interval: [of(low), of(high)], pairs: Some(n) }
+        let alone: Vec<bool> = pairs.iter().map(|(a, b)| a != b).collect();
+        let count = |pair: (bool, bool)| pairs.iter().filter(|own| **own == pair).count() as f64;
+        let d = alone.iter().filter(|alone| **alone).count();
+        let effect = design_effect(&alone, d, block.clamp(1, n));
+        let [b, c, n_effective] = [count((true, false)), count((false, true)), n as f64].map(|count| count / effect);
+        let z = Normal::standard().inverse_cdf(0.5 + 0.5 * confidence);
+        let value = (b - c) / n_effective;
+        // The score falls as δ grows.
+        let end = |target: f64, mut low: f64, mut high: f64| {
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if score([b, c, n_effective], middle) > target { low = middle } else { high = middle }
+            }
+            0.5 * (low + high)
+        };
+        Self { value, interval: [end(z, -1.0, value), end(-z, value, 1.0)], pairs: Some(n) }
     }
 
     /// The median difference of two values of the same trials; `None` without trials.
@@ -82,27 +94,52 @@ impl Difference {
     }
 }
 
+/// Tango's score of the difference δ for `[b, c, n]`.
+fn score([b, c, n]: [f64; 3], delta: f64) -> f64 {
+    let (second, third) = ((2.0 * n - b + c) * delta - b - c, -c * delta * (1.0 - delta));
+    let q = ((second * second - 8.0 * n * third).max(0.0).sqrt() - second) / (4.0 * n);
+    let variance = n * (2.0 * q + delta * (1.0 - delta));
+    let excess = b - c - n * delta;
+    if excess == 0.0 { 0.0 } else { excess / variance.max(0.0).sqrt() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// McNemar's exact test of 6 against 0 gives p = 2 · 2⁻⁶ = 0.031, of 5 against 0 it gives 0.063.
+    /// The ends solve the score equation, with q at the maximum of the likelihood b ln(q + δ) + c ln q + (n − b − c)
+    /// ln(1 − 2q − δ), here found by trying all.
     ///
-    /// Seen to fail where the interval is that of the rate of the first alone.
+    /// Seen to fail where q is c/n.
     #[test]
-    fn the_difference_of_rates_inverts_the_exact_test() {
+    fn the_ends_of_the_difference_have_the_score_of_the_level() {
+        let pairs: Vec<(bool, bool)> = (0..50).map(|i| (i < 12 || i >= 14, i >= 12)).collect();
+        let found = Difference::of_rates(&pairs, 1, 0.95);
+        assert!((found.value - 0.2).abs() < 1e-12, "12 against 2 of 50");
+        for end in found.interval {
+            let likelihood = |q: f64| 12.0 * (q + end).ln() + 2.0 * q.ln() + 36.0 * (1.0 - 2.0 * q - end).ln();
+            let possible = (1..100_000).map(|i| f64::from(i) * 5e-6).filter(|q| q + end > 0.0 && 2.0 * q + end < 1.0);
+            let q = possible.max_by(|a, b| likelihood(*a).total_cmp(&likelihood(*b))).expect("some q is possible");
+            let z = (10.0 - 50.0 * end).abs() / (50.0 * (2.0 * q + end * (1.0 - end))).sqrt();
+            assert!((z - 1.959_964).abs() < 1e-3, "{end} {q} {z}");
+        }
+    }
+
+    #[test]
+    fn the_difference_of_rates_is_that_of_mcnemar_s_test() {
         let pairs =
             |only: usize, both: usize| -> Vec<(bool, bool)> { (0..only + both).map(|i| (true, i >= only)).collect() };
-        let (six, five) = (pairs(6, 34), pairs(5, 35));
-        assert!(Difference::of_rates(&six, 1, 0.95).significant());
-        assert!(!Difference::of_rates(&five, 1, 0.95).significant());
-        // In blocks of three, six successive trials are two.
-        assert!(!Difference::of_rates(&six, 3, 0.95).significant());
-        let apart: Vec<(bool, bool)> = (0..40).map(|i| (true, i % 6 != 0)).collect();
-        assert!(Difference::of_rates(&apart, 3, 0.95).significant(), "seven blocks of three have one each");
-        // Nothing differs: the rule of three bounds the difference by about 3/n on both sides.
+        // z = (b − c)/√(b + c) is 2 for four against none, and 1.7 for three.
+        assert!(Difference::of_rates(&pairs(4, 36), 1, 0.95).significant());
+        assert!(!Difference::of_rates(&pairs(3, 37), 1, 0.95).significant());
+        // Six successive trials in blocks of three are two.
+        assert!(!Difference::of_rates(&pairs(6, 34), 3, 0.95).significant());
+        let apart: Vec<(bool, bool)> = (0..40).map(|i| (true, i % 5 != 0)).collect();
+        assert!(Difference::of_rates(&apart, 3, 0.95).significant());
+        // Nothing differs: the score interval of no event in n ends at z²/(n + z²).
         let [low, high] = Difference::of_rates(&pairs(0, 100), 1, 0.95).interval;
-        assert!(low == -high && (0.03..0.04).contains(&high), "{high}");
+        let expected = 3.8415 / 103.8415;
+        assert!((high - expected).abs() < 1e-4 && (low + expected).abs() < 1e-4, "{low} {high}");
         assert_eq!(Difference::of_rates(&[], 1, 0.95).interval, [-1.0, 1.0]);
     }
 

@@ -72,7 +72,7 @@ fn whether_fixes_bound_the_error_is_answered() {
     trial(folder.path(), 2, ["navigation", "seldom"], question, |_| [0.007, 0.020]);
     let text = page(folder.path());
     assert!(
-        text.contains("Not shown, since some intervals overlap with those of odometry alone: with often"),
+        text.contains("Not shown, since some differences from odometry alone are not significant: with often"),
         "{text}"
     );
 }
@@ -89,7 +89,7 @@ fn a_drift_has_the_range_of_its_intervals() {
     let slope = |number: u64| if number < 20 { 2e-3 } else { 4e-3 };
     trial(folder.path(), 2, ["navigation.odometry", "dvl"], question, |number| [slope(number) * since(number), 0.0]);
     let text = page(folder.path());
-    let expected = "With stereo the pose drifts 1.00 mm per metre of path between two fixes (1.00 to 1.00 in its 2 \
+    let expected = "With stereo the pose drifts 1.00 mm per metre of path after a fix (1.00 to 1.00 in its 2 \
                     intervals), with dvl 3.00 mm per metre (2.00 to 4.00 in its 2 intervals); with stereo the camera \
                     position error is ";
     assert!(text.contains(expected), "{text}");
@@ -105,8 +105,8 @@ fn trials_are_compared_from_their_first_difference_on() {
     trial(folder.path(), 1, ["navigation", "alone"], question, |number| [if number < 25 { 0.001 } else { 0.010 }, 0.0]);
     trial(folder.path(), 2, ["navigation", "map"], question, |number| [if number < 25 { 0.001 } else { 0.002 }, 0.0]);
     let text = page(folder.path());
-    let expected = "The error becomes smaller: from frame 25, where the trials first differ, the camera position error is \
-                    10.0 mm RMS [10.0, 10.0] with alone and 2.0 mm RMS [2.0, 2.0] with map; at the last frame alone, \
-                    which has no interval, it is 10.0 mm and 2.0 mm.";
+    let expected = "At the last frame of the dive the camera position error is 10.0 mm with alone and 2.0 mm with map (a \
+                    single frame has no interval); from frame 25 on, where the trials first differ, it is 10.0 mm RMS \
+                    [10.0, 10.0] and 2.0 mm RMS [2.0, 2.0], a significant difference.";
     assert!(text.contains(expected), "{text}");
 }

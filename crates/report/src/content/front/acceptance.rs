@@ -6,7 +6,7 @@ use crate::{
     document::{Text, text},
     format::{distinct, short},
     run::Run,
-    summary::RunSummary,
+    summary::{Row, RunSummary},
 };
 
 /// The trials at a limit: those of frames with the object, and those of frames without it.
@@ -17,7 +17,7 @@ pub(super) struct Limit {
 }
 
 /// Each value of the axis `key` with its trials, in the order of the run.
-pub(super) fn limits(summary: &RunSummary, key: &str) -> Vec<Limit> {
+fn limits(summary: &RunSummary, key: &str) -> Vec<Limit> {
     let is_absent = |index: &usize| {
         summary.rows[*index].axes.iter().any(|axis| short(&axis.key) == "absent" && axis.value == "true")
     };
@@ -29,15 +29,34 @@ pub(super) fn limits(summary: &RunSummary, key: &str) -> Vec<Limit> {
     distinct(summary.rows.iter().map(|row| value(row, key))).into_iter().map(of).collect()
 }
 
-/// The rates of fixes and of wrong fixes among frames with the object, and that of answers among those without it.
+/// The limits of each method, the first method of the run first.
+pub(super) fn methods(summary: &RunSummary, key: &str) -> Vec<(String, Vec<Limit>)> {
+    let several = summary.rows.iter().any(|row| row.search != summary.rows[0].search);
+    let name = |row: &Row| if several { row.search.clone() } else { row.method() };
+    let own = |method: String| {
+        let of =
+            |members: &[usize]| members.iter().copied().filter(|&index| name(&summary.rows[index]) == method).collect();
+        let limits = limits(summary, key).into_iter();
+        let limits =
+            limits.map(|limit| Limit { present: of(&limit.present), absent: of(&limit.absent), ..limit }).collect();
+        (method.clone(), limits)
+    };
+    distinct(summary.rows.iter().map(name)).into_iter().map(own).collect()
+}
+
+/// The rates of fixes and of wrong fixes among frames with the object, and that of answers among those without it, with the
+/// first method.
 pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Text> {
-    let mut message = Text::new();
-    for limit in limits(summary, key) {
+    let methods = methods(summary, key);
+    let several = methods.len() > 1;
+    let (method, limits) = methods.into_iter().next()?;
+    let mut message = if several { text![format!("with {method}, ")] } else { Text::new() };
+    for (place, limit) in limits.into_iter().enumerate() {
         let [present, absent] = [&limit.present, &limit.absent].map(|members| Sample::of(run, summary, members));
         if present.attempted == 0 {
             continue;
         }
-        let begin = if message.is_empty() { "" } else { "; " };
+        let begin = if place == 0 { "" } else { "; " };
         message.push(format!("{begin}at the limit {}, ", limit.name).into());
         message.extend(present.rate());
         message.extend(text![" of ", present.n(), " objects in view have a fix and "]);
@@ -48,6 +67,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
             message.extend(absent.wrong_rate().text());
             message.extend(text![" of ", absent.n(), " frames without the object are answered"]);
         }
+    }
+    if several {
+        message.push("; the table has the other methods".into());
     }
     (!message.is_empty()).then(|| capitalised(message))
 }

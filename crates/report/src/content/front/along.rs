@@ -160,16 +160,22 @@ impl Series<'_> {
         message
     }
 
-    /// The words on the lower ends of the intervals, if they fall below one half before the value of `count` does.
+    /// The words on the values, of the first `count`, whose interval is above one half as a whole; `None` if all are.
     fn surely(&self, count: usize) -> Option<crate::document::Span> {
         let sure =
             |index: &&usize| self.sample(**index).measured().interval().is_some_and(|[low, _]| low >= 100.0 * HALF);
-        let surely = self.members.iter().take_while(sure).count();
-        (surely < count).then(|| match surely.checked_sub(1).map(|last| self.members[last]) {
-            Some(last) => {
-                format!(", where the lower end of the interval is above one half up to {} only", self.at(last)).into()
+        let own: Vec<String> = self.members[..count].iter().filter(sure).map(|&index| self.at(index)).collect();
+        let first = self.members[..count].iter().take_while(sure).count();
+        (own.len() < count).then(|| match own.last() {
+            None => ", with no interval above one half as a whole".into(),
+            Some(last) if first == own.len() => {
+                format!(", with intervals above one half as a whole up to {last}").into()
             }
-            None => ", where the lower end of the interval is below one half at every value".into(),
+            Some(_) => {
+                let own = own.iter().map(String::as_str);
+                format!(", with intervals above one half as a whole only at {}", own.collect::<Vec<_>>().join(" and "))
+                    .into()
+            }
         })
     }
 

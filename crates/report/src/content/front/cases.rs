@@ -4,7 +4,7 @@ use super::{
     contrast::{Contrast, Ranked},
     kind::Asked,
     measured::{DistributionOf, Sample, capitalised, error, median_of, wrong},
-    ranking::{Case, Words, clause, decreasing, of_attempts},
+    ranking::{Case, Words, clause, decreasing, of_attempts, quoted},
 };
 use crate::{
     content::{conditions::labels::Labels, phrases::Unit},
@@ -64,13 +64,7 @@ fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)], asked
         members: members.clone(),
         tail: of_attempts(sample(members).n()),
     };
-    let suffices = samples.iter().all(|sample| sample.found > 0 && sample.wrong == 0);
-    let mut message = text![match (asked.suffices, suffices) {
-        (true, true) if samples.len() > 1 => "yes, every case has fixes and no wrong one; ",
-        (true, true) => "yes: ",
-        (true, false) => "no, not in every case: ",
-        (false, _) => "",
-    }];
+    let mut message = Text::new();
     match &samples[..] {
         [] => return None,
         [one] => {
@@ -83,9 +77,28 @@ fn rates(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)], asked
             let contrast = Contrast { run, summary };
             let differs = |a: &Case, b: &Case| contrast.rates_differ(&a.members, &b.members, cases.len());
             message.extend(clause(&cases, &words("rate of fixes", MORE), &differs));
+            if asked.suffices {
+                message.extend(against_first(run, summary, series));
+            }
         }
     }
     Some(message)
+}
+
+/// The clause on the change of the rate from the first case to each other one, over their common attempts; empty if some
+/// have none.
+fn against_first(run: &Run, summary: &RunSummary, series: &[(String, Vec<usize>)]) -> Text {
+    let contrast = Contrast { run, summary };
+    let [(first, base), others @ ..] = series else { return Text::new() };
+    let mut message = text![format!("; on the attempts in common with {}, it changes by ", quoted(first))];
+    for (place, (name, members)) in others.iter().enumerate() {
+        let Some(found) = contrast.of_rates(members, base, 0.95) else { return Text::new() };
+        let [_, value, low, high] = contrast.numbers([members, base], "found", (found, Unit::Plain, 1));
+        message.push(if place > 0 { ", by ".into() } else { "".into() });
+        message.extend(text![value, if place > 0 { " [" } else { " points [" }, low, ", ", high]);
+        message.push(format!("] with {}", quoted(name)).into());
+    }
+    message
 }
 
 /// The clause on the medians of a quantity over cases of one trial each; `None` without fixes.

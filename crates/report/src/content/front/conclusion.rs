@@ -2,7 +2,7 @@
 
 use super::{
     acceptance,
-    contrast::Contrast,
+    contrast::{Contrast, simultaneous},
     cost,
     kind::{Asked, Kind},
     measured::Sample,
@@ -35,7 +35,7 @@ pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
         Kind::Cost => cost::conclusion(run, summary),
         _ => None,
     });
-    let accuracy = matches!(kind, Kind::Limits | Kind::Outliers(_) | Kind::Along(_) | Kind::Cases) && asked.accuracy;
+    let accuracy = matches!(kind, Kind::Outliers(_) | Kind::Along(_) | Kind::Cases) && asked.accuracy;
     if accuracy {
         shown.extend(significance::sentences(run, comparisons, 1));
     }
@@ -65,14 +65,14 @@ fn rates(run: &Run, summary: &RunSummary, kind: &Kind) -> Option<Text> {
     };
     let mut cases = match kind {
         Kind::Acceptance(key) => {
-            let limits = acceptance::limits(summary, key).into_iter();
-            limits.map(|limit| (format!("at the limit {}", limit.name), limit.present)).collect()
+            let (_, limits) = acceptance::methods(summary, key).into_iter().next()?;
+            limits.into_iter().map(|limit| (format!("at the limit {}", limit.name), limit.present)).collect()
         }
         Kind::Along(key) if labels.series(summary).len() == 1 => {
             let place = |index: usize| format!("at {}", labels.place(&summary.rows[index], key));
             (0..summary.rows.len()).map(|index| (place(index), vec![index])).collect()
         }
-        Kind::Along(_) | Kind::Families(_) | Kind::Cases | Kind::Outliers(_) => series(),
+        Kind::Along(_) | Kind::Cases => series(),
         _ => return None,
     };
     let fraction = |case: &(String, Vec<usize>)| Sample::of(run, summary, &case.1).fraction();
@@ -88,7 +88,14 @@ fn rates(run: &Run, summary: &RunSummary, kind: &Kind) -> Option<Text> {
             format!(" common attempts, the rates of fixes {} and {} are equal.", highest.0, lowest.0)
         ]);
     }
-    let significant = if found.significant() { "a significant difference" } else { "which is not significant" };
+    // The verdict is that of the ranking, which compares the best with each other case.
+    let count = if matches!(kind, Kind::Cases) { cases.len() } else { 2 };
+    let strict = contrast.of_rates(&highest.1, &lowest.1, simultaneous(count)).is_some_and(|of| of.significant());
+    let significant = match (strict, found.significant()) {
+        (true, _) => "a significant difference",
+        (false, true) => "which is not significant among so many comparisons",
+        (false, false) => "which is not significant",
+    };
     Some(text![
         "Over ",
         pairs,
@@ -124,14 +131,21 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
         ""
     };
     let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
+    let (wrong, all) = summary.rows.iter().fold((0, 0), |(w, a), row| (w + row.wrong, a + row.attempted));
     let successive = headers().any(proportion::is_trajectory);
     let bound = 100.0 * proportion::interval_of_counts(successive, 0, min).1;
     // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
     let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
-    format!(
-        "{data}{site}. {dives}The smallest trial has {}{}: even if none of them is a wrong fix, the rate of wrong fixes may be up \
-         to {bound:.digits$} % (95 % interval). The section on threats to validity lists all limits.",
-        counted(min, "attempt", "attempts"),
-        if successive { ", which successive frames make dependent" } else { "" }
-    )
+    let most = summary.rows.iter().map(|row| (row.wrong, row.attempted)).max().unwrap_or_default();
+    let wrong = match wrong {
+        0 if min > 0 && !summary.rows.iter().all(|row| row.unjudged == row.found) => format!(
+            "No fix is wrong. The smallest trial has {}{}, after which the rate of wrong fixes may still be up to {bound:.digits$} % \
+             (95 % interval). ",
+            counted(min, "attempt", "attempts"),
+            if successive && min > 1 { ", which depend on each other" } else { "" }
+        ),
+        0 => String::new(),
+        _ => format!("{wrong} of {all} attempts are wrong fixes, at most {} of {} in one trial. ", most.0, most.1),
+    };
+    format!("{data}{site}. {dives}{wrong}The section on threats to validity lists all limits.")
 }

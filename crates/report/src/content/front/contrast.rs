@@ -141,7 +141,7 @@ impl Contrast<'_> {
 /// The level of the intervals of the differences between the best of `count` cases and each other one.
 ///
 /// All hold together with a probability of at least 95 % (Bonferroni).
-fn simultaneous(count: usize) -> f64 {
+pub(super) fn simultaneous(count: usize) -> f64 {
     1.0 - 0.05 / count.saturating_sub(1).max(1) as f64
 }
 

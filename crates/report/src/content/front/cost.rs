@@ -53,7 +53,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
         message.push(format!(" with {name}").into());
     }
     for (index, (name, _, last)) in without.iter().enumerate() {
-        let begin = if index == 0 { "; without a fix there, at their limit of work, end " } else { " and " };
+        let begin = if index == 0 { "; without a fix there stop, at their limit of work, " } else { " and " };
         message.extend(text![
             format!("{begin}{name} after "),
             tests(*last),

@@ -27,22 +27,20 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     let last = |trial| navigation::statistic(trial, "last", Position, Unit::Millimetres);
     let rms = |trial: &Trial| navigated_rms(trial, Position, [stamp, trial.span()[1]]);
     let (without, with) = (rms(first), rms(second));
-    let mut message = verdict(&without, &with);
-    message.extend(text![
-        "from frame ",
-        phrases::frame(first, frame, stamp),
-        ", where the trials first differ, the camera position error is "
-    ]);
-    message.extend(without.text());
-    message.push(format!(" with {} and ", name(0)).into());
-    message.extend(with.text());
-    message.extend(text![
-        format!(" with {}; at the last frame alone, which has no interval, it is ", name(1)),
+    let message = text![
+        "at the last frame of the dive the camera position error is ",
         last(first),
-        " mm and ",
+        format!(" mm with {} and ", name(0)),
         last(second),
-        " mm"
-    ]);
+        format!(" mm with {} (a single frame has no interval); from frame ", name(1)),
+        phrases::frame(first, frame, stamp),
+        " on, where the trials first differ, it is "
+    ];
+    let mut message = message;
+    message.extend(without.text());
+    message.push(" and ".into());
+    message.extend(with.text());
+    message.push(verdict(&without, &with).into());
     Some(capitalised(message))
 }
 
@@ -59,11 +57,10 @@ fn parting(first: &Trial, second: &Trial) -> Option<(u64, u64)> {
     alike.then(|| (first[place].0, first[place].1))
 }
 
-/// The answer whether the error of the second trial is smaller.
-fn verdict(without: &Measured, with: &Measured) -> Text {
-    match (without.differs(with), with.value() < without.value()) {
-        (false, _) => text!["no significant effect: "],
-        (true, true) => text!["the error becomes smaller: "],
-        (true, false) => text!["none, the error becomes larger: "],
+/// The words on whether the errors differ.
+fn verdict(without: &Measured, with: &Measured) -> &'static str {
+    match without.differs(with) {
+        false => ", without a significant difference",
+        true => ", a significant difference",
     }
 }

@@ -71,24 +71,22 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
     Some(capitalised(message))
 }
 
-/// The rates of wrong fixes of the methods that have any, the most first.
+/// The rates of wrong fixes of all methods, the smallest first; those without any together.
 fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Text {
     let series = labels.series(summary);
     let mut samples: Vec<(&str, Sample<'_>)> =
         series.iter().map(|(name, members)| (name.as_str(), Sample::of(run, summary, members))).collect();
-    samples.retain(|(_, sample)| sample.wrong > 0);
-    samples.sort_by_key(|(_, sample)| std::cmp::Reverse(sample.wrong));
-    let mut message = text![if samples.is_empty() { "; no fix is wrong" } else { "; wrong are " }];
-    let count = samples.len();
-    for (place, (name, sample)) in samples.into_iter().enumerate() {
-        message.push(if place > 0 { ", " } else { "" }.into());
-        message.extend(sample.wrong_rate().text());
-        let attempts = if place == 0 { text![" of the ", sample.n(), " attempts with "] } else { text![" with "] };
-        message.extend(attempts);
-        message.push(quoted(name).into());
-        if place + 1 == count && count < series.len() {
-            message.push(", none with the others".into());
-        }
+    samples.sort_by_key(|(_, sample)| sample.wrong);
+    let mut message = Text::new();
+    for group in samples.chunk_by(|a, b| (a.1.wrong, a.1.attempted) == (b.1.wrong, b.1.attempted)) {
+        let own = names(group.iter().map(|(name, _)| *name));
+        let sample = &group[0].1;
+        message.push(if message.is_empty() { "; wrong are " } else { ", " }.into());
+        message.extend(match sample.wrong {
+            0 => text!["none of ", sample.n()],
+            _ => text![sample.wrong_count(), " of ", sample.n()],
+        });
+        message.push(format!(" with {own}").into());
     }
     message
 }

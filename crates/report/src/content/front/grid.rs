@@ -66,10 +66,10 @@ fn condition(row: &Row, summary: &RunSummary) -> String {
 fn caption(run: &Run, summary: &RunSummary, kind: &Kind) -> String {
     match kind {
         Kind::Cost => {
-            "The median number of pair tests; a dash: no fix, since the search ended at its limit of work.".to_owned()
+            "The median number of pair tests over all attempts, solved or not; a dash: no attempt is solved.".to_owned()
         }
         Kind::Limits => {
-            "RMS camera position error / RMS error of the model points (TRE), in times their Cramér–Rao bounds."
+            "RMS camera position error / RMS error of the model points (TRE), in multiples of their Cramér–Rao bounds."
                 .to_owned()
         }
         _ => {
@@ -79,7 +79,7 @@ fn caption(run: &Run, summary: &RunSummary, kind: &Kind) -> String {
             let successive = run.trials.iter().any(|trial| proportion::is_trajectory(&trial.header));
             let (low, high) = proportion::interval_of_counts(successive, min / 2, min);
             format!(
-                "Fixes in % of the {attempts} attempts of each cell, and wrong fixes in brackets. A rate of 50 % has the 95 % interval [{:.0}, {:.0}].",
+                "Fixes in % of the {attempts} attempts of each cell; the number of wrong fixes in brackets. A rate of 50 % has the 95 % interval [{:.0}, {:.0}].",
                 100.0 * low,
                 100.0 * high
             )

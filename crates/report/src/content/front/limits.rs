@@ -38,7 +38,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary) -> Option<Text> {
     let mut message = Text::new();
     for (place, (method, [position, points])) in known.into_iter().enumerate() {
         message.push(match place {
-            0 => format!("in times the Cramér–Rao bound, with {method} the RMS camera position error is ").into(),
+            0 => {
+                format!("in multiples of the Cramér–Rao bound, with {method} the RMS camera position error is ").into()
+            }
             _ => format!("; with {method} ").into(),
         });
         message.extend(range(&position));

@@ -62,7 +62,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, asked: 
         let what = if place == 0 { "the camera position error is " } else { "it is " };
         message.push(format!("{begin}with {} {what}", name(dive)).into());
         message.extend(dive.navigated.text());
-        if asked.bounded && dive.alone.value().is_finite() {
+        if dive.alone.value().is_finite() {
             message.push(", by odometry alone ".into());
             message.extend(dive.alone.text());
         }

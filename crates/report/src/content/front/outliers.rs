@@ -56,7 +56,10 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
         }
     }
     message.extend(at_the_largest(run, summary, labels, key).unwrap_or_default());
-    message.extend(loss(run, summary, labels, key).unwrap_or_default());
+    let values = || summary.rows.iter().filter_map(|row| axes::on(row, key));
+    for at in [values().reduce(f64::min), values().reduce(f64::max)].into_iter().flatten() {
+        message.extend(loss(run, summary, labels, (key, at)).unwrap_or_default());
+    }
     message.extend(wrong(run, summary));
     Some(capitalised(message))
 }
@@ -93,11 +96,9 @@ fn fraction(value: &str, key: &str) -> String {
     format!("{value}{unit} {}", short(key))
 }
 
-/// The clause on the median errors at the smallest fraction.
-fn loss(run: &Run, summary: &RunSummary, labels: &Labels, key: &str) -> Option<Text> {
+/// The clause on the median errors at a fraction.
+fn loss(run: &Run, summary: &RunSummary, labels: &Labels, (key, at): (&str, f64)) -> Option<Text> {
     let (name, field, of) = error(summary);
-    let values = || summary.rows.iter().filter_map(|row| axes::on(row, key));
-    let at = values().reduce(f64::min)?;
     let known = (0..summary.rows.len()).filter(|&index| axes::on(&summary.rows[index], key) == Some(at));
     let cases = known.filter(|&index| of(&summary.rows[index]).is_some()).map(|index| Case {
         name: labels.of_series(&summary.rows[index]),

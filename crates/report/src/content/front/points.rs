@@ -31,9 +31,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
         let differ = first.differs(second);
         message.push(
             if differ {
-                ", and the largest differ significantly"
+                ", where the largest errors differ significantly"
             } else {
-                ", and the largest do not differ significantly"
+                ", where the largest errors do not differ significantly"
             }
             .into(),
         );

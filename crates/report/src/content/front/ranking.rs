@@ -47,12 +47,14 @@ pub(super) fn clause(cases: &[Case], words: &Words<'_>, differs: &dyn Fn(&Case, 
         return message;
     }
     if apart.is_empty() {
-        let lasts = ties(last);
+        let mut ends = [(last, ties(last)), (best, firsts)];
+        ends.sort_by(|a, b| a.0.value.value().total_cmp(&b.0.value.value()));
         message.push(format!("no difference of the {quantity} is significant: it ranges from ").into());
-        message.extend(named(last));
-        message.push(format!(" with {} to ", some_names(&lasts)).into());
-        message.extend(named(best));
-        message.push(format!(" with {}", some_names(&firsts)).into());
+        for (place, (case, own)) in ends.iter().enumerate() {
+            message.push(if place > 0 { " to ".into() } else { "".into() });
+            message.extend(named(case));
+            message.push(format!(" with {}", some_names(own)).into());
+        }
         return message;
     }
     message.push(format!("the {quantity} is {superlative} with {}, ", some_names(&firsts)).into());

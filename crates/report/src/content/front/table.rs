@@ -70,17 +70,23 @@ fn table(run: &Run, summary: &RunSummary, lines: Vec<(String, Vec<usize>)>) -> T
     if navigates && single {
         heads.push(Head::numbers("navigated error RMS (mm)"));
     }
-    let errors = if single { " and median errors" } else { "" };
+    let errors = match (single, navigates) {
+        (true, true) => ", median errors of the fixes, and RMS errors of the navigated pose",
+        (true, false) => " and median errors of the fixes",
+        _ => "",
+    };
     let change = match compared {
         true if bases.iter().all(|&base| base == 0) => {
-            " Change: the difference of the rate from that of the first line, over their common attempts; each interval holds alone."
+            " Change: the difference of the rate from that of the first line, over the attempts made in both; each interval holds alone, whereas “significant” accounts for all comparisons with the best."
         }
         true => {
-            " Change: the difference of the rate from that of the dash above, over their common attempts; each interval holds alone."
+            " Change: the difference of the rate from that of the dash above, over the attempts made in both; each interval holds alone, whereas “significant” accounts for all comparisons with the best."
         }
         false => "",
     };
-    let caption = format!("Fixes in % of the attempts{errors}, with 95 % intervals.{change}");
+    let caption = format!(
+        "Fixes in % of the attempts{errors}, with 95 % intervals. An attempt is a frame and a target that the prior puts in view.{change}"
+    );
     let mut table = Table::new("answer", text![caption], heads);
     for (name, members) in lines {
         let sample = Sample::of(run, summary, &members);

@@ -51,14 +51,17 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
         Effect { pose: own.value.text(), larger, fewer, case: own }
     };
     let effects: Vec<Effect> = (1..count).map(effect).collect();
-    let mut message = text![format!("against {}, with a median {name} of ", exact.name)];
+    let mut message = text![format!("compared with {}, whose median {name} is ", exact.name)];
     message.extend(exact.value.text());
     let mut separator = ": ";
     for (larger, words) in [
-        ([false, false], "neither this error nor the residuals of the points (fit RMS) are significantly larger with "),
-        ([false, true], "the residuals are larger, but not this error, with "),
+        (
+            [false, false],
+            "neither the position error nor the residuals of the points (fit RMS) are shown to be larger with ",
+        ),
+        ([false, true], "the residuals are larger, and a larger position error is not shown, with "),
         ([true, true], "both are larger with "),
-        ([true, false], "this error is larger without larger residuals with "),
+        ([true, false], "the position error is larger, and larger residuals are not shown, with "),
     ] {
         let own: Vec<&Effect> = effects.iter().filter(|effect| effect.larger == larger).collect();
         for (place, effect) in own.iter().enumerate() {

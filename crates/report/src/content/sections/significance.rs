@@ -78,7 +78,7 @@ pub(crate) fn sentences(run: &Run, comparisons: &[Comparison], max: usize) -> Ve
     let as_number =
         |comparison: &Comparison| match comparison.difference.is_finite() && comparison.interval.0.is_finite() {
             true if comparison.interval.1.is_finite() => sentence(run, comparison),
-            _ => sentence_of_failures(run, comparisons, comparison),
+            _ => sentence_of_failures(run, comparison),
         };
     sure.into_iter().take(max).map(as_number).collect()
 }
@@ -93,7 +93,7 @@ pub(crate) fn others(comparisons: &[Comparison], max: usize) -> Option<Text> {
 /// The sentence on a comparison with an infinite difference or interval.
 ///
 /// One of the trials often fails then.
-fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comparison) -> Text {
+fn sentence_of_failures(run: &Run, comparison: &Comparison) -> Text {
     let [first, second] = &comparison.names;
     let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };
     let as_number = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
@@ -102,9 +102,10 @@ fn sentence_of_failures(run: &Run, comparisons: &[Comparison], comparison: &Comp
     let counts = if better == first { (alone, other) } else { ([alone[1].clone(), alone[0].clone()], own) };
     let ([of_better, of_worse], count_of_worse) = counts;
     let mut message = text![
-        format!("{}, {better} has smaller errors or fewer failures than {worse} (p ", begin(comparison)),
-        holm(run, comparisons, comparison),
-        ", Holm-adjusted): in ",
+        format!(
+            "{}, {better} has smaller errors or fewer failures than {worse}, a significant difference: in ",
+            begin(comparison)
+        ),
         of_better,
         " of ",
         as_number("pairs", comparison.n),
