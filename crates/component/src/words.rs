@@ -65,7 +65,7 @@ pub fn plain(message: &str) -> String {
             let found = found.replace("floating point", "number").replace("integer", "number");
             let found = found.replace("sequence", "a list").replace("map", "a table");
             let found = match found.strip_suffix(" variant") {
-                Some("unit") => "a word alone".to_owned(),
+                Some("unit") => "a value without quotes".to_owned(),
                 Some(_) => "a word with a value".to_owned(),
                 None => found,
             };
