@@ -69,6 +69,8 @@ pub(super) struct Evidence<'a> {
     edges: usize,
     /// The number of false alarms of points and edges together.
     nfa_with_edges: Option<f64>,
+    /// The number of false alarms by independent pairs of a large putative set.
+    nfa_independent: Option<f64>,
     /// The posterior of the search; `None` for a search that counts pairs.
     posterior: Option<PosteriorProbabilities>,
     /// The numbers of false alarms, computed on demand.
@@ -86,7 +88,22 @@ impl<'a> Evidence<'a> {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(problem.model, limit));
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
         let nfa_with_edges = ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp);
-        Self { problem, pairs: &found.pairs, edges: found.edges.len(), nfa_with_edges, posterior, a_contrario }
+        let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
+        let nfa_independent = support.map(|support| libm::exp(support.ln_nfa));
+        Self {
+            problem,
+            pairs: &found.pairs,
+            edges: found.edges.len(),
+            nfa_with_edges,
+            nfa_independent,
+            posterior,
+            a_contrario,
+        }
+    }
+
+    /// Whether the number of false alarms is that of independent pairs.
+    pub(super) fn is_independent(&self) -> bool {
+        self.nfa_independent.is_some()
     }
 
     /// The probabilities of the answer.
@@ -118,7 +135,8 @@ impl<'a> Evidence<'a> {
     ///
     /// Each bounds the probability of such an answer without the object.
     pub(super) fn nfa(&self) -> f64 {
-        match self.nfa_with_edges {
+        match self.nfa_with_edges.or(self.nfa_independent) {
+            _ if self.nfa_independent.is_some() => self.nfa_independent.unwrap_or(f64::NAN),
             None => self.a_contrario.sets_as_good(),
             Some(all) if all <= 1e-6 => all,
             Some(all) => all.min(self.a_contrario.sets_as_good()),
@@ -139,6 +157,9 @@ impl<'a> Evidence<'a> {
         let edges = self.problem.edges.with_candidates() as f64;
         let unseen = if self.edges > 0 { unseen * (2.0 / (edges + 1.0)).min(1.0) } else { unseen };
         let permuted = by_nfa(self.a_contrario.at_their_pose());
+        if std::env::var("DBG").is_ok() {
+            eprintln!("DBG absent {absent:.1e} elsewhere {elsewhere:.1e} nfa-pose {:.1e} nfa {:.1e}", self.a_contrario.at_their_pose(), self.nfa());
+        }
         let absent_by_any = larger(larger(absent, permuted), by_nfa(self.nfa()));
         let present = 1.0 - absent;
         Probability::of(absent_by_any, if present > 0.0 { ((elsewhere + unseen) / present).min(1.0) } else { 0.0 })

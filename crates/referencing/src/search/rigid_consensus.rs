@@ -20,8 +20,9 @@ use super::{
         prior_terms::PriorTerms,
         proof::{Proved, prove},
         repeated_pattern::Pattern,
-        seeds::{Seeds, Swept},
+        seeds::{Seeds, Swept, guided::LARGE},
         structured_clutter::{Occupied, StructuredClutter},
+        support::IndependentPairs,
     },
     grow::{feasible, grow, max_possible, so_far},
     identification::{Identification, Rejected, Search},
@@ -29,7 +30,7 @@ use super::{
     orientation::Sense,
     posterior::{COPY, Explanation, Posterior},
 };
-use crate::{problem::Problem, solve::likelihood::mixed::ENOUGH};
+use crate::{a_contrario::coordinates::shuffled, problem::Problem, solve::likelihood::mixed::ENOUGH};
 
 /// Maximum-a-posteriori pose search with Bayesian model comparison (MacKay 2003, ch. 27 and 28).
 ///
@@ -201,9 +202,11 @@ impl Search for RigidConsensus {
                 |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
             swept.modes.sort_by(by);
         };
+        // A large putative set is judged by its independent pairs instead.
+        let large = edge_terms.is_none() && shuffled(problem) && graph.starts.len() > LARGE;
         // The pattern is that of points.
         let by_points = swept.modes.first().is_some_and(|best| best.members.len() >= NEEDED);
-        let pattern = if strong(&swept) && by_points { Pattern::of(problem.model, problem.edges.model) } else { None };
+        let pattern = if strong(&swept) && by_points && !large { Pattern::of(problem.model, problem.edges.model) } else { None };
         if let (Some(pattern), Some(best)) = (&pattern, swept.modes.first()) {
             let compared = Cell::new(0);
             let (model, taken) = (problem.model, &none);
@@ -213,8 +216,10 @@ impl Search for RigidConsensus {
             swept.insert(shifts);
         }
         swept.modes.truncate(MAX_COMPARED);
-        weighted(&mut swept);
-        largest_evidence_first(&mut swept.modes);
+        if !large {
+            weighted(&mut swept);
+            largest_evidence_first(&mut swept.modes);
+        }
         let continued =
             pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
         let ended = |best: usize, pair_tests| Rejected::Budget { budget: self.budget, best, bound, pair_tests };
@@ -231,7 +236,7 @@ impl Search for RigidConsensus {
         let mut copies_sought = None;
         let mut structured_clutter = None;
         let mut unlikely = None;
-        if best.ln_evidence >= STRONG {
+        if best.ln_evidence >= STRONG && !large {
             let elsewhere = |mode: &Mode| {
                 let points = mode.members.iter().filter(|&&v| best.holds(v)).count();
                 let edges = mode.edges.iter().filter(|v| best.edges.binary_search(v).is_ok()).count();
@@ -290,6 +295,7 @@ impl Search for RigidConsensus {
             }
         }
         let complete = swept.complete && beside.complete;
+        let support = if large { IndependentPairs::of(parts).support(&swept.modes) } else { None };
         let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
         let evidence_gap = proved.map(gap);
         // The returned set is coherent throughout: among twenty true points some two usually differ by more than the
@@ -338,6 +344,7 @@ impl Search for RigidConsensus {
                 unlikely: unlikely.as_ref().map(explanation),
                 evidence_gap,
                 ln_nfa,
+                support,
             }),
             pairs,
         })

@@ -1,7 +1,7 @@
 //! Best-first enumeration of the coherent triples that may lead to a pose of interest.
 
 mod elsewhere;
-mod guided;
+pub(in crate::search) mod guided;
 mod queue;
 #[cfg(test)]
 mod tests;
