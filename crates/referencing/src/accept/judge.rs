@@ -249,11 +249,15 @@ impl Judge<'_> {
 
     /// Whether a rigid motion explains the set within its noise (χ² test).
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
-        let dof = hypothesis.dof();
-        let variance_factor = if self.supported { VARIANCE_FACTOR } else { 1.0 };
-        let (chi2, limit) = (hypothesis.likelihood.cost, variance_factor * chi_square(dof, self.acceptance.confidence));
+        let (chi2, limit) = (hypothesis.likelihood.cost, self.chi2_limit(hypothesis.dof()));
         // A NaN is rejected as well.
         if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
+    }
+
+    /// The limit of χ² with these degrees of freedom.
+    fn chi2_limit(&self, dof: usize) -> f64 {
+        let variance_factor = if self.supported { VARIANCE_FACTOR } else { 1.0 };
+        variance_factor * chi_square(dof, self.acceptance.confidence)
     }
 
     /// Whether the pose passes the tests of precision and prior.
@@ -288,7 +292,9 @@ impl Judge<'_> {
         let data = self.observations(pairs, edges);
         let covariance = self.solver.covariance(&data, pose)?;
         let covariance = match self.supported {
-            true => Covariance6::new(covariance.matrix * (hypothesis.likelihood.cost / hypothesis.dof() as f64).max(1.0)),
+            true => {
+                Covariance6::new(covariance.matrix * (hypothesis.likelihood.cost / hypothesis.dof() as f64).max(1.0))
+            }
             false => covariance,
         };
         if !self.searched || pairs.is_empty() {
@@ -466,7 +472,7 @@ impl Judge<'_> {
             redundancy: Redundancy::of_features(hypothesis.pairs.len(), hypothesis.edges.len()),
             chi2: hypothesis.likelihood.cost,
             dof,
-            chi2_limit: chi_square(dof, self.acceptance.confidence),
+            chi2_limit: self.chi2_limit(dof),
             solution_separation: left_out.one,
             solution_separation_two: left_out.two,
             misidentified,

@@ -168,8 +168,17 @@ pub fn judge_labelled(
     rig: Option<&StereoRig>,
 ) -> Attempt {
     let alert_limit = alert_limit(problem.model, acceptance);
-    let judge =
-        Judge { problem, solver, acceptance, alert_limit, largest: pairs.len(), searched: false, rig, supported: false, near: None };
+    let judge = Judge {
+        problem,
+        solver,
+        acceptance,
+        alert_limit,
+        largest: pairs.len(),
+        searched: false,
+        rig,
+        supported: false,
+        near: None,
+    };
     let consensus_bound = pairs.len();
     let found = Identification::unproved(pairs, consensus_bound, 0);
     let (outcome, runner_up) = match judge.size(&found.pairs, &found.edges) {

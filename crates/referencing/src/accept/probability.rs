@@ -131,12 +131,15 @@ impl<'a> Evidence<'a> {
         ln_evidence >= COPY || 1.0 / (1.0 + libm::exp(ln_evidence)) <= max
     }
 
-    /// The number of false alarms: that of the points or, with edges, the smaller of it and that of all features.
+    /// The number of false alarms: that of the points or, with edges, the smaller of it and that of all features;
+    /// that of independent pairs for a large putative set.
     ///
     /// Each bounds the probability of such an answer without the object.
     pub(super) fn nfa(&self) -> f64 {
-        match self.nfa_with_edges.or(self.nfa_independent) {
-            _ if self.nfa_independent.is_some() => self.nfa_independent.unwrap_or(f64::NAN),
+        if let Some(independent) = self.nfa_independent {
+            return independent;
+        }
+        match self.nfa_with_edges {
             None => self.a_contrario.sets_as_good(),
             Some(all) if all <= 1e-6 => all,
             Some(all) => all.min(self.a_contrario.sets_as_good()),
@@ -157,9 +160,6 @@ impl<'a> Evidence<'a> {
         let edges = self.problem.edges.with_candidates() as f64;
         let unseen = if self.edges > 0 { unseen * (2.0 / (edges + 1.0)).min(1.0) } else { unseen };
         let permuted = by_nfa(self.a_contrario.at_their_pose());
-        if std::env::var("DBG").is_ok() {
-            eprintln!("DBG absent {absent:.1e} elsewhere {elsewhere:.1e} nfa-pose {:.1e} nfa {:.1e}", self.a_contrario.at_their_pose(), self.nfa());
-        }
         let absent_by_any = larger(larger(absent, permuted), by_nfa(self.nfa()));
         let present = 1.0 - absent;
         Probability::of(absent_by_any, if present > 0.0 { ((elsewhere + unseen) / present).min(1.0) } else { 0.0 })

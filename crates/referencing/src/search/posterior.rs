@@ -3,7 +3,12 @@
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::consensus::{structured_clutter::StructuredClutter, support::Support};
-use crate::{accept::{apart::rms_apart, probability::by_nfa}, alternative::Alternative, problem::Correspondence, site::model::ModelPoint};
+use crate::{
+    accept::{apart::rms_apart, probability::by_nfa},
+    alternative::Alternative,
+    problem::Correspondence,
+    site::model::ModelPoint,
+};
 
 /// Evidence (nats) below the best at which an explanation is not listed; e⁻⁷·⁶ = 0.05 %.
 const NEGLIGIBLE: f64 = 7.6;
@@ -44,8 +49,8 @@ pub struct Posterior {
     pub beside: Vec<Explanation>,
     /// Whether the search for second copies of the object was exhaustive, up to the bounds of evidence.
     ///
-    /// A copy may be complete or partial. `None` if none was searched for, since no pose has enough evidence to be
-    /// accepted.
+    /// A copy may be complete or partial. `None` if none was searched for: no pose has enough evidence to be accepted, or
+    /// the set is large and putative, where a copy is one of the wrong poses of its [`Support`].
     pub copies_sought: Option<bool>,
     /// ln evidence (nats) of a pattern like the object's in its place, without the object; `None` for an object without
     /// a pattern.
@@ -171,12 +176,6 @@ impl Posterior {
             self.structured_clutter.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_RESEMBLES);
         let imitated = self.structured_clutter.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);
         let max = [clutter, pattern, shifted, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
-        if std::env::var("DBG").is_ok() {
-            eprintln!("DBG best {:.1} (lost {:.1}, {} pts) others {:?} beside {:?} clutter {clutter:.1} pattern {pattern:.1} shifted {shifted:.1} struct {:?} unlikely {:?}", best.ln_evidence, best.ln_clutter_density, best.pairs.len(),
-                self.explanations.iter().skip(1).take(4).map(|e| (e.ln_evidence as i64, e.pairs.len(), (100.0*rms_apart(model, &best.object_from_camera, &e.object_from_camera)) as i64)).collect::<Vec<_>>(),
-                self.beside.iter().take(4).map(|e| (e.ln_evidence as i64, e.ln_clutter_density as i64, e.pairs.len(), (100.0*rms_apart(model, &best.object_from_camera, &e.object_from_camera)) as i64)).collect::<Vec<_>>(),
-                self.structured_clutter, self.unlikely.as_ref().map(|e| (e.ln_evidence as i64, e.pairs.len(), (100.0*rms_apart(model, &best.object_from_camera, &e.object_from_camera)) as i64)));
-        }
         let (mut map_estimate, mut elsewhere) = (0.0, libm::exp(shifted - max));
         for other in &self.explanations {
             // Structured clutter may be beside the object wherever the object is.
@@ -201,9 +200,7 @@ impl Posterior {
             clutter: more / all,
         }
     }
-}
 
-impl Posterior {
     /// The probabilities of a large putative set, from the support of independent pairs.
     fn by_support(&self, support: &Support, model: &[ModelPoint], limit: f64) -> PosteriorProbabilities {
         let absent = by_nfa(libm::exp(support.ln_nfa));

@@ -6,7 +6,7 @@ use super::{
     bits::{ones, shared},
     fit::fit,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, Term, Terms},
     motion::Motion,
     places::Places,
     prior_terms::PriorTerms,
@@ -78,10 +78,7 @@ impl<'a> IndependentPairs<'a> {
     pub(in crate::search) fn of(
         (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
     ) -> Self {
-        let mut kept = apart(terms, 0..terms.pairs.len(), |terms, a, b| {
-            beside(&terms[a].model, &terms[b].model, terms[a].variance)
-                && beside(&terms[a].cloud, &terms[b].cloud, terms[a].variance)
-        });
+        let mut kept = apart(terms, 0..terms.pairs.len(), |pair| [pair.cloud, pair.model]);
         kept.sort_by(|&a, &b| terms.pairs[a].cloud.x.total_cmp(&terms.pairs[b].cloud.x).then(a.cmp(&b)));
         let count = terms.pairs.len() as f64;
         let edges: usize = (0..terms.pairs.len()).map(|v| shared(graph.row(v), graph.row(v), 0)).sum();
@@ -98,9 +95,6 @@ impl<'a> IndependentPairs<'a> {
         let (wrong, ln_sampled) = self.wrong(best);
         let scale = ((self.ln_poses - ln_sampled).max(1.0) / wrong).min(1.0);
         let own = self.of_pose(&best.members, &best.motion);
-        if std::env::var("DBG").is_ok() {
-            eprintln!("DBG support own {own:.1} places {} of {} kept {} wrong {wrong:.1} ln_poses {:.1} nfa {:.1}", self.places(&best.members), best.members.len(), self.kept.len(), self.ln_poses, self.ln_poses - scale * own);
-        }
         let ln_odds = |other: &Mode| {
             let common = other.members.iter().filter(|&&v| best.holds(v)).count();
             match 2 * common > other.members.len() {
@@ -132,13 +126,10 @@ impl<'a> IndependentPairs<'a> {
 
     /// The number of places of some pairs, the smaller of those in the model and in the cloud.
     fn places(&self, members: &[usize]) -> usize {
-        let count = |side: fn(&super::likelihood::Term) -> &Vector3<f64>| {
-            let together = move |terms: &[super::likelihood::Term], a: usize, b: usize| {
-                beside(side(&terms[a]), side(&terms[b]), terms[a].variance)
-            };
-            apart(self.terms, members.iter().copied(), together).len()
-        };
-        count(|pair| &pair.model).min(count(|pair| &pair.cloud))
+        let of = || members.iter().copied();
+        let (model, cloud) =
+            (apart(self.terms, of(), |pair| [pair.model]), apart(self.terms, of(), |pair| [pair.cloud]));
+        model.len().min(cloud.len())
     }
 
     /// The expected number of kept pairs that fit a pose if their partners are shuffled; half a coincidence at least.
@@ -178,8 +169,7 @@ impl<'a> IndependentPairs<'a> {
         let seeded = |k: usize| {
             let seed = others[k * step % others.len()];
             let row: Vec<u64> = adjacency.row(seed).iter().zip(&free).map(|(row, free)| row & free).collect();
-            let ranked: Vec<(usize, usize)> =
-                ones(&row, 0).map(|v| (shared(&row, adjacency.row(v), 0), v)).collect();
+            let ranked: Vec<(usize, usize)> = ones(&row, 0).map(|v| (shared(&row, adjacency.row(v), 0), v)).collect();
             let start = fitted(terms, &beginning(&adjacency, seed, ranked)?)?;
             let (motion, _) = fit(terms, self.prior_terms, &near(&start)?, &start, 2)?;
             let members = near(&motion)?;
@@ -197,22 +187,125 @@ fn far() -> f64 {
     chi_square(3, CONFIDENCE)
 }
 
-/// Whether two points may be one place, measured with this variance (m²).
-fn beside(a: &Vector3<f64>, b: &Vector3<f64>, variance: f64) -> bool {
-    (a - b).norm_squared() <= ONE_PLACE * ONE_PLACE * variance
-}
-
-/// Some pairs of which no two are `together`, in their order.
-fn apart(
+/// Some of these pairs of which no two are together at all `ends`, in their order.
+///
+/// Ends are together if they may be one place ([`ONE_PLACE`]).
+fn apart<const N: usize>(
     terms: &Terms,
     of: impl Iterator<Item = usize>,
-    together: impl Fn(&[super::likelihood::Term], usize, usize) -> bool,
+    ends: impl Fn(&Term) -> [Vector3<f64>; N],
 ) -> Vec<usize> {
-    let mut kept: Vec<usize> = Vec::new();
+    let (mut kept, mut places): (Vec<usize>, Vec<[Vector3<f64>; N]>) = (Vec::new(), Vec::new());
     for v in of {
-        if !kept.iter().rev().any(|&known| together(&terms.pairs, v, known)) {
+        let (own, reach2) = (ends(&terms.pairs[v]), ONE_PLACE * ONE_PLACE * terms.pairs[v].variance);
+        let together = |known: &[Vector3<f64>; N]| own.iter().zip(known).all(|(a, b)| (a - b).norm_squared() <= reach2);
+        if !places.iter().any(together) {
+            places.push(own);
             kept.push(v);
         }
     }
     kept
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint};
+
+    use crate::{
+        accept::{Acceptance, Attempt, Outcome, compute_fix},
+        candidates::Candidates,
+        problem::{Problem, Tolerance},
+        search::rigid_consensus::RigidConsensus,
+        site::model::ModelPoint,
+        solve::mahalanobis::Mahalanobis,
+    };
+    use nalgebra::Vector3;
+
+    const SIGMA: f64 = 0.01;
+    const PAIRS: usize = 500;
+
+    fn truth() -> Transform<Object, Camera> {
+        Transform::exp(&[0.3, -0.2, 0.5, 0.1, 0.2, -3.0].into())
+    }
+
+    /// The answer to pairs of a model of 2 m; the first are true with `noise` standard deviations of error; the tolerance
+    /// is in standard deviations too.
+    ///
+    /// `place` changes the model point of a true pair.
+    fn answer(
+        true_pairs: usize,
+        (noise, sigmas): (f64, f64),
+        place: impl Fn(usize, Vector3<f64>) -> Vector3<f64>,
+    ) -> Attempt {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut uniform = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+        // A sum of three has the variance of one: a normal error, nearly.
+        let mut error = |at: Vector3<f64>| at + (uniform(1.0) + uniform(1.0) + uniform(1.0)) * (noise * SIGMA);
+        let places: Vec<Vector3<f64>> = (0..PAIRS).map(|_| error(Vector3::zeros())).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut uniform = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+        let model: Vec<Vector3<f64>> = (0..PAIRS).map(|i| place(i, uniform(1.0))).collect();
+        let camera_from_object = truth().inverse();
+        let cloud = (0..PAIRS).map(|i| {
+            let seen = if i < true_pairs { model[i] + places[i] } else { uniform(1.0) };
+            let position = UncertainPoint::isotropic(camera_from_object * Point::from(seen), SIGMA);
+            MeasuredPoint { position, pixels: None }
+        });
+        let cloud: Vec<MeasuredPoint> = cloud.collect();
+        let model: Vec<ModelPoint> = model.iter().map(|at| ModelPoint::exact("", (*at).into())).collect();
+        let candidates = Candidates::from_pairs(PAIRS, (0..PAIRS).map(|i| (i, i)));
+        let tolerance = Tolerance::Fixed(sigmas * SIGMA);
+        let problem = Problem {
+            model: &model,
+            cloud: &cloud,
+            candidates: &candidates,
+            tolerance,
+            prior: None,
+            edges: Default::default(),
+        };
+        let (search, solver) = (RigidConsensus::default(), Mahalanobis::default());
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng)
+    }
+
+    /// Fails if the support of the best pose is not compared with anything.
+    #[test]
+    fn five_percent_of_true_pairs_suffice_and_none_do_not() {
+        let attempt = answer(25, (1.0, 4.0), |_, at| at);
+        let Outcome::Fix(fix) = &attempt.outcome else { panic!("{}", attempt.outcome) };
+        assert!(truth().error_to(&fix.object_from_camera).norm() < 0.02 && attempt.p_wrong < Some(1e-9));
+        assert!(attempt.nfa < Some(1e-9), "{:?}", attempt.nfa);
+        let absent = answer(0, (1.0, 4.0), |_, at| at);
+        assert!(matches!(absent.outcome, Outcome::Rejected(_)), "{}", absent.outcome);
+        assert!(absent.p_absent > Some(0.1), "{:?}", absent.p_absent);
+    }
+
+    /// Forty pairs in four groups, each two standard deviations wide, have four places.
+    ///
+    /// Fails if every pair counts.
+    #[test]
+    fn pairs_side_by_side_count_once() {
+        let centres = [[0.5, 0.1, 0.0], [-0.4, 0.3, 0.2], [0.1, -0.6, 0.4], [-0.2, -0.2, -0.5]].map(Vector3::from);
+        let grouped = |i: usize, at: Vector3<f64>| if i < 40 { centres[i % 4] + at * (2.0 * SIGMA) } else { at };
+        let attempt = answer(40, (0.2, 4.0), grouped);
+        assert!(matches!(attempt.outcome, Outcome::Rejected(_)), "{}", attempt.outcome);
+        assert!(attempt.identified.len() > 20, "{} pairs", attempt.identified.len());
+        assert!(attempt.p_absent > Some(0.1), "{:?}", attempt.p_absent);
+    }
+
+    /// The noise is two fifths larger than stated: the residuals of 150 pairs show it, and the covariance allows for it.
+    ///
+    /// Fails if the χ² test stands, and if the covariance does not grow.
+    #[test]
+    fn a_large_set_tells_its_own_noise() {
+        let sigma = |noise: f64| {
+            let attempt = answer(150, (noise, 6.0), |_, at| at);
+            let Outcome::Fix(fix) = attempt.outcome else { panic!("{}", attempt.outcome) };
+            (fix.covariance.matrix.trace().sqrt(), fix.integrity.chi2 / fix.integrity.dof as f64)
+        };
+        let ((stated, _), (larger, ratio)) = (sigma(0.9), sigma(1.4));
+        assert!(ratio > 1.3 && larger > 1.2 * stated, "{stated} {larger} {ratio}");
+    }
 }

@@ -51,13 +51,19 @@ impl Seeds<'_> {
         self
     }
 
+    /// Lets the guided seeds suffice, whatever their number: the answer is compared with a sample of wrong poses.
+    pub(in crate::search) fn sampled(mut self, suffices: bool) -> Self {
+        self.sampled = suffices;
+        self
+    }
+
     /// Follows guided seeds and sets the limit of the enumeration. Returns whether a set of interest would have been
     /// found.
     pub(super) fn guide(&mut self) -> bool {
         if self.guided == 0 || self.climb.graph.starts.len() <= LARGE {
             return false;
         }
-        let found = self.follow_seeds();
+        let found = self.follow_seeds() || self.sampled;
         let left = if found { self.budget.min(self.spent / ENUMERATED) } else { self.budget };
         self.budget = self.spent.saturating_add(left);
         found
