@@ -230,33 +230,30 @@ mod tests {
         Transform::exp(&[0.3, -0.2, 0.5, 0.1, 0.2, -3.0].into())
     }
 
-    /// The answer to pairs of a model of 2 m; the first are true with `noise` standard deviations of error; the tolerance
-    /// is in standard deviations too.
+    /// The answer to pairs of a model of 2 m; the first are true with `noise` standard deviations of error, and the
+    /// tolerance is in standard deviations too.
     ///
-    /// `place` changes the model point of a true pair.
+    /// `place` gives the model point of a true pair, and its place in the object frame where it is measured.
     fn answer(
         true_pairs: usize,
-        (noise, sigmas): (f64, f64),
-        place: impl Fn(usize, Vector3<f64>) -> Vector3<f64>,
+        (noise, tolerance): (f64, f64),
+        place: impl Fn(usize, Vector3<f64>) -> [Vector3<f64>; 2],
     ) -> Attempt {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let mut uniform = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
-        // A sum of three has the variance of one: a normal error, nearly.
-        let mut error = |at: Vector3<f64>| at + (uniform(1.0) + uniform(1.0) + uniform(1.0)) * (noise * SIGMA);
-        let places: Vec<Vector3<f64>> = (0..PAIRS).map(|_| error(Vector3::zeros())).collect();
-        let mut rng = ChaCha8Rng::seed_from_u64(8);
-        let mut uniform = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
-        let model: Vec<Vector3<f64>> = (0..PAIRS).map(|i| place(i, uniform(1.0))).collect();
-        let camera_from_object = truth().inverse();
-        let cloud = (0..PAIRS).map(|i| {
-            let seen = if i < true_pairs { model[i] + places[i] } else { uniform(1.0) };
-            let position = UncertainPoint::isotropic(camera_from_object * Point::from(seen), SIGMA);
-            MeasuredPoint { position, pixels: None }
-        });
-        let cloud: Vec<MeasuredPoint> = cloud.collect();
+        let mut uniform = || Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let (mut model, mut cloud) = (Vec::new(), Vec::new());
+        for i in 0..PAIRS {
+            // The sum of three has the variance of one and is nearly normal.
+            let (at, elsewhere, error) = (uniform(), uniform(), uniform() + uniform() + uniform());
+            let [own, seen] = if i < true_pairs { place(i, at) } else { [at, elsewhere] };
+            let seen = if i < true_pairs { seen + error * (noise * SIGMA) } else { seen };
+            model.push(own);
+            let position = UncertainPoint::isotropic(truth().inverse() * Point::from(seen), SIGMA);
+            cloud.push(MeasuredPoint { position, pixels: None });
+        }
         let model: Vec<ModelPoint> = model.iter().map(|at| ModelPoint::exact("", (*at).into())).collect();
         let candidates = Candidates::from_pairs(PAIRS, (0..PAIRS).map(|i| (i, i)));
-        let tolerance = Tolerance::Fixed(sigmas * SIGMA);
+        let tolerance = Tolerance::Fixed(tolerance * SIGMA);
         let problem = Problem {
             model: &model,
             cloud: &cloud,
@@ -270,14 +267,13 @@ mod tests {
         compute_fix(&problem, &search, &solver, &Acceptance::default(), None, &mut rng)
     }
 
-    /// Fails if the support of the best pose is not compared with anything.
     #[test]
     fn five_percent_of_true_pairs_suffice_and_none_do_not() {
-        let attempt = answer(25, (1.0, 4.0), |_, at| at);
+        let attempt = answer(25, (1.0, 4.0), |_, at| [at; 2]);
         let Outcome::Fix(fix) = &attempt.outcome else { panic!("{}", attempt.outcome) };
         assert!(truth().error_to(&fix.object_from_camera).norm() < 0.02 && attempt.p_wrong < Some(1e-9));
         assert!(attempt.nfa < Some(1e-9), "{:?}", attempt.nfa);
-        let absent = answer(0, (1.0, 4.0), |_, at| at);
+        let absent = answer(0, (1.0, 4.0), |_, at| [at; 2]);
         assert!(matches!(absent.outcome, Outcome::Rejected(_)), "{}", absent.outcome);
         assert!(absent.p_absent > Some(0.1), "{:?}", absent.p_absent);
     }
@@ -288,10 +284,21 @@ mod tests {
     #[test]
     fn pairs_side_by_side_count_once() {
         let centres = [[0.5, 0.1, 0.0], [-0.4, 0.3, 0.2], [0.1, -0.6, 0.4], [-0.2, -0.2, -0.5]].map(Vector3::from);
-        let grouped = |i: usize, at: Vector3<f64>| if i < 40 { centres[i % 4] + at * (2.0 * SIGMA) } else { at };
+        let grouped = |i: usize, at: Vector3<f64>| [centres[i % 4] + at * (2.0 * SIGMA); 2];
         let attempt = answer(40, (0.2, 4.0), grouped);
         assert!(matches!(attempt.outcome, Outcome::Rejected(_)), "{}", attempt.outcome);
         assert!(attempt.identified.len() > 20, "{} pairs", attempt.identified.len());
+        assert!(attempt.p_absent > Some(0.1), "{:?}", attempt.p_absent);
+    }
+
+    /// Half of the true pairs show the object at one place, half at another.
+    ///
+    /// Fails if the best pose is not compared with wrong poses.
+    #[test]
+    fn one_of_two_copies_is_not_answered() {
+        let beside = |i: usize, at: Vector3<f64>| [at, at + Vector3::new(1.0, 0.5, 0.0) * (i % 2) as f64];
+        let attempt = answer(50, (1.0, 4.0), beside);
+        assert!(!matches!(attempt.outcome, Outcome::Fix(_)), "{}", attempt.outcome);
         assert!(attempt.p_absent > Some(0.1), "{:?}", attempt.p_absent);
     }
 
@@ -301,7 +308,7 @@ mod tests {
     #[test]
     fn a_large_set_tells_its_own_noise() {
         let sigma = |noise: f64| {
-            let attempt = answer(150, (noise, 6.0), |_, at| at);
+            let attempt = answer(150, (noise, 6.0), |_, at| [at; 2]);
             let Outcome::Fix(fix) = attempt.outcome else { panic!("{}", attempt.outcome) };
             (fix.covariance.matrix.trace().sqrt(), fix.integrity.chi2 / fix.integrity.dof as f64)
         };
