@@ -86,7 +86,7 @@ pub use observations::{EdgeObservation, Observation, Observations};
 pub use problem::{Correspondence, Edges, Prior, PriorBound, Problem, Tolerance};
 pub use search::{
     Explanation, Identification, MaximumClique, Posterior, PosteriorProbabilities, Rejected, RigidConsensus, SEARCHES,
-    Samples, Search, StructuralCoherence, StructuredClutter,
+    Samples, Search, StructuralCoherence, StructuredClutter, Support,
 };
 pub use site::{
     BoundingBox, Congruence, End, Interest, ModelEdge, ModelPoint, NoWorld, Site, SiteObject, Target, TargetKind,

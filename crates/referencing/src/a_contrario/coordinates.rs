@@ -6,7 +6,7 @@ use seafix_geometry::MeasuredPoint;
 use crate::problem::Problem;
 
 /// Confidence of the χ² test that sets must pass.
-pub(super) const CONFIDENCE: f64 = 0.999;
+pub(crate) const CONFIDENCE: f64 = 0.999;
 
 /// Whether the null model shuffles partners: pairs are given without a prior, and not every possible pair.
 pub(crate) fn shuffled(problem: &Problem<'_>) -> bool {

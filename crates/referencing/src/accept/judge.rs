@@ -42,6 +42,8 @@ pub(super) struct Judge<'a> {
     /// Whether a search selected the sets, so that false alarms are possible.
     pub(super) searched: bool,
     pub(super) rig: Option<&'a StereoRig>,
+    /// Whether the independent pairs of a large putative set support the pose ([`Support`](crate::Support)).
+    pub(super) supported: bool,
     /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
     pub(super) near: Option<Transform<Object, Camera>>,
 }
@@ -247,10 +249,15 @@ impl Judge<'_> {
 
     /// Whether a rigid motion explains the set within its noise (χ² test).
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
-        let dof = hypothesis.dof();
-        let (chi2, limit) = (hypothesis.likelihood.cost, chi_square(dof, self.acceptance.confidence));
+        let (chi2, limit) = (hypothesis.likelihood.cost, self.chi2_limit(hypothesis.dof()));
         // A NaN is rejected as well.
         if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
+    }
+
+    /// The limit of χ² with these degrees of freedom.
+    fn chi2_limit(&self, dof: usize) -> f64 {
+        let variance_factor = if self.supported { VARIANCE_FACTOR } else { 1.0 };
+        variance_factor * chi_square(dof, self.acceptance.confidence)
     }
 
     /// Whether the pose passes the tests of precision and prior.
@@ -284,6 +291,12 @@ impl Judge<'_> {
         let Hypothesis { pairs, edges, pose, .. } = hypothesis;
         let data = self.observations(pairs, edges);
         let covariance = self.solver.covariance(&data, pose)?;
+        let covariance = match self.supported {
+            true => {
+                Covariance6::new(covariance.matrix * (hypothesis.likelihood.cost / hypothesis.dof() as f64).max(1.0))
+            }
+            false => covariance,
+        };
         if !self.searched || pairs.is_empty() {
             return Ok(covariance);
         }
@@ -363,6 +376,9 @@ impl Judge<'_> {
     /// a row, many wrong poses are possible; a clutter point near one of them makes a wrong pose look precise. Three
     /// points cannot be tested: each is needed.
     ///
+    /// A pose that a large putative set supports has more pairs than any wrong pose of the same frame: it does not hang
+    /// on one.
+    ///
     /// `all` is the predicted error of the complete set, whose own test it passed. A pose does not depend on a point
     /// whose exclusion changes the predicted error by less than [`CARRIED`]: otherwise a pose of hundreds of points that
     /// is just precise enough would fail by the loss of any of them.
@@ -372,7 +388,7 @@ impl Judge<'_> {
         hinge: Option<(usize, f64)>,
         all: f64,
     ) -> Result<(), RejectionReason> {
-        let Some((place, rms)) = hinge.filter(|_| self.searched) else { return Ok(()) };
+        let Some((place, rms)) = hinge.filter(|_| self.searched && !self.supported) else { return Ok(()) };
         // A NaN is rejected as well.
         if 2.0 * rms <= self.alert_limit || rms <= (1.0 + CARRIED) * all {
             return Ok(());
@@ -456,7 +472,7 @@ impl Judge<'_> {
             redundancy: Redundancy::of_features(hypothesis.pairs.len(), hypothesis.edges.len()),
             chi2: hypothesis.likelihood.cost,
             dof,
-            chi2_limit: chi_square(dof, self.acceptance.confidence),
+            chi2_limit: self.chi2_limit(dof),
             solution_separation: left_out.one,
             solution_separation_two: left_out.two,
             misidentified,
@@ -489,6 +505,13 @@ fn information_of_edges(data: &Observations<'_>, pose: &Transform<Object, Camera
     let all = Mixed::of(data, None, data.rig)?.each(pose)?;
     Ok(all[data.points.len()..].iter().map(Linearized::information).sum())
 }
+
+/// Largest ratio of the variance of residuals to that of the stated noise in a large putative set.
+///
+/// Its noise is the spacing of key points, which is known to a factor of √2 at best. Hundreds of residuals would reject
+/// a standard deviation that is wrong by a tenth. The covariance of the pose grows with the ratio (a-posteriori variance
+/// factor). Clutter that fills the gate of five standard deviations evenly has the ratio five.
+const VARIANCE_FACTOR: f64 = 2.0;
 
 /// Fraction of the risk: poses near the fix with a smaller relative probability need no coverage.
 const COVERED: f64 = 0.01;

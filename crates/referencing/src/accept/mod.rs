@@ -86,7 +86,8 @@ pub fn judge(
     let largest = std::iter::once(&found.pairs).chain(&found.alternatives).map(Vec::len).max().unwrap_or(0);
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
-    let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig, near };
+    let supported = found.posterior.as_ref().is_some_and(|posterior| posterior.support.is_some());
+    let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig, supported, near };
     let a_contrario = AContrario::of(problem, &found.pairs);
     let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario);
     let mut probability = evidence.probability();
@@ -123,7 +124,7 @@ pub fn judge(
     let line = if found.edges.is_empty() { on_a_line(problem) } else { None };
     let outcome = line.map_or(outcome, Outcome::Degenerate);
     let nfa = match &outcome {
-        _ if !found.edges.is_empty() => evidence.nfa(),
+        _ if !found.edges.is_empty() || evidence.is_independent() => evidence.nfa(),
         Outcome::Fix(fix) if fix.pairs != found.pairs => {
             if found.posterior.is_none() {
                 probability = Probability::counted(problem, &fix.pairs);
@@ -167,8 +168,17 @@ pub fn judge_labelled(
     rig: Option<&StereoRig>,
 ) -> Attempt {
     let alert_limit = alert_limit(problem.model, acceptance);
-    let judge =
-        Judge { problem, solver, acceptance, alert_limit, largest: pairs.len(), searched: false, rig, near: None };
+    let judge = Judge {
+        problem,
+        solver,
+        acceptance,
+        alert_limit,
+        largest: pairs.len(),
+        searched: false,
+        rig,
+        supported: false,
+        near: None,
+    };
     let consensus_bound = pairs.len();
     let found = Identification::unproved(pairs, consensus_bound, 0);
     let (outcome, runner_up) = match judge.size(&found.pairs, &found.edges) {

@@ -69,6 +69,8 @@ pub(super) struct Evidence<'a> {
     edges: usize,
     /// The number of false alarms of points and edges together.
     nfa_with_edges: Option<f64>,
+    /// The number of false alarms by independent pairs of a large putative set.
+    nfa_independent: Option<f64>,
     /// The posterior of the search; `None` for a search that counts pairs.
     posterior: Option<PosteriorProbabilities>,
     /// The numbers of false alarms, computed on demand.
@@ -86,7 +88,22 @@ impl<'a> Evidence<'a> {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(problem.model, limit));
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
         let nfa_with_edges = ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp);
-        Self { problem, pairs: &found.pairs, edges: found.edges.len(), nfa_with_edges, posterior, a_contrario }
+        let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
+        let nfa_independent = support.map(|support| libm::exp(support.ln_nfa));
+        Self {
+            problem,
+            pairs: &found.pairs,
+            edges: found.edges.len(),
+            nfa_with_edges,
+            nfa_independent,
+            posterior,
+            a_contrario,
+        }
+    }
+
+    /// Whether the number of false alarms is that of independent pairs.
+    pub(super) fn is_independent(&self) -> bool {
+        self.nfa_independent.is_some()
     }
 
     /// The probabilities of the answer.
@@ -114,10 +131,14 @@ impl<'a> Evidence<'a> {
         ln_evidence >= COPY || 1.0 / (1.0 + libm::exp(ln_evidence)) <= max
     }
 
-    /// The number of false alarms: that of the points or, with edges, the smaller of it and that of all features.
+    /// The number of false alarms: that of the points or, with edges, the smaller of it and that of all features;
+    /// that of independent pairs for a large putative set.
     ///
     /// Each bounds the probability of such an answer without the object.
     pub(super) fn nfa(&self) -> f64 {
+        if let Some(independent) = self.nfa_independent {
+            return independent;
+        }
         match self.nfa_with_edges {
             None => self.a_contrario.sets_as_good(),
             Some(all) if all <= 1e-6 => all,

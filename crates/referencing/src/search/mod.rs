@@ -40,7 +40,7 @@ mod structural_coherence;
 mod volumes;
 mod weighted_clique;
 
-pub use consensus::StructuredClutter;
+pub use consensus::{StructuredClutter, Support};
 pub use identification::{Identification, Rejected, Search};
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]

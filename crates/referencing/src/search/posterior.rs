@@ -2,8 +2,13 @@
 
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::consensus::structured_clutter::StructuredClutter;
-use crate::{accept::apart::rms_apart, alternative::Alternative, problem::Correspondence, site::model::ModelPoint};
+use super::consensus::{structured_clutter::StructuredClutter, support::Support};
+use crate::{
+    accept::{apart::rms_apart, probability::by_nfa},
+    alternative::Alternative,
+    problem::Correspondence,
+    site::model::ModelPoint,
+};
 
 /// Evidence (nats) below the best at which an explanation is not listed; e⁻⁷·⁶ = 0.05 %.
 const NEGLIGIBLE: f64 = 7.6;
@@ -44,8 +49,8 @@ pub struct Posterior {
     pub beside: Vec<Explanation>,
     /// Whether the search for second copies of the object was exhaustive, up to the bounds of evidence.
     ///
-    /// A copy may be complete or partial. `None` if none was searched for, since no pose has enough evidence to be
-    /// accepted.
+    /// A copy may be complete or partial. `None` if none was searched for: no pose has enough evidence to be accepted, or
+    /// the set is large and putative, where a copy is one of the wrong poses of its [`Support`].
     pub copies_sought: Option<bool>,
     /// ln evidence (nats) of a pattern like the object's in its place, without the object; `None` for an object without
     /// a pattern.
@@ -67,6 +72,8 @@ pub struct Posterior {
     pub evidence_gap: Option<f64>,
     /// ln of the number of false alarms of the best pose by points and edges together; `None` without edges or prior.
     pub ln_nfa: Option<f64>,
+    /// The support of independent pairs, in place of all evidence of clutter; `None` but for a large putative set.
+    pub support: Option<Support>,
 }
 
 /// Evidence (nats) that makes a pose beside the best a second copy of the object in any case, complete or partial.
@@ -157,6 +164,9 @@ impl Posterior {
         let Some(best) = self.explanations.first() else {
             return PosteriorProbabilities { map_estimate: 0.0, elsewhere: 0.0, absent: 1.0, alike: 0.0, clutter: 0.0 };
         };
+        if let Some(support) = &self.support {
+            return self.by_support(support, model, limit);
+        }
         let pattern = self.pattern_alone.unwrap_or(f64::NEG_INFINITY);
         let shifted = self.pattern_shifted.unwrap_or(f64::NEG_INFINITY);
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
@@ -189,6 +199,19 @@ impl Posterior {
             alike: alike / all,
             clutter: more / all,
         }
+    }
+
+    /// The probabilities of a large putative set, from the support of independent pairs.
+    fn by_support(&self, support: &Support, model: &[ModelPoint], limit: f64) -> PosteriorProbabilities {
+        let absent = by_nfa(libm::exp(support.ln_nfa));
+        let (mut near, mut elsewhere) = (0.0, libm::exp(support.ln_odds_elsewhere.min(0.0)));
+        for (other, ln_odds) in self.explanations.iter().zip(&support.ln_odds) {
+            let apart = rms_apart(model, &self.explanations[0].object_from_camera, &other.object_from_camera);
+            *if apart <= limit { &mut near } else { &mut elsewhere } += libm::exp(*ln_odds);
+        }
+        let present = (1.0 - absent) / (near + elsewhere);
+        let (map_estimate, elsewhere) = (present * near, present * elsewhere);
+        PosteriorProbabilities { map_estimate, elsewhere, absent, alike: 0.0, clutter: absent }
     }
 }
 

@@ -20,8 +20,9 @@ use super::{
         prior_terms::PriorTerms,
         proof::{Proved, prove},
         repeated_pattern::Pattern,
-        seeds::{Seeds, Swept},
+        seeds::{Seeds, Swept, guided::LARGE},
         structured_clutter::{Occupied, StructuredClutter},
+        support::IndependentPairs,
     },
     grow::{feasible, grow, max_possible, so_far},
     identification::{Identification, Rejected, Search},
@@ -29,7 +30,7 @@ use super::{
     orientation::Sense,
     posterior::{COPY, Explanation, Posterior},
 };
-use crate::{problem::Problem, solve::likelihood::mixed::ENOUGH};
+use crate::{a_contrario::coordinates::shuffled, problem::Problem, solve::likelihood::mixed::ENOUGH};
 
 /// Maximum-a-posteriori pose search with Bayesian model comparison (MacKay 2003, ch. 27 and 28).
 ///
@@ -82,6 +83,13 @@ use crate::{problem::Problem, solve::likelihood::mixed::ENOUGH};
 /// many members. Once so many of these were seeds that a set would have been missed with a probability of 10⁻⁴, the
 /// enumeration need not be complete. The seeds take at most the budget once more, in words of the graph.
 ///
+/// # Large putative sets
+///
+/// Of more than 256 model points with putative partners and without a prior, as key points of scans with descriptors,
+/// wrong pairs come in groups and on common surfaces. Such a set is not weighed against models of clutter. Its best pose
+/// is accepted by the number of its independent pairs, compared with wrong poses of the same frame ([`Support`](super::Support)). The
+/// guided seeds suffice then, and a second copy is a wrong pose that leaves the best without support.
+///
 /// With `prove`, and if the evidence of the best pose exceeds five nats, strict bounds decide which coherent sets are
 /// examined. They hold for uniform clutter and to first order in the geometry. A better set joins the posterior. The
 /// answer is optimal if no set remains open, unless some pairs of its pose were removed for lack of coherence.
@@ -114,7 +122,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 6;
+    const VERSION: u32 = 7;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -175,9 +183,11 @@ impl Search for RigidConsensus {
         let parts = (&terms, &prior_terms, &graph);
         let none = BTreeSet::new();
         let seeds = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget);
+        // A large putative set is judged by its independent pairs.
+        let large = problem.edges.with_candidates() == 0 && shuffled(problem) && graph.starts.len() > LARGE;
         // The proof starts from the complete enumeration.
         let mut swept = match enough(0) {
-            true => if self.prove { seeds } else { seeds.guided(self.budget) }.sweep(),
+            true => if self.prove { seeds } else { seeds.guided(self.budget).sampled(large) }.sweep(),
             false => Swept { complete: true, parts: true, ..Swept::default() },
         };
         let mut pair_tests = graph.pair_tests + swept.pair_tests;
@@ -203,7 +213,8 @@ impl Search for RigidConsensus {
         };
         // The pattern is that of points.
         let by_points = swept.modes.first().is_some_and(|best| best.members.len() >= NEEDED);
-        let pattern = if strong(&swept) && by_points { Pattern::of(problem.model, problem.edges.model) } else { None };
+        let pattern =
+            if strong(&swept) && by_points && !large { Pattern::of(problem.model, problem.edges.model) } else { None };
         if let (Some(pattern), Some(best)) = (&pattern, swept.modes.first()) {
             let compared = Cell::new(0);
             let (model, taken) = (problem.model, &none);
@@ -213,8 +224,10 @@ impl Search for RigidConsensus {
             swept.insert(shifts);
         }
         swept.modes.truncate(MAX_COMPARED);
-        weighted(&mut swept);
-        largest_evidence_first(&mut swept.modes);
+        if !large {
+            weighted(&mut swept);
+            largest_evidence_first(&mut swept.modes);
+        }
         let continued =
             pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
         let ended = |best: usize, pair_tests| Rejected::Budget { budget: self.budget, best, bound, pair_tests };
@@ -231,7 +244,7 @@ impl Search for RigidConsensus {
         let mut copies_sought = None;
         let mut structured_clutter = None;
         let mut unlikely = None;
-        if best.ln_evidence >= STRONG {
+        if best.ln_evidence >= STRONG && !large {
             let elsewhere = |mode: &Mode| {
                 let points = mode.members.iter().filter(|&&v| best.holds(v)).count();
                 let edges = mode.edges.iter().filter(|v| best.edges.binary_search(v).is_ok()).count();
@@ -290,6 +303,7 @@ impl Search for RigidConsensus {
             }
         }
         let complete = swept.complete && beside.complete;
+        let support = if large { IndependentPairs::of(parts).support(&swept.modes) } else { None };
         let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
         let evidence_gap = proved.map(gap);
         // The returned set is coherent throughout: among twenty true points some two usually differ by more than the
@@ -338,6 +352,7 @@ impl Search for RigidConsensus {
                 unlikely: unlikely.as_ref().map(explanation),
                 evidence_gap,
                 ln_nfa,
+                support,
             }),
             pairs,
         })

@@ -93,7 +93,17 @@ impl Scene {
         };
         let (acceptance, searched, largest) = (&self.acceptance, self.searched, self.largest);
         let alert_limit = acceptance.alert_limit;
-        work(&Judge { problem: &problem, solver, acceptance, alert_limit, largest, searched, rig: None, near: None })
+        work(&Judge {
+            problem: &problem,
+            solver,
+            acceptance,
+            alert_limit,
+            largest,
+            searched,
+            rig: None,
+            supported: false,
+            near: None,
+        })
     }
 
     fn pairs(&self) -> Vec<Correspondence> {

@@ -31,6 +31,8 @@ pub(crate) mod repeated_pattern;
 pub(crate) mod seeds;
 mod solve6;
 pub(crate) mod structured_clutter;
+pub(crate) mod support;
 mod visible;
 
 pub use structured_clutter::StructuredClutter;
+pub use support::Support;

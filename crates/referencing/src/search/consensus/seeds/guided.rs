@@ -21,7 +21,7 @@ use crate::{
 /// Minimum number of model points with a pair in a large problem.
 ///
 /// Smaller problems are enumerated within a fraction of the budget.
-const LARGE: usize = 256;
+pub(in crate::search) const LARGE: usize = 256;
 /// Number of the best connected vertices that are seeds first, so that a good pose is known early.
 const FIRST: usize = 64;
 /// Number of beginnings of a seed, of its neighbours that may join, and maximum size of a beginning.
@@ -51,13 +51,19 @@ impl Seeds<'_> {
         self
     }
 
+    /// Lets the guided seeds suffice, whatever their number: the answer is compared with a sample of wrong poses.
+    pub(in crate::search) fn sampled(mut self, suffices: bool) -> Self {
+        self.sampled = suffices;
+        self
+    }
+
     /// Follows guided seeds and sets the limit of the enumeration. Returns whether a set of interest would have been
     /// found.
     pub(super) fn guide(&mut self) -> bool {
         if self.guided == 0 || self.climb.graph.starts.len() <= LARGE {
             return false;
         }
-        let found = self.follow_seeds();
+        let found = self.follow_seeds() || self.sampled;
         let left = if found { self.budget.min(self.spent / ENUMERATED) } else { self.budget };
         self.budget = self.spent.saturating_add(left);
         found
@@ -109,21 +115,11 @@ impl Seeds<'_> {
         if ranked.len() + 1 < min {
             return;
         }
-        let by = |&(common, v): &(usize, usize)| (std::cmp::Reverse(common), v);
-        if ranked.len() > TOP {
-            ranked.select_nth_unstable_by_key(TOP, by);
-            ranked.truncate(TOP);
-        }
-        ranked.sort_unstable_by_key(by);
+        best_connected_first(&mut ranked);
         let mut tried: Vec<usize> = Vec::new();
         for _ in 0..BEGINNINGS {
             let Some(&(_, second)) = ranked.iter().find(|(_, v)| !tried.contains(v)) else { return };
-            let mut joined = vec![seed, second];
-            for &(_, v) in &ranked {
-                if joined.len() < JOINED && joined.iter().all(|&other| is_set(adjacency.row(other), v)) {
-                    joined.push(v);
-                }
-            }
+            let joined = joined(adjacency, &[seed, second], &ranked);
             tried.extend(&joined[1..]);
             if joined.len() < MIN {
                 continue;
@@ -160,8 +156,39 @@ impl Seeds<'_> {
     }
 }
 
+/// Sorts neighbours by falling number of common neighbours, and keeps the first [`TOP`].
+fn best_connected_first(ranked: &mut Vec<(usize, usize)>) {
+    let by = |&(common, v): &(usize, usize)| (std::cmp::Reverse(common), v);
+    if ranked.len() > TOP {
+        ranked.select_nth_unstable_by_key(TOP, by);
+        ranked.truncate(TOP);
+    }
+    ranked.sort_unstable_by_key(by);
+}
+
+/// Some pairs and those of `ranked`, the first first, that are compatible with all of them.
+fn joined(adjacency: &BitMatrix, begun: &[usize], ranked: &[(usize, usize)]) -> Vec<usize> {
+    let mut joined = begun.to_vec();
+    for &(_, v) in ranked {
+        if joined.len() < JOINED && joined.iter().all(|&other| is_set(adjacency.row(other), v)) {
+            joined.push(v);
+        }
+    }
+    joined
+}
+
+/// The beginning of a seed and its neighbours, each with its number of common neighbours; `None` below three pairs.
+pub(in crate::search::consensus) fn beginning(
+    adjacency: &BitMatrix,
+    seed: usize,
+    mut neighbours: Vec<(usize, usize)>,
+) -> Option<Vec<usize>> {
+    best_connected_first(&mut neighbours);
+    Some(joined(adjacency, &[seed], &neighbours)).filter(|joined| joined.len() >= MIN)
+}
+
 /// The least-squares motion of some pairs; `None` if it is not finite.
-fn fitted(terms: &Terms, members: &[usize]) -> Option<Motion> {
+pub(in crate::search::consensus) fn fitted(terms: &Terms, members: &[usize]) -> Option<Motion> {
     let observed = |&v: &usize| Observation {
         measured: UncertainPoint::isotropic(terms.pairs[v].cloud.into(), 0.0),
         pixels: None,
@@ -174,7 +201,7 @@ fn fitted(terms: &Terms, members: &[usize]) -> Option<Motion> {
 }
 
 /// The adjacency with both directions of every edge.
-fn symmetric(graph: &ConsistencyGraph) -> BitMatrix {
+pub(in crate::search::consensus) fn symmetric(graph: &ConsistencyGraph) -> BitMatrix {
     let count = graph.vertices.len();
     let mut adjacency = BitMatrix::zeros(count);
     (0..count).for_each(|v| adjacency.row_mut(v).copy_from_slice(graph.row(v)));
@@ -183,7 +210,7 @@ fn symmetric(graph: &ConsistencyGraph) -> BitMatrix {
 }
 
 /// A step without a common divisor with `count`, near the golden section of it: its multiples are spread evenly.
-fn stride(count: usize) -> usize {
+pub(in crate::search::consensus) fn stride(count: usize) -> usize {
     let coprime = |a: &usize| {
         let (mut a, mut b) = (*a, count);
         while b > 0 {

@@ -1,7 +1,7 @@
 //! Best-first enumeration of the coherent triples that may lead to a pose of interest.
 
 mod elsewhere;
-mod guided;
+pub(in crate::search) mod guided;
 mod queue;
 #[cfg(test)]
 mod tests;
@@ -144,6 +144,8 @@ pub(in crate::search) struct Seeds<'a> {
     climbed: BTreeSet<Vec<usize>>,
     /// Maximum work of guided seeds; none without.
     guided: u64,
+    /// Whether the guided seeds suffice.
+    sampled: bool,
 }
 
 impl<'a> Seeds<'a> {
@@ -180,6 +182,7 @@ impl<'a> Seeds<'a> {
             members: Vec::new(),
             climbed: BTreeSet::new(),
             guided: 0,
+            sampled: false,
         }
     }
 
