@@ -244,13 +244,13 @@ fn between(run: &Run) -> Vec<Comparison> {
 
 /// Whether the frames of two trials are generated from the same random numbers, frame by frame.
 fn alike(first: &Trial, second: &Trial) -> bool {
-    let drawn = |trial: &Trial| {
+    let random = |trial: &Trial| {
         let targets: Vec<String> = trial.header.targets.iter().map(|target| target.id.clone()).collect();
         (trial.header.seeds.clone(), targets, trial.count(), trial.every())
     };
     // Recorded frames have no random numbers in common.
     let simulated = !first.header.configuration.contains("name = \"dataset\"");
-    simulated && !first.header.seeds.is_empty() && drawn(first) == drawn(second)
+    simulated && !first.header.seeds.is_empty() && random(first) == random(second)
 }
 
 /// Whether attempts of two trials can be compared in pairs: they have the same frames, or the same random numbers.

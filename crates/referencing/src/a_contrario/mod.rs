@@ -31,6 +31,7 @@
 //! Source: a-contrario acceptance after Moisan and Stival, *A probabilistic criterion to detect rigid point matches*,
 //! 2004; the volume of tubes after Weyl, *On the volume of tubes*, 1939.
 
+pub(crate) mod absence;
 pub(crate) mod coincidence;
 pub(crate) mod coordinates;
 mod null;

@@ -8,7 +8,8 @@ use super::{
     member::{Member, ObjectObservations, Placement},
 };
 use crate::{
-    accept::{acceptance::Acceptance, max_p_wrong::MaxPWrong, probability::by_nfa},
+    a_contrario::absence::by_nfa,
+    accept::{acceptance::Acceptance, max_p_wrong::MaxPWrong},
     candidates::{Candidates, Gate, candidates},
     chi_square::chi_square,
     observations::Observations,

@@ -4,9 +4,7 @@ use seafix_geometry::{Camera, Object, Transform};
 
 use super::consensus::{structured_clutter::StructuredClutter, support::Support};
 use crate::{
-    accept::{apart::rms_apart, probability::by_nfa},
-    alternative::Alternative,
-    problem::Correspondence,
+    a_contrario::absence::by_nfa, accept::apart::rms_apart, alternative::Alternative, problem::Correspondence,
     site::model::ModelPoint,
 };
 

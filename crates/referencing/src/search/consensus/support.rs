@@ -306,7 +306,7 @@ mod tests {
     ///
     /// Fails if the χ² test stands, and if the covariance does not grow.
     #[test]
-    fn a_large_set_tells_its_own_noise() {
+    fn a_large_set_states_its_own_noise() {
         let sigma = |noise: f64| {
             let attempt = answer(150, (noise, 6.0), |_, at| [at; 2]);
             let Outcome::Fix(fix) = attempt.outcome else { panic!("{}", attempt.outcome) };

@@ -136,7 +136,7 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
     let bound = 100.0 * proportion::interval_of_counts(successive, 0, min).1;
     // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
     let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
-    let most = summary.rows.iter().map(|row| (row.wrong, row.attempted)).max().unwrap_or_default();
+    let worst = summary.rows.iter().map(|row| (row.wrong, row.attempted)).max().unwrap_or_default();
     let wrong = match wrong {
         0 if min > 0 && !summary.rows.iter().all(|row| row.unjudged == row.found) => format!(
             "No fix is wrong. The smallest trial has {}{}, after which the rate of wrong fixes may still be up to {bound:.digits$} % \
@@ -145,7 +145,7 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
             if successive && min > 1 { ", which depend on each other" } else { "" }
         ),
         0 => String::new(),
-        _ => format!("{wrong} of {all} attempts are wrong fixes, at most {} of {} in one trial. ", most.0, most.1),
+        _ => format!("{wrong} of {all} attempts are wrong fixes, at most {} of {} in one trial. ", worst.0, worst.1),
     };
     format!("{data}{site}. {dives}{wrong}The section on threats to validity lists all limits.")
 }

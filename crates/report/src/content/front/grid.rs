@@ -1,6 +1,6 @@
 //! The table of a run over two conditions: a line for each value of one, a column for each of the other.
 
-use super::{cost, kind::Kind, limits, measured::Sample, table::LINES};
+use super::{cells::LINES, cost, kind::Kind, limits, measured::Sample};
 use crate::{
     content::conditions::labels::{Labels, value},
     document::{Block, Cell, Head, Table, Text, text},

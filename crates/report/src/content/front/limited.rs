@@ -1,6 +1,6 @@
 //! The table of limits of the probability of a wrong answer.
 
-use super::{acceptance::methods, measured::Sample, table::rate_of};
+use super::{acceptance::methods, cells::rate_of, measured::Sample};
 use crate::{
     document::{Block, Cell, Head, Table, text},
     run::Run,

@@ -3,6 +3,7 @@
 mod acceptance;
 mod along;
 mod cases;
+mod cells;
 mod company;
 mod conclusion;
 mod contrast;

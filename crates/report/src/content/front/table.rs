@@ -3,11 +3,12 @@
 //! A longer run has a [`grid`] of its two conditions, or a line for every series.
 
 use super::{
+    cells::{LINES, rate_of, without_unit},
     contrast::Contrast,
     grid,
     kind::Kind,
     limited,
-    measured::{Measured, Sample, error, median, navigated_rms},
+    measured::{Sample, error, median, navigated_rms},
 };
 use crate::{
     content::{
@@ -15,14 +16,11 @@ use crate::{
         phrases::{self, Unit},
         sections::navigation,
     },
-    document::{Block, Cell, Head, Table, Text, text},
+    document::{Block, Cell, Head, Table, text},
     navigation_quantity::NavigationQuantity,
     run::Run,
     summary::RunSummary,
 };
-
-/// Maximum number of lines.
-pub(super) const LINES: usize = 12;
 
 /// The table; `None` if even the series are too many, or nothing was attempted.
 pub(super) fn block(run: &Run, summary: &RunSummary) -> Option<Block> {
@@ -129,20 +127,4 @@ fn bases(summary: &RunSummary) -> Vec<usize> {
         _ => (0..index).find(|&other| place(other) == place(index)).unwrap_or(index),
     };
     (0..summary.rows.len()).map(base).collect()
-}
-
-/// The rate without its sign; a dash without attempts.
-pub(super) fn rate_of(sample: &Sample<'_>, rate: Measured) -> Text {
-    if sample.attempted == 0 { text!["–"] } else { without_unit(rate.text()) }
-}
-
-/// A measured value whose unit the head of its column states.
-fn without_unit(text: Text) -> Text {
-    let strip = |span| match span {
-        crate::document::Span::Plain(words) => {
-            crate::document::Span::Plain(words.replace(" mm RMS", "").replace(" mm", "").replace(" %", ""))
-        }
-        span => span,
-    };
-    text.into_iter().map(strip).collect()
 }
