@@ -41,6 +41,11 @@ pub(crate) fn unit(key: &str) -> Option<&'static str> {
     }
 }
 
+/// A name in a sentence: one of several words in quotation marks, so that it is read as one.
+pub(crate) fn quoted(name: &str) -> String {
+    if name.contains(' ') { format!("“{name}”") } else { name.to_owned() }
+}
+
 /// Whether a larger value of an axis makes the task harder.
 ///
 /// Such axes describe the environment, not the settings of the method.

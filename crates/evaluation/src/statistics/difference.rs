@@ -113,7 +113,7 @@ mod tests {
     /// Seen to fail where q is c/n.
     #[test]
     fn the_ends_of_the_difference_have_the_score_of_the_level() {
-        let pairs: Vec<(bool, bool)> = (0..50).map(|i| (i < 12 || i >= 14, i >= 12)).collect();
+        let pairs: Vec<(bool, bool)> = (0..50).map(|i| (!(12..14).contains(&i), i >= 12)).collect();
         let found = Difference::of_rates(&pairs, 1, 0.95);
         assert!((found.value - 0.2).abs() < 1e-12, "12 against 2 of 50");
         for end in found.interval {

@@ -59,8 +59,8 @@ fn whether_fixes_bound_the_error_is_answered() {
     trial(folder.path(), 1, ["navigation", "often"], question, |_| [0.004, 0.020]);
     trial(folder.path(), 2, ["navigation", "seldom"], question, |_| [0.007, 0.020]);
     let text = page(folder.path());
-    let expected = "Yes: with often the camera position error is 4.0 mm RMS [4.0, 4.0], by odometry alone 20.0 mm RMS \
-                    [20.0, 20.0]; with seldom it is 7.0 mm RMS [7.0, 7.0], by odometry alone 20.0 mm RMS [20.0, 20.0].";
+    let expected = "Yes: with often the camera position error is 4.0 mm RMS [4.0, 4.0], without fixes after the first 20.0 mm RMS \
+                    [20.0, 20.0]; with seldom it is 7.0 mm RMS [7.0, 7.0], without fixes after the first 20.0 mm RMS [20.0, 20.0].";
     assert!(text.contains(expected), "{text}");
     assert!(
         text.contains("Each trial is one dive: the intervals of its errors are over blocks of its frames"),

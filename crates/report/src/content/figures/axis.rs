@@ -9,7 +9,7 @@ use crate::{
     document::{Figure, Head, Table, text},
     field::Field,
     figure::{Axis, Chart, Entry, Layer, Panel},
-    format::{distinct, headed, short},
+    format::{distinct, headed, sentence_case, short},
     number::{Key, Number},
     published::Published,
     run::{Run, Trial},
@@ -19,7 +19,7 @@ use crate::{
 /// A quantity with its distribution in a row and its axis label.
 type Metric = (Field, fn(&Row) -> Option<Distribution>, &'static str);
 
-/// The figure of fit RMS and TRE over the condition, with published ranges.
+/// The figure of two errors over the condition, with published ranges.
 ///
 /// Over distance it also shows growth with z and z².
 pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
@@ -39,8 +39,8 @@ pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     heads.extend(["p5 (mm)", "median (mm)", "p95 (mm)"].map(Head::numbers));
     let mut data =
         Table::new("error-over-condition", text!["The data of the figure of error over the condition."], heads);
-    let metrics: [Metric; 2] = [(Field::Fit, |row| row.fit, "fit RMS (mm)"), (Field::Tre, |row| row.tre, "TRE (mm)")];
     let published = Published::of(run);
+    let metrics = metrics(summary, &published);
     let mut plotted = Vec::new();
     for (field, value, label) in metrics {
         let mut layers = Vec::new();
@@ -89,11 +89,26 @@ pub(crate) fn errors(run: &Run, summary: &RunSummary) -> Option<Figure> {
     let chart = Chart { panels: plotted, columns: 2, page: true, shape: 0.78, legend };
     let laws = if ranges(&key) { " Thin grey lines: growth with the distance z and with its square." } else { "" };
     let message = format!(
-        "Error over {}: medians of the fixes, with bars from the 5 % to the 95 % quantile, slightly shifted apart.{laws}{}",
+        "{} and {} over {}: medians of the fixes, with bars from the 5 % to the 95 % quantile, slightly shifted apart.{laws}{}",
+        sentence_case(metrics[0].2.trim_end_matches(" (mm)")),
+        metrics[1].2.trim_end_matches(" (mm)"),
         short(&key),
         Published::caption(&published, &metrics.map(|(field, ..)| field))
     );
     figure("error-over-condition", caption(&message), &chart, data)
+}
+
+/// The two quantities of the figure: the error that the first page states, and the fit RMS where a publication states one.
+fn metrics(summary: &RunSummary, published: &[Published]) -> [Metric; 2] {
+    let position: Metric = (Field::Position, |row| row.position_error, "camera position error (mm)");
+    let tre: Metric = (Field::Tre, |row| row.tre, "TRE (mm)");
+    let fit: Metric = (Field::Fit, |row| row.fit, "fit RMS (mm)");
+    let stated = !Published::caption(published, &[Field::Fit]).is_empty();
+    match (summary.rows.iter().any(|row| row.position_error.is_some()), stated) {
+        (true, true) => [position, fit],
+        (true, false) => [position, tre],
+        (false, _) => [tre, fit],
+    }
 }
 
 /// Whether a condition is the distance to the objects, or nearly so.

@@ -119,7 +119,7 @@ pub(crate) fn precision_recall(run: &Run, summary: &RunSummary) -> Option<Figure
     let columns = if panels.len() == 4 { 2 } else { panels.len().min(3) };
     let chart = Chart { panels, columns, page, shape: if columns == 2 { 0.62 } else { 0.8 }, legend };
     let message = format!(
-        "Precision of the points that fixes identified, over recall of the visible points of all attempts including rejected ones, along {}. The numbers are its smallest and largest value, at the ends of each line, and its value with the largest F1 score on these frames, marked by a ring.",
+        "Precision of the points that fixes identified, over recall of the visible points of all attempts including rejected ones, along {}. The numbers are its smallest and largest value with a fix, at the ends of each line, and its value with the largest F1 score on these frames, marked by a ring.",
         headed(&key)
     );
     figure("precision-recall", caption(&message), &chart, data)

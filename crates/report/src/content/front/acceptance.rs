@@ -16,14 +16,16 @@ pub(super) struct Limit {
     pub(super) absent: Vec<usize>,
 }
 
+/// Whether the frames of a trial lack the object.
+pub(super) fn is_absent(row: &Row) -> bool {
+    row.axes.iter().any(|axis| short(&axis.key) == "absent" && axis.value == "true")
+}
+
 /// Each value of the axis `key` with its trials, in the order of the run.
 fn limits(summary: &RunSummary, key: &str) -> Vec<Limit> {
-    let is_absent = |index: &usize| {
-        summary.rows[*index].axes.iter().any(|axis| short(&axis.key) == "absent" && axis.value == "true")
-    };
     let of = |name: String| {
         let members = (0..summary.rows.len()).filter(|&index| value(&summary.rows[index], key) == name);
-        let (absent, present) = members.partition(is_absent);
+        let (absent, present) = members.partition(|&index| is_absent(&summary.rows[index]));
         Limit { name, present, absent }
     };
     distinct(summary.rows.iter().map(|row| value(row, key))).into_iter().map(of).collect()

@@ -4,12 +4,13 @@ use super::{
     contrast::{Contrast, Ranked},
     kind::Asked,
     measured::{DistributionOf, Sample, capitalised, error, median_of, wrong},
-    ranking::{Case, Words, clause, decreasing, of_attempts, quoted},
+    ranking::{Case, Words, clause, decreasing, of_attempts},
 };
 use crate::{
     content::{conditions::labels::Labels, phrases::Unit},
     document::{Text, text},
     field::Field,
+    format::quoted,
     run::Run,
     summary::RunSummary,
 };

@@ -6,7 +6,7 @@ use super::{
     cost,
     kind::{Asked, Kind},
     measured::Sample,
-    navigated, ranking,
+    navigated,
 };
 use crate::{
     content::{
@@ -15,7 +15,7 @@ use crate::{
         sections::{navigation, significance},
     },
     document::{Text, bold, text},
-    format::counted,
+    format::{counted, quoted},
     paired::Comparison,
     proportion,
     run::Run,
@@ -60,13 +60,14 @@ pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
 fn rates(run: &Run, summary: &RunSummary, kind: &Kind) -> Option<Text> {
     let labels = Labels::of(summary);
     let series = || -> Vec<(String, Vec<usize>)> {
-        let named = |(name, members): (String, _)| (format!("with {}", ranking::quoted(&name)), members);
+        let named = |(name, members): (String, _)| (format!("with {}", quoted(&name)), members);
         labels.series(summary).into_iter().map(named).collect()
     };
     let mut cases = match kind {
         Kind::Acceptance(key) => {
-            let (_, limits) = acceptance::methods(summary, key).into_iter().next()?;
-            limits.into_iter().map(|limit| (format!("at the limit {}", limit.name), limit.present)).collect()
+            let (method, limits) = acceptance::methods(summary, key).into_iter().next()?;
+            let named = |limit: &str| format!("with {method} at the limit {limit}");
+            limits.into_iter().map(|limit| (named(&limit.name), limit.present)).collect()
         }
         Kind::Along(key) if labels.series(summary).len() == 1 => {
             let place = |index: usize| format!("at {}", labels.place(&summary.rows[index], key));
@@ -93,7 +94,7 @@ fn rates(run: &Run, summary: &RunSummary, kind: &Kind) -> Option<Text> {
     let strict = contrast.of_rates(&highest.1, &lowest.1, simultaneous(count)).is_some_and(|of| of.significant());
     let significant = match (strict, found.significant()) {
         (true, _) => "a significant difference",
-        (false, true) => "which is not significant among so many comparisons",
+        (false, true) => "which is not significant after adjustment for all comparisons with the best",
         (false, false) => "which is not significant",
     };
     Some(text![
@@ -123,7 +124,14 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
     let targets = run.header().targets.len();
     let site = match targets {
         0 => ", and every frame has another object".to_owned(),
-        targets => format!(", of one site with {}", counted(targets, "target", "targets")),
+        targets => {
+            let sites: std::collections::BTreeSet<&str> = headers().map(|header| header.site.as_str()).collect();
+            let targets = counted(targets, "target", "targets");
+            match sites.len() {
+                1 => format!(", of one site with {targets}"),
+                sites => format!(", of {sites} sites or variants of a site with {targets}"),
+            }
+        }
     };
     let dives = if run.trials.iter().any(navigation::navigates) {
         "Each trial is one dive: the intervals of its errors are over blocks of its frames, not over other dives. "
@@ -131,13 +139,20 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
         ""
     };
     let min = summary.rows.iter().map(|row| row.attempted).min().unwrap_or(0);
-    let (wrong, all) = summary.rows.iter().fold((0, 0), |(w, a), row| (w + row.wrong, a + row.attempted));
+    let counts = |absent: bool| {
+        let own = summary.rows.iter().filter(move |row| acceptance::is_absent(row) == absent);
+        own.fold((0, 0), |(w, a), row| (w + row.wrong, a + row.attempted))
+    };
+    let ((wrong, all), (answered, without)) = (counts(false), counts(true));
     let successive = headers().any(proportion::is_trajectory);
     let bound = 100.0 * proportion::interval_of_counts(successive, 0, min).1;
     // Two significant digits: a thousand attempts and more bound the rate below a tenth of a percent.
     let digits = if bound > 0.0 { (1.0 - bound.log10().floor()).clamp(1.0, 4.0) as usize } else { 1 };
     let worst = summary.rows.iter().map(|row| (row.wrong, row.attempted)).max().unwrap_or_default();
     let wrong = match wrong {
+        _ if without > 0 => format!(
+            "{wrong} of {all} objects in view have a wrong fix, and {answered} of {without} frames without the object are answered. "
+        ),
         0 if min > 0 && !summary.rows.iter().all(|row| row.unjudged == row.found) => format!(
             "No fix is wrong. The smallest trial has {}{}, after which the rate of wrong fixes may still be up to {bound:.digits$} % \
              (95 % interval). ",
@@ -147,5 +162,5 @@ fn limits(run: &Run, summary: &RunSummary) -> String {
         0 => String::new(),
         _ => format!("{wrong} of {all} attempts are wrong fixes, at most {} of {} in one trial. ", worst.0, worst.1),
     };
-    format!("{data}{site}. {dives}{wrong}The section on threats to validity lists all limits.")
+    format!("{data}{site}. {dives}{wrong}The section on threats to validity explains further limits.")
 }

@@ -41,11 +41,11 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     let (_, first, last) = known.first().or(without.first())?;
     let candidates = |index: usize| median(&run.trials[index], Field::Candidates).number();
     let mut message = text![
-        "from a median of ",
+        format!("from {} (a median of ", placed(key, &crate::format::trimmed(place(*first)))),
         candidates(*first),
-        " candidates to one of ",
+        format!(" candidates) to {} (", placed(key, &crate::format::trimmed(largest))),
         candidates(*last),
-        ", the median number of pair tests grows "
+        "), the median number of pair tests grows "
     ];
     for (index, (name, first, last)) in known.iter().enumerate() {
         message.extend(text![format!("{}from ", if index > 0 { ", " } else { "" }), tests(*first), " to "]);
@@ -53,7 +53,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
         message.push(format!(" with {name}").into());
     }
     for (index, (name, _, last)) in without.iter().enumerate() {
-        let begin = if index == 0 { "; without a fix there stop, at their limit of work, " } else { " and " };
+        let begin = if index == 0 { "; at their limit of work and without a fix there stop " } else { " and " };
         message.extend(text![
             format!("{begin}{name} after "),
             tests(*last),
@@ -84,7 +84,7 @@ pub(super) fn conclusion(run: &Run, summary: &RunSummary) -> Option<Text> {
     let words = Words { quantity: "number of pair tests", best: "smallest", worst: "largest", worse: "larger" };
     let mut message = text![format!("at {} ", placed(key, &crate::format::trimmed(largest)))];
     message.extend(ranking::clause(&cases, &words, &differs));
-    message.push(".".into());
+    message.push(" (in pairs of the same attempts).".into());
     (cases.len() > 1).then(|| capitalised(message))
 }
 

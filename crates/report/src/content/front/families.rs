@@ -3,12 +3,12 @@
 use super::{
     contrast::Contrast,
     measured::{Sample, capitalised},
-    ranking::{Case, decreasing, names, quoted},
+    ranking::{Case, decreasing, names},
 };
 use crate::{
     content::conditions::labels::{Labels, value},
     document::{Text, text},
-    format::distinct,
+    format::{distinct, quoted},
     run::Run,
     summary::RunSummary,
 };
@@ -42,9 +42,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
         };
         let cases = decreasing(members.map(case).collect());
         let first = cases.first()?;
-        best.push(format!("{}{} (", if best.is_empty() { "" } else { ", " }, quoted(kind)).into());
+        best.push(if best.is_empty() { "" } else { ", " }.into());
         best.extend(first.value.text());
-        best.push(")".into());
+        best.push(format!(" in {}", quoted(kind)).into());
         for case in &cases {
             let lower = case.value.value() < first.value.value();
             if lower && contrast.rates_differ(&case.members, &first.members, cases.len()) {
@@ -65,7 +65,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
             _ => format!("{own} {verb} below it in {}", names(group[0].1.iter().map(String::as_str))).into(),
         });
     }
-    message.push("; the best rates are those in ".into());
+    message.push("; the best rates are ".into());
     message.extend(best);
     message.extend(wrong(run, summary, labels));
     Some(capitalised(message))
@@ -81,9 +81,9 @@ fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Text {
     for group in samples.chunk_by(|a, b| (a.1.wrong, a.1.attempted) == (b.1.wrong, b.1.attempted)) {
         let own = names(group.iter().map(|(name, _)| *name));
         let sample = &group[0].1;
-        message.push(if message.is_empty() { "; wrong are " } else { ", " }.into());
+        message.push(if message.is_empty() { "; wrong fixes: " } else { ", " }.into());
         message.extend(match sample.wrong {
-            0 => text!["none of ", sample.n()],
+            0 => text!["none of ", sample.n(), " attempts"],
             _ => text![sample.wrong_count(), " of ", sample.n()],
         });
         message.push(format!(" with {own}").into());

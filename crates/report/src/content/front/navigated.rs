@@ -63,7 +63,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, asked: 
         message.push(format!("{begin}with {} {what}", name(dive)).into());
         message.extend(dive.navigated.text());
         if dive.alone.value().is_finite() {
-            message.push(", by odometry alone ".into());
+            message.push(", without fixes after the first ".into());
             message.extend(dive.alone.text());
         }
     }
@@ -127,8 +127,7 @@ fn verdict(known: &[Dive]) -> Text {
 fn compared(first: &Dive, last: &Dive, known: &[Dive], along: bool) -> &'static str {
     let any = known.iter().any(|a| known.iter().any(|b| a.navigated.differs(&b.navigated)));
     match (first.navigated.differs(&last.navigated), any, known.len()) {
-        (false, false, 2) => ", without a significant difference",
-        (false, false, _) => ", without a significant difference",
+        (false, false, _) => "; the errors with all fixes do not differ significantly",
         (true, _, 3..) if along && !known[1].navigated.differs(&last.navigated) => {
             ", where the last two do not differ significantly"
         }

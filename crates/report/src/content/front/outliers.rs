@@ -49,9 +49,9 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels, key: &s
         // The interval states more than the rate only where its lower end is below the limit earlier.
         if surely.value.is_some() && surely.value != point.value {
             message.extend(text![
-                " (the lower end of the 95 % interval stays there up to ",
+                " (up to ",
                 surely.clone(),
-                format!("{end})")
+                format!("{end} if the 95 % interval is to lie above this rate)")
             ]);
         }
     }

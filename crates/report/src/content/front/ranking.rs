@@ -1,7 +1,10 @@
 //! A clause on named cases in order of a measured value, and on the differences that their intervals show.
 
 use super::measured::Measured;
-use crate::document::{Text, text};
+use crate::{
+    document::{Text, text},
+    format::quoted,
+};
 
 /// Maximum number of cases that a clause lists, as many as one reads at a glance.
 const LISTED: usize = 4;
@@ -49,9 +52,10 @@ pub(super) fn clause(cases: &[Case], words: &Words<'_>, differs: &dyn Fn(&Case, 
     if apart.is_empty() {
         let mut ends = [(last, ties(last)), (best, firsts)];
         ends.sort_by(|a, b| a.0.value.value().total_cmp(&b.0.value.value()));
-        message.push(format!("no difference of the {quantity} is significant: it ranges from ").into());
+        let (begin, between) = if cases.len() == 2 { ("is ", " and ") } else { ("ranges from ", " to ") };
+        message.push(format!("no difference of the {quantity} is significant: it {begin}").into());
         for (place, (case, own)) in ends.iter().enumerate() {
-            message.push(if place > 0 { " to ".into() } else { "".into() });
+            message.push(if place > 0 { between } else { "" }.into());
             message.extend(named(case));
             message.push(format!(" with {}", some_names(own)).into());
         }
@@ -98,11 +102,6 @@ fn some_names(cases: &[&Case]) -> String {
 pub(super) fn names<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
     let count = names.len();
     names.enumerate().map(|(place, name)| format!("{}{}", separator(place, count), quoted(name))).collect()
-}
-
-/// A name in a sentence: one of several words in quotation marks, so that it is read as one.
-pub(super) fn quoted(name: &str) -> String {
-    if name.contains(' ') { format!("“{name}”") } else { name.to_owned() }
 }
 
 /// Cases in decreasing order of their values.

@@ -75,15 +75,15 @@ fn table(run: &Run, summary: &RunSummary, lines: Vec<(String, Vec<usize>)>) -> T
     };
     let change = match compared {
         true if bases.iter().all(|&base| base == 0) => {
-            " Change: the difference of the rate from that of the first line, over the attempts made in both; each interval holds alone, whereas “significant” accounts for all comparisons with the best."
+            " Change: the difference of the rate from that of the first line, over the attempts made in both; each interval holds alone, whereas “significant” accounts for all comparisons of a sentence."
         }
         true => {
-            " Change: the difference of the rate from that of the dash above, over the attempts made in both; each interval holds alone, whereas “significant” accounts for all comparisons with the best."
+            " Change: the difference of the rate from that of the dash above, over the attempts made in both; each interval holds alone, whereas “significant” accounts for all comparisons of a sentence."
         }
         false => "",
     };
     let caption = format!(
-        "Fixes in % of the attempts{errors}, with 95 % intervals. An attempt is a frame and a target that the prior puts in view.{change}"
+        "Fixes in % of the attempts{errors}, with 95 % intervals. An attempt is a frame in which a fix is tried, and a target with enough features in view by the prior.{change}"
     );
     let mut table = Table::new("answer", text![caption], heads);
     for (name, members) in lines {

@@ -38,7 +38,7 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, key: &str) -> Option<Tex
         let tolerance = axes::on(row, key)?;
         message.extend(text![
             format!(
-                "{}{condition}the points have the largest F1 score with {} and {}, at a precision of ",
+                "{}{condition}the identified points have the largest F1 score (of precision and recall) with {} and {}, at a precision of ",
                 if message.is_empty() { "" } else { "; " },
                 row.search,
                 placed(key, &trimmed(tolerance))

@@ -55,13 +55,10 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     message.extend(exact.value.text());
     let mut separator = ": ";
     for (larger, words) in [
-        (
-            [false, false],
-            "neither the position error nor the residuals of the points (fit RMS) are shown to be larger with ",
-        ),
-        ([false, true], "the residuals are larger, and a larger position error is not shown, with "),
+        ([false, false], "neither this error nor the residuals of the points (fit RMS) are shown to be larger with "),
+        ([false, true], "the residuals are larger, and a larger camera position error is not shown, with "),
         ([true, true], "both are larger with "),
-        ([true, false], "the position error is larger, and larger residuals are not shown, with "),
+        ([true, false], "the camera position error is larger, and larger residuals are not shown, with "),
     ] {
         let own: Vec<&Effect> = effects.iter().filter(|effect| effect.larger == larger).collect();
         for (place, effect) in own.iter().enumerate() {
@@ -78,6 +75,15 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
         0 => "; no case has significantly fewer fixes".into(),
         _ => format!("; significantly fewer fixes have {}", names(fewer.into_iter())).into(),
     });
+    let tre = |index: &usize| contrast.values_differ((Field::Tre, |row| row.tre), [&case(*index), &exact], count);
+    let moved: Vec<String> = (1..count).filter(tre).map(|index| case(index).name).collect();
+    if field != Field::Tre && !moved.is_empty() {
+        let which = match moved.len() + 1 {
+            all if all == count => "every one of them".to_owned(),
+            _ => names(moved.iter().map(String::as_str)),
+        };
+        message.push(format!("; the error of the model points (TRE) differs significantly with {which}").into());
+    }
     message.retain(|span| !span.plain().is_empty());
     message.extend(wrong(run, summary));
     Some(capitalised(message))

@@ -6,7 +6,7 @@ use crate::{
     content::phrases,
     document::{Block, Cell, Figure, Head, Section, Span, Table, Text, text},
     figure::{Axis, Chart, Layer, Panel},
-    format::decimals,
+    format::{decimals, quoted},
     number::{Key, Number},
     paired::{Comparison, MARGIN, MARGIN_RATIO},
     run::{Run, Trial},
@@ -95,27 +95,28 @@ pub(crate) fn others(comparisons: &[Comparison], max: usize) -> Option<Text> {
 /// One of the trials often fails then.
 fn sentence_of_failures(run: &Run, comparison: &Comparison) -> Text {
     let [first, second] = &comparison.names;
-    let (better, worse) = if comparison.better() == Some(comparison.first) { (first, second) } else { (second, first) };
+    let first_is_better = comparison.better() == Some(comparison.first);
+    let [better, worse] = if first_is_better { [first, second] } else { [second, first] }.map(|name| quoted(name));
     let as_number = |what: &str, n: usize| Number::new(Some(n as f64), 0, key(run, comparison, what));
     let [own, other] = comparison.alone;
     let alone = [as_number("alone-first", own), as_number("alone-second", other)];
-    let counts = if better == first { (alone, other) } else { ([alone[1].clone(), alone[0].clone()], own) };
+    let counts = if first_is_better { (alone, other) } else { ([alone[1].clone(), alone[0].clone()], own) };
     let ([of_better, of_worse], count_of_worse) = counts;
     let mut message = text![
         format!(
-            "{}, {better} has smaller errors or fewer failures than {worse}, a significant difference: in ",
+            "{}, errors are smaller or failures fewer with {better} than with {worse}, a significant difference: in ",
             begin(comparison)
         ),
         of_better,
         " of ",
         as_number("pairs", comparison.n),
-        format!(" pairs only {better} has a fix, in ")
+        format!(" pairs there is a fix only with {better}, in ")
     ];
     match count_of_worse {
         0 => message.push("none".into()),
         _ => message.extend(text![of_worse]),
     }
-    message.push(format!(" only {worse}.").into());
+    message.push(format!(" only with {worse}.").into());
     message
 }
 
