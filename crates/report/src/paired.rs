@@ -267,11 +267,10 @@ pub(crate) fn errors(first: &Trial, second: &Trial) -> Vec<(f64, f64)> {
 
 /// A value of both on their common attempts, in order of time.
 pub(crate) fn values(first: &Trial, second: &Trial, of: impl Fn(&AttemptRow) -> f64) -> Vec<(f64, f64)> {
-    let keyed = |trial: &Trial| -> Vec<(u64, String, f64)> {
-        let attempts = trial.attempts();
-        attempts.map(|(frame, row)| (frame.number, trial.object(row).to_owned(), of(row))).collect()
-    };
-    matched(keyed(first), keyed(second))
+    fn keyed<'a>(trial: &'a Trial, of: &impl Fn(&AttemptRow) -> f64) -> Vec<(u64, &'a str, f64)> {
+        trial.attempts().map(|(frame, row)| (frame.number, trial.object(row), of(row))).collect()
+    }
+    matched(keyed(first, &of), keyed(second, &of))
 }
 
 /// The values of both under their common keys, in the order of the keys.

@@ -118,7 +118,7 @@ fn errors_of_series_are_at_the_same_values() {
 ///
 /// Twelve rejected ones are three blocks, for which McNemar's z is √3; all forty are ten, for which it is √10.
 ///
-/// Seen to fail where every attempt counts as one, and where the intervals of the rates decide.
+/// Seen to fail where every attempt counts as one.
 #[test]
 fn ends_are_compared_over_common_attempts() {
     let question = "How much does a current reduce the rate of fixes?";

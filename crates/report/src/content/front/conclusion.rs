@@ -89,9 +89,8 @@ fn rates(run: &Run, summary: &RunSummary, kind: &Kind) -> Option<Text> {
             format!(" common attempts, the rates of fixes {} and {} are equal.", highest.0, lowest.0)
         ]);
     }
-    // The verdict is that of the ranking, which compares the best with each other case.
-    let count = if matches!(kind, Kind::Cases) { cases.len() } else { 2 };
-    let strict = contrast.of_rates(&highest.1, &lowest.1, simultaneous(count)).is_some_and(|of| of.significant());
+    // These two are chosen as the extremes of all, so the verdict allows for all comparisons with the best.
+    let strict = contrast.of_rates(&highest.1, &lowest.1, simultaneous(cases.len())).is_some_and(|of| of.significant());
     let significant = match (strict, found.significant()) {
         (true, _) => "a significant difference",
         (false, true) => "which is not significant after adjustment for all comparisons with the best",

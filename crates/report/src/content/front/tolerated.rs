@@ -55,10 +55,13 @@ pub(super) fn sentence(run: &Run, summary: &RunSummary, labels: &Labels) -> Opti
     message.extend(exact.value.text());
     let mut separator = ": ";
     for (larger, words) in [
-        ([false, false], "neither this error nor the residuals of the points (fit RMS) are shown to be larger with "),
-        ([false, true], "the residuals are larger, and a larger camera position error is not shown, with "),
-        ([true, true], "both are larger with "),
-        ([true, false], "the camera position error is larger, and larger residuals are not shown, with "),
+        (
+            [false, false],
+            "neither this error nor the residuals of the points (fit RMS) are shown to be larger with ".to_owned(),
+        ),
+        ([false, true], format!("the residuals are larger, and a larger {name} is not shown, with ")),
+        ([true, true], "both are larger with ".to_owned()),
+        ([true, false], format!("the {name} is larger, and larger residuals are not shown, with ")),
     ] {
         let own: Vec<&Effect> = effects.iter().filter(|effect| effect.larger == larger).collect();
         for (place, effect) in own.iter().enumerate() {
