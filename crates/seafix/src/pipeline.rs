@@ -3,8 +3,8 @@
 use seafix_component::{BuildError, Choice, Part, Registry, Settings, each_invalid, in_range, out_of_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, Filter, FrontEnd, InvalidStage, LOCATORS, LineChoices, LineFrontEnd, LineRules,
-    MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, StageChoices, TRIANGULATORS,
+    DESCRIPTORS, DETECTORS, EdgeCorners, FILTERS, Filter, FrontEnd, InvalidStage, LOCATORS, LineChoices, LineFrontEnd,
+    LineRules, MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, StageChoices, TRIANGULATORS,
     read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
@@ -45,6 +45,9 @@ pub struct Pipeline {
     pub segment_matcher: Choice,
     /// The triangulation of matched segments.
     pub lines: LineRules,
+    /// Corners that are intersections of edges. They join the points of the cloud where edges are not identified as
+    /// such.
+    pub edge_corners: EdgeCorners,
     /// The gates of the candidate selection ("shells" in the paper).
     pub gate: Gate,
     /// Whether the search is repeated with larger gates, then without, when it finds nothing. A displaced object is
@@ -67,7 +70,7 @@ impl Default for Pipeline {
             window: 1,
             filters: Vec::new(),
             detector: Choice::named("harris"),
-            locator: Choice::named("corner"),
+            locator: Choice::named("corner-junction"),
             descriptor: Choice::named("surf"),
             matcher: Choice::named("epipolar-band"),
             refinement: Choice::named("direct"),
@@ -77,6 +80,7 @@ impl Default for Pipeline {
             segment_fit: SegmentFit::default(),
             segment_matcher: Choice::named("overlap-profile"),
             lines: LineRules::default(),
+            edge_corners: EdgeCorners::default(),
             gate: Gate::default(),
             expand_gates: false,
             tolerance: Tolerance::Sigmas(3.0),
@@ -155,6 +159,8 @@ impl Pipeline {
         all.extend(fit.into_iter().map(|message| invalid_setting("segment-fit", message)));
         let lines = each_invalid(&self.lines, LineRules::check);
         all.extend(lines.into_iter().map(|message| invalid_setting("lines", message)));
+        let corners = each_invalid(&self.edge_corners, EdgeCorners::check);
+        all.extend(corners.into_iter().map(|message| invalid_setting("edge-corners", message)));
         all.extend(faults(&SEARCHES, &self.search));
         all.extend(faults(&SOLVERS, &self.solver));
         all.extend(each_invalid(&self.gate, Gate::check).into_iter().map(|message| invalid_setting("gate", message)));
@@ -210,6 +216,7 @@ impl Pipeline {
     pub fn line_front_end(&self) -> Result<LineFrontEnd, PipelineError> {
         self.segment_fit.check().map_err(|message| invalid_setting("segment-fit", message))?;
         self.lines.check().map_err(|message| invalid_setting("lines", message))?;
+        self.edge_corners.check().map_err(|message| invalid_setting("edge-corners", message))?;
         let choices = LineChoices {
             segment_detector: &self.segment_detector,
             segment_fit: &self.segment_fit,

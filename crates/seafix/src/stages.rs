@@ -10,7 +10,7 @@ use seafix_referencing::{
     Problem, Rejected, Search, Solver, Target, Tolerance, candidates, edge_candidates, judge, judge_labelled,
     problem_file::CoherenceProblem, search_with_expanding_gates,
 };
-use seafix_vision::{FrontEnd, FrontEndOutput, Image, Keypoint, LineFrontEnd, LineOutput, Regions};
+use seafix_vision::{FrontEnd, FrontEndOutput, Keypoint, LineFrontEnd, LineOutput, Regions};
 
 use crate::{
     in_view::{edges_in_view, in_view, regions, visible},
@@ -256,21 +256,26 @@ impl PipelineStages {
             refine_ms: Some(output.times.refine_ms),
             triangulate_ms: Some(output.times.triangulate_ms),
         };
-        let (keypoints, points) = (output.keypoints()[0].into(), output.cloud[..].into());
+        let keypoints = output.keypoints()[0].into();
         let [l, r] = output.filtered();
-        let wanted = self.settings.edges == UseOfEdges::On && targets.iter().any(|target| !target.edges.is_empty());
-        let lines = match wanted {
-            true => self.lines([l.unwrap_or(left), r.unwrap_or(right)], rig),
-            false => Arc::default(),
+        let identified = self.settings.edges == UseOfEdges::On && targets.iter().any(|target| !target.edges.is_empty());
+        let corners = &self.settings.edge_corners;
+        let mut measured = LineOutput::default();
+        if identified || corners.enabled {
+            self.line_front_end.run([l.unwrap_or(left), r.unwrap_or(right)], rig, &mut measured);
+        }
+        // An edge serves as itself or by its corners: as both, its errors would count twice.
+        let lines = match identified {
+            true => measured.lines.into(),
+            false => {
+                if corners.enabled {
+                    corners.add_to(&mut output.cloud, &measured, rig, &*self.front_end.triangulator);
+                }
+                Arc::default()
+            }
         };
+        let points = output.cloud[..].into();
         Cloud { keypoints, points, lines, times, total_ms: milliseconds(start) }
-    }
-
-    /// The measured lines of a pair of images.
-    fn lines(&self, images: [&Image; 2], rig: &StereoRig) -> Arc<[MeasuredLine]> {
-        let mut output = LineOutput::default();
-        self.line_front_end.run(images, rig, &mut output);
-        output.lines.into()
     }
 
     /// Stages 1 and 2 for every target in view, in order.

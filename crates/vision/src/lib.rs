@@ -89,13 +89,16 @@ pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation
 pub use front_end::{FrontEnd, FrontEndOutput, StageTimes};
 pub use image::{BadImage, Image};
 pub use line_front_end::{LineChoices, LineFrontEnd, LineOutput};
-pub use locate::{Corner, CornerFit, Junction, LCorner, LOCATORS, Locator, Pair, Peak, UncertainPixel, XCorner};
+pub use locate::{
+    Corner, CornerFit, CornerJunction, Junction, LCorner, LOCATORS, Locator, Pair, Peak, UncertainPixel, XCorner,
+};
 pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View, ZnccBand};
 pub use regions::{Disc, Regions};
 pub use right_camera_rotation::RightCameraRotation;
 pub use segment::{
-    AContrario, BandDescriptor, EdgeDrawing, FitScratch, FittedSegment, LineRules, OverlapProfile, SEGMENT_DETECTORS,
-    SEGMENT_MATCHERS, Segment, SegmentDetector, SegmentFit, SegmentMatch, SegmentMatcher, SegmentView,
+    AContrario, BandDescriptor, EdgeCorners, EdgeDrawing, FitScratch, FittedSegment, LineRules, OverlapProfile,
+    SEGMENT_DETECTORS, SEGMENT_MATCHERS, Segment, SegmentDetector, SegmentFit, SegmentMatch, SegmentMatcher,
+    SegmentView,
 };
 pub use stages::{InvalidStage, StageChoices};
 pub use swap_check::Sides;

@@ -21,6 +21,11 @@ use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 ///
 /// The covariance is A⁻¹ (Σ w² (gᵀd)² g gᵀ) A⁻¹ with A = Σ w g gᵀ and d = x − p, from the distances of the lines to p.
 ///
+/// It is a junction only if the lines of its edges pass closer to it than their normals: the ratio of Σ w (gᵀd)² to
+/// Σ w (g×d)² is at most `max_ratio`. In images of another renderer's boxes, of two simulated sites and of laboratory
+/// boxes, 55 of 56 junctions with a ratio up to 0.12 were within 1 px of a corner and had the stated error; of those
+/// above 0.15, half were not.
+///
 /// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct points, corners and
 /// centres of circular features*, ISPRS 1987.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
@@ -28,23 +33,27 @@ use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 pub struct Junction {
     /// Standard deviation σ of the window (px).
     pub sigma: f64,
+    /// Maximum of the ratio above, from 0 to 1.
+    pub max_ratio: f64,
 }
 
 impl Default for Junction {
     fn default() -> Self {
-        Self { sigma: 2.5 }
+        Self { sigma: 2.5, max_ratio: 0.12 }
     }
 }
 
 impl Component for Junction {
     const NAME: &'static str = "junction";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "Förstner's junction: the intersection of the edges around a corner";
     const SOURCE: &'static str =
         "Förstner and Gülch, A fast operator for detection and precise location of distinct points, ISPRS 1987";
 
     fn check(&self) -> Result<(), String> {
-        let Self { sigma } = *self;
-        in_range((0.3..=100.0).contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")
+        let Self { sigma, max_ratio } = *self;
+        in_range((0.3..=100.0).contains(&sigma), "sigma", sigma, "a number from 0.3 to 100 (px)")?;
+        in_range(max_ratio > 0.0 && max_ratio <= 1.0, "max-ratio", max_ratio, "more than 0, at most 1 (no test)")
     }
 }
 
@@ -56,10 +65,26 @@ impl Locator for Junction {
         work: &mut Workspace,
         places: &mut Vec<Option<UncertainPixel>>,
     ) {
-        let window = Window::new(self.sigma);
-        let gradients: &mut Gradients = work.get();
         places.clear();
-        places.extend(keypoints.iter().map(|keypoint| window.near(image, &keypoint.at, gradients)));
+        places.resize(keypoints.len(), None);
+        self.fill(image, keypoints, work, places);
+    }
+}
+
+impl Junction {
+    /// Adds the junctions at the key points without a place.
+    pub(super) fn fill(
+        &self,
+        image: &Image,
+        keypoints: &[Keypoint],
+        work: &mut Workspace,
+        places: &mut [Option<UncertainPixel>],
+    ) {
+        let window = Window::new(self);
+        let gradients: &mut Gradients = work.get();
+        for (place, keypoint) in places.iter_mut().zip(keypoints).filter(|(place, _)| place.is_none()) {
+            *place = window.near(image, &keypoint.at, gradients);
+        }
     }
 }
 
@@ -69,6 +94,7 @@ struct Window {
     exponents: [f64; 2],
     /// The half-side of the window (px).
     half: usize,
+    max_ratio: f64,
 }
 
 /// The gradients of the square around a key point, and the weights of a window's columns and rows.
@@ -86,9 +112,10 @@ const REACH: f64 = 3.5;
 const SLACK: usize = 4;
 
 impl Window {
-    fn new(sigma: f64) -> Self {
+    fn new(&Junction { sigma, max_ratio }: &Junction) -> Self {
         let outer = -0.5 / (sigma * sigma);
-        Self { exponents: [outer, outer / (0.6 * 0.6) + outer], half: libm::ceil(2.5 * sigma) as usize }
+        let exponents = [outer, outer / (0.6 * 0.6) + outer];
+        Self { exponents, half: libm::ceil(2.5 * sigma) as usize, max_ratio }
     }
 
     /// The junction near `start`.
@@ -112,7 +139,11 @@ impl Window {
             }
             if step.norm_squared() < 1e-6 {
                 let place = at + origin;
-                let covariance = inverse * self.sums(gradients, &at).spread * inverse;
+                let sums = self.sums(gradients, &at);
+                if sums.beside > self.max_ratio * sums.along {
+                    return None;
+                }
+                let covariance = inverse * sums.spread * inverse;
                 return Some(UncertainPixel { at: Pixel { u: place.x, v: place.y }, covariance });
             }
         }
@@ -143,18 +174,24 @@ impl Window {
                 sums.tensor += weight * square;
                 sums.towards += weight * towards * g;
                 sums.spread += weight * weight * towards * towards * square;
+                let across = g.x * dy - g.y * dx;
+                sums.beside += weight * towards * towards;
+                sums.along += weight * across * across;
             }
         }
         sums
     }
 }
 
-/// The sums Σ w g gᵀ, Σ w g gᵀ d and Σ w² (gᵀ d)² g gᵀ over the pixels of a window, d from its centre.
+/// The sums Σ w g gᵀ, Σ w g gᵀ d, Σ w² (gᵀd)² g gᵀ, Σ w (gᵀd)² and Σ w (g×d)² over the pixels of a window, d from its
+/// centre.
 #[derive(Debug, Default)]
 struct Sums {
     tensor: Matrix2<f64>,
     towards: Vector2<f64>,
     spread: Matrix2<f64>,
+    beside: f64,
+    along: f64,
 }
 
 impl Sums {

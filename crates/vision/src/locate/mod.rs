@@ -6,6 +6,7 @@
 //! corner stay. The refinement later replaces the right pixel by a more exact one than a second fit gives.
 
 mod corner;
+mod corner_junction;
 mod fit;
 mod junction;
 mod locator;
@@ -15,6 +16,7 @@ mod start;
 
 pub use corner::{Corner, LCorner, XCorner};
 pub(crate) use corner::{SOURCE as FITTED, fit_into};
+pub use corner_junction::CornerJunction;
 pub use fit::CornerFit;
 pub use junction::Junction;
 pub use locator::{Locator, Pair, UncertainPixel};
@@ -23,5 +25,7 @@ pub use peak::Peak;
 use seafix_component::{Registry, entry};
 
 /// The registry of locators.
-pub static LOCATORS: Registry<dyn Locator> =
-    Registry::new("locator", &[entry!(Corner), entry!(Junction), entry!(LCorner), entry!(Peak), entry!(XCorner)]);
+pub static LOCATORS: Registry<dyn Locator> = Registry::new(
+    "locator",
+    &[entry!(Corner), entry!(CornerJunction), entry!(Junction), entry!(LCorner), entry!(Peak), entry!(XCorner)],
+);

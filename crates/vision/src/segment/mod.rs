@@ -3,6 +3,7 @@
 mod a_contrario;
 mod band_descriptor;
 mod chain;
+mod corners;
 mod detector;
 mod distinct;
 mod edge_drawing;
@@ -24,6 +25,7 @@ mod triangulate;
 
 pub use a_contrario::AContrario;
 pub use band_descriptor::BandDescriptor;
+pub use corners::EdgeCorners;
 pub use detector::{Segment, SegmentDetector};
 pub(crate) use distinct::keep_distinct;
 pub use edge_drawing::EdgeDrawing;

@@ -51,20 +51,24 @@ pub trait Triangulator: Send + Sync + std::fmt::Debug {
     /// order of `pairs`.
     fn triangulate_into(&self, pairs: &[UncertainPixels], rig: &StereoRig, cloud: &mut Vec<MeasuredPoint>) {
         cloud.clear();
-        let PointRules { calibration_px, epipolar_px, confidence, max_depth, .. } = *self.rules();
-        let near =
-            pairs.iter().filter(|pair| rig.epipolar_distance(&pair.at).is_some_and(|distance| distance <= epipolar_px));
-        cloud.extend(near.filter_map(|pair| {
-            let calibration = Matrix4::identity() * (calibration_px * calibration_px);
-            let pair = UncertainPixels { covariance: pair.covariance + calibration, ..*pair };
-            let found = self.point(rig, &pair).ok()?;
-            // The χ² distribution with one degree of freedom is P(x) = erf √(x/2).
-            let likely = libm::erf((0.5 * found.disagreement).sqrt()) <= confidence;
-            let kept = likely && found.point.coords.z <= max_depth;
-            kept.then_some(MeasuredPoint {
-                position: UncertainPoint { at: found.point, covariance: found.covariance },
-                pixels: Some(pair),
-            })
-        }));
+        let confidence = self.rules().confidence;
+        cloud.extend(pairs.iter().filter_map(|pair| self.measured(rig, pair, confidence)));
+    }
+
+    /// The point of one pair in front of the cameras, if the pair passes the epipolar test and the χ² test that a
+    /// fraction `confidence` of good pairs passes.
+    fn measured(&self, rig: &StereoRig, pair: &UncertainPixels, confidence: f64) -> Option<MeasuredPoint> {
+        let PointRules { calibration_px, epipolar_px, max_depth, .. } = *self.rules();
+        rig.epipolar_distance(&pair.at).filter(|&distance| distance <= epipolar_px)?;
+        let calibration = Matrix4::identity() * (calibration_px * calibration_px);
+        let pair = UncertainPixels { covariance: pair.covariance + calibration, ..*pair };
+        let found = self.point(rig, &pair).ok()?;
+        // The χ² distribution with one degree of freedom is P(x) = erf √(x/2).
+        let likely = libm::erf((0.5 * found.disagreement).sqrt()) <= confidence;
+        let kept = likely && found.point.coords.z <= max_depth;
+        kept.then_some(MeasuredPoint {
+            position: UncertainPoint { at: found.point, covariance: found.covariance },
+            pixels: Some(pair),
+        })
     }
 }

@@ -7,17 +7,17 @@ use seafix_vision::{Image, LineChoices, LineFrontEnd, LineOutput, LineRules, SEG
 
 const SIZE: [usize; 2] = [480, 360];
 /// The depth of the wall (m).
-const DEPTH: f64 = 3.0;
+pub(crate) const DEPTH: f64 = 3.0;
 
 /// A rig whose right camera is displaced by `step` (m) and turned, so that its rows are no epipolar lines.
-fn rig(step: [f64; 3], lens: &[f64]) -> StereoRig {
+pub(crate) fn rig(step: [f64; 3], lens: &[f64]) -> StereoRig {
     let camera = Pinhole::new(SIZE.map(|n| n as u32), [400.0; 2], [239.5, 179.5], lens).expect("a valid camera");
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.01, -0.02, 0.03));
     StereoRig::new(camera, camera, Transform::new(turn, turn * -Vector3::from(step))).expect("a valid rig")
 }
 
 /// The corners of two rectangles on the wall (m).
-const RECTANGLES: [([f64; 2], [f64; 2], f64); 2] =
+pub(crate) const RECTANGLES: [([f64; 2], [f64; 2], f64); 2] =
     [([-0.9, -0.6], [-0.2, 0.5], 70.0), ([0.3, -0.4], [0.9, 0.7], -50.0)];
 
 /// The grey level of the wall at (x, y), blurred over 6 mm, nearly a pixel; the axes are turned by 0.2 rad.
@@ -34,6 +34,11 @@ fn turned(x: f64, y: f64) -> f64 {
 }
 
 fn images(rig: &StereoRig) -> [Image; 2] {
+    views(rig, DEPTH, |_| 0.0)
+}
+
+/// The images of the wall, the part with the second rectangle at depth `second` (m), plus `noise` at each pixel.
+pub(crate) fn views(rig: &StereoRig, second: f64, mut noise: impl FnMut(usize) -> f64) -> [Image; 2] {
     let back = rig.right_from_left().inverse();
     let cameras = [
         (rig.left(), Vector3::zeros(), UnitQuaternion::identity()),
@@ -44,14 +49,19 @@ fn images(rig: &StereoRig) -> [Image; 2] {
             let at = Pixel { u: (i % SIZE[0]) as f64, v: (i / SIZE[0]) as f64 };
             let Some(direction) = camera.normalize(&at) else { return 0.0 };
             let ray = rotation * direction.push(1.0);
-            let p = origin + ray * ((DEPTH - origin.z) / ray.z);
-            level(p.x, p.y).round() as f32
+            let [near, far] = [second, DEPTH].map(|depth| origin + ray * ((depth - origin.z) / ray.z));
+            let p = if turned(near.x, near.y) > 0.1 { near } else { far };
+            (level(p.x, p.y) + noise(i)).round() as f32
         };
         Image::new(SIZE[0], SIZE[1], (0..SIZE[0] * SIZE[1]).map(pixel).collect()).expect("width × height pixels")
     })
 }
 
 fn lines(rig: &StereoRig, matcher: &str, calibration_px: f64) -> Vec<MeasuredLine> {
+    measured(&images(rig), rig, matcher, calibration_px).lines
+}
+
+pub(crate) fn measured([left, right]: &[Image; 2], rig: &StereoRig, matcher: &str, calibration_px: f64) -> LineOutput {
     let choices = LineChoices {
         segment_detector: &Choice::named("a-contrario"),
         segment_fit: &SegmentFit::default(),
@@ -60,9 +70,8 @@ fn lines(rig: &StereoRig, matcher: &str, calibration_px: f64) -> Vec<MeasuredLin
         calibration_px,
     };
     let mut output = LineOutput::default();
-    let [left, right] = images(rig);
-    LineFrontEnd::build(&choices).expect("valid choices").run([&left, &right], rig, &mut output);
-    output.lines
+    LineFrontEnd::build(&choices).expect("valid choices").run([left, right], rig, &mut output);
+    output
 }
 
 /// The distance (m) of a point of the wall from the nearest true edge.

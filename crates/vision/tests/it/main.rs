@@ -5,6 +5,7 @@
 mod allocations;
 mod descriptors;
 mod detectors;
+mod edge_corners;
 mod filters;
 mod front_end;
 mod lines;

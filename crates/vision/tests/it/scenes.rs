@@ -27,7 +27,7 @@ pub(crate) fn truth(rig: &StereoRig, left: Pixel) -> Option<StereoPixels> {
     rig.project(&Point::from(hit(Vector3::zeros(), ray)))
 }
 
-fn hash(x: i64, y: i64) -> f64 {
+pub(crate) fn hash(x: i64, y: i64) -> f64 {
     let mut h = (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA77);
     h = (h ^ (h >> 15)).wrapping_mul(0x2C1B_3C6D);
     h = (h ^ (h >> 13)).wrapping_mul(0x297A_2D39);

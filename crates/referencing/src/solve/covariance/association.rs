@@ -1,6 +1,6 @@
 //! The covariance of a pose by uncertain data association.
 
-use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3};
+use nalgebra::{Cholesky, Matrix3, Matrix3x6, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, Object, Transform, UncertainPoint, so3::skew};
 
 use crate::observations::{Observation, Observations};
@@ -35,14 +35,15 @@ pub(crate) fn association(
     let Some(points) = points else { return Matrix6::zeros() };
     let normal: Matrix6<f64> = points.iter().map(|one| one.by.transpose() * one.information * one.by).sum();
     let normal = if data.edges.is_empty() { normal } else { normal + edges };
-    let Some(covariance) = normal.cholesky().map(|root| root.inverse()) else { return Matrix6::zeros() };
+    let Some(root) = normal.cholesky() else { return Matrix6::zeros() };
+    let covariance = root.inverse();
     // The residuals are those of the given pose, which the step without a point then leaves.
     let pulls = points.iter().map(|one| one.by.transpose() * (one.information * one.residual));
     let off = covariance * pulls.sum::<nalgebra::Vector6<f64>>();
     let mut sum = Matrix6::zeros();
     for ((one, point), others) in points.iter().zip(&data.points).zip(others).filter(|(_, others)| !others.is_empty()) {
         let own = one.by.transpose() * one.information * one.by;
-        let Some(without) = (normal - own).cholesky().map(|root| root.inverse()) else { continue };
+        let Some(without) = without(&root, &(normal - own)) else { continue };
         let step = without * (normal * off - one.by.transpose() * (one.information * one.residual));
         let predicted = one.at + one.by * step;
         let own_noise = point.noise() - point.measured.covariance + one.by * without * one.by.transpose();
@@ -81,6 +82,21 @@ pub(crate) fn association(
     sum
 }
 
+/// The covariance of a pose with the information `rest`, a part of the information with the Cholesky factor `root`;
+/// `None` if it leaves the pose undetermined.
+///
+/// Two of three points leave the rotation about their line free, but rounding may give it a tiny information.
+fn without(root: &Cholesky<f64, U6>, rest: &Matrix6<f64>) -> Option<Matrix6<f64>> {
+    let half = root.l().solve_lower_triangular(rest)?;
+    let fraction = root.l().solve_lower_triangular(&half.transpose())?;
+    let fraction = 0.5 * (fraction + fraction.transpose());
+    (fraction.symmetric_eigenvalues().min() > UNDETERMINED).then_some(())?;
+    rest.cholesky().map(|root| root.inverse())
+}
+
+/// The fraction of its information below which a direction of the pose is undetermined: rounding of its sum leaves
+/// some 1e-13.
+const UNDETERMINED: f64 = 1e-9;
 /// The standard deviations within which a candidate may be the point; beyond four the density is below e⁻⁸ of its
 /// maximum.
 const GATE: f64 = 4.0;
@@ -145,6 +161,22 @@ mod tests {
         let near = with(0.02, 1.0);
         assert!(near.symmetric_eigenvalues().min() > -1e-12 && near.trace() > 1e-7, "{near}");
         assert!(with(0.02, 0.5).trace() > near.trace(), "a point may be undetected");
+    }
+
+    /// Two of three points determine no pose, whatever rounding says.
+    #[test]
+    fn a_point_that_the_pose_needs_is_taken_as_identified() {
+        let (mut data, pose) = seen();
+        data.points.truncate(3);
+        for turn in 0..200 {
+            let turned = pose * Transform::exp(&[0.01 * f64::from(turn), 0.3, -0.2, 0.1, 0.4, 0.3].into());
+            for point in &mut data.points {
+                point.measured = UncertainPoint::isotropic(turned.inverse() * point.model, SIGMA);
+            }
+            let near = data.points[1].measured.at + Vector3::new(0.0, 0.02, 0.0);
+            let others = [vec![], vec![UncertainPoint::isotropic(near, SIGMA)], vec![]];
+            assert_eq!(association(&data, &turned, &others, 0.5, &Matrix6::zeros()), Matrix6::zeros());
+        }
     }
 
     /// Two candidates, one of which is the point: the mixture of both poses about the pose of the chosen one.
