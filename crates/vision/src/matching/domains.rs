@@ -248,7 +248,7 @@ mod tests {
     /// Descriptors that together prefer one shift decide where borders do not.
     #[test]
     fn descriptors_of_the_pattern_decide_as_one() {
-        let prefers = |i: usize, j: usize| if i == j { 0.03 + 0.001 * (i % 5) as f32 } else { 0.05 };
+        let prefers = |i: usize, j: usize| if i == j { 0.3 + 0.01 * (i % 5) as f32 } else { 0.5 };
         let all = decisions([0..8, 0..8], false, prefers);
         assert!(all.iter().enumerate().all(|(i, decision)| *decision == Some(i)), "{all:?}");
     }
