@@ -30,13 +30,13 @@ pub const SHARED: [SharedPart; 8] = [
     // Cameras, rigs, distortion, transforms and covariances.
     SharedPart { name: "geometry", version: 1, used: |_| true },
     // Points in view, candidates, gates, tolerance, acceptance tests, integrity and joint fixes.
-    SharedPart { name: "acceptance", version: 2, used: |_| true },
+    SharedPart { name: "acceptance", version: 3, used: |_| true },
     // Errors, rates and bounds; the comparison with truth.
     SharedPart { name: "evaluation", version: 1, used: |_| true },
     // The logged quantities and the choice of logged frames.
     SharedPart { name: "log", version: 3, used: |_| true },
     // The order of the stages on a stereo pair.
-    SharedPart { name: "front-end", version: 1, used: |used| used.images },
+    SharedPart { name: "front-end", version: 2, used: |used| used.images },
     // The navigator, the pose graph and key frames.
     SharedPart { name: "navigation", version: 1, used: |used| used.navigates },
     // Sites, dives, sensors, noisy points, problems and random streams.
