@@ -70,7 +70,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         });
     }
     if let Some(group) = rest.strip_suffix(" of common") {
-        return in_common(first, group, span, logs);
+        return Some(in_common(first, group, span, logs)?.map(|value| value * scale));
     }
     if let Some((quantity, point)) = rest.split_once(" at the point ") {
         return Some(poi(first, quantity, point, span, log)?.map(|value| value * scale));

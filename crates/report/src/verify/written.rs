@@ -2,11 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use seafix_evaluation::quantile;
 use seafix_log::Outcome;
 
 use super::{
     logs::{Log, Row},
-    rows::{found, rows},
+    rows::{found, rows, value},
 };
 use crate::{answer::Operation, field::Field, proportion};
 
@@ -31,32 +32,40 @@ pub(super) fn extreme(name: &str, of: &str, span: [u64; 2], logs: &[&Log], answe
     Some(each.reduce(if name == "smallest-of" { f64::min } else { f64::max }))
 }
 
-/// A count or rate of the first log over the attempts at targets of frames that all logs have.
+/// A count, a rate, or a median of a quantity (SI), of the first log over the attempts at targets of frames that all logs have.
 pub(super) fn in_common(which: &str, group: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     let (own, others) = logs.split_first()?;
-    let attempts = |log: &Log| -> Vec<(u64, String, bool)> {
-        let is = |row: &Row| match group {
-            "attempted" => true,
-            "wrong" => row.record.outcome == Outcome::Fix && !found(&row.record),
-            _ => found(&row.record),
-        };
-        let of_frames = log.sample(span).flat_map(|frame| frame.rows.iter().map(move |row| (frame.number, row)));
-        of_frames.map(|(number, row)| (number, row.record.object.clone(), is(row))).collect()
+    let keys = |log: &Log| -> BTreeSet<(u64, String)> { attempts(log, span).map(|(key, _)| key).collect() };
+    let sets: Vec<BTreeSet<(u64, String)>> = others.iter().map(|log| keys(log)).collect();
+    let own_rows = attempts(own, span).filter(|(key, _)| sets.iter().all(|set| set.contains(key))).map(|(_, row)| row);
+    let trajectory = proportion::is_trajectory(&own.header);
+    if let Some(field) = Field::named(group) {
+        let mut values: Vec<f64> =
+            own_rows.filter(|row| found(&row.record)).filter_map(|row| value(row, field)).collect();
+        let ends = proportion::median_interval(trajectory, &mut values);
+        return Some(match which {
+            "median" => ends.map(|_| quantile(&mut values, 0.5)),
+            "median-low" => ends.map(|ends| ends.0),
+            _ => ends.map(|ends| ends.1),
+        });
+    }
+    let is = |row: &Row| match group {
+        "attempted" => true,
+        "wrong" => row.record.outcome == Outcome::Fix && !found(&row.record),
+        _ => found(&row.record),
     };
-    let sets: Vec<BTreeSet<(u64, String)>> = others
-        .iter()
-        .map(|log| attempts(log).into_iter().map(|(number, object, _)| (number, object)).collect())
-        .collect();
-    let events: Vec<bool> = attempts(own)
-        .into_iter()
-        .filter(|(number, object, _)| sets.iter().all(|set| set.contains(&(*number, object.clone()))))
-        .map(|(.., is)| is)
-        .collect();
+    let events: Vec<bool> = own_rows.map(is).collect();
     if which == "count" {
         return Some(Some(events.iter().filter(|event| **event).count() as f64));
     }
     let place = ["percent", "low", "high"].iter().position(|name| *name == which)?;
-    Some(proportion::rate(proportion::is_trajectory(&own.header), &events).map(|rate| rate[place]))
+    Some(proportion::rate(trajectory, &events).map(|rate| rate[place]))
+}
+
+/// The attempts of a log with their keys: the frame and the object.
+fn attempts(log: &Log, span: [u64; 2]) -> impl Iterator<Item = ((u64, String), &Row)> {
+    log.sample(span)
+        .flat_map(|frame| frame.rows.iter().map(move |row| ((frame.number, row.record.object.clone()), row)))
 }
 
 /// The F1 score of the identified points: 2 correct / (identified by fixes + visible in all attempts).

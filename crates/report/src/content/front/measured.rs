@@ -44,6 +44,12 @@ impl Measured {
         Self::new([value, unknown.clone(), unknown], unit)
     }
 
+    /// A median of `count` fixes, whose number stands in place of the interval if it is small.
+    pub(super) fn of_fixes(self, count: usize) -> Self {
+        let without = if count < MIN_FIXES { counted(count, "fix", "fixes") } else { String::new() };
+        Self { without, ..self }
+    }
+
     /// The same with another unit.
     pub(super) fn with_unit(self, unit: &'static str) -> Self {
         Self { unit, ..self }
@@ -192,8 +198,7 @@ pub(super) fn median_of(
 /// interval.
 pub(super) fn median_with(trial: &Trial, field: Field, unit: (Unit, usize), suffix: &'static str) -> Measured {
     let count = trial.attempts().filter(|(_, row)| row.found() && row.get(field).is_some()).count();
-    let without = if count < MIN_FIXES { counted(count, "fix", "fixes") } else { String::new() };
-    Measured { without, ..Measured::new(phrases::median(trial, field, unit), suffix) }
+    Measured::new(phrases::median(trial, field, unit), suffix).of_fixes(count)
 }
 
 /// The median of a count over all attempts of a trial.

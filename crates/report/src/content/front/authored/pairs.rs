@@ -62,12 +62,13 @@ impl Values<'_> {
         Ok(Measured::new([value, low, high], sign))
     }
 
-    /// A count or rate of the first trial over the attempts that it has in common with all others.
+    /// A count, rate or median of the first trial over the attempts that it has in common with all others.
     fn common(&self, quantity: Quantity, both: &[Selection; 2], place: &str) -> Result<Measured, AnswerError> {
         let [own, others] = self.both(both, place)?;
-        let ([index], Quantity::Rate(group) | Quantity::Count(group)) = (&own.members[..], quantity) else {
-            let remedy =
-                "write common fix-rate: A & B with one trial in A; fixes, wrong and attempts are counted likewise";
+        let ([index], quantity @ (Quantity::Rate(_) | Quantity::Count(_) | Quantity::Median(_))) =
+            (&own.members[..], quantity)
+        else {
+            let remedy = "write common fix-rate: A & B with one trial in A; counts and medians likewise";
             return Err(AnswerError::new(place, "no common attempts of this", remedy));
         };
         let own = &self.run.trials[*index];
@@ -80,20 +81,44 @@ impl Values<'_> {
         let sets: Vec<BTreeSet<(u64, String)>> =
             others.iter().map(|trial| trial.attempts().map(|attempt| keyed(attempt, trial)).collect()).collect();
         let attempts = own.attempts().filter(|attempt| sets.iter().all(|set| set.contains(&keyed(*attempt, own))));
-        let is = |row: &AttemptRow| match group {
+        let attempts: Vec<&AttemptRow> = attempts.map(|(_, row)| row).collect();
+        let trials: Vec<&Trial> = [own].into_iter().chain(others).collect();
+        let topic = "/metrics/evaluation";
+        let key = |what: &str, of: &str, unit: Unit| {
+            phrases::over(&trials, topic, format!("{what} {of} of common{}", unit.suffix()))
+        };
+        let trajectory = proportion::is_trajectory(&own.header);
+        let group = match quantity {
+            Quantity::Rate(group) | Quantity::Count(group) => group,
+            Quantity::Median(field) => {
+                let (unit, sign) = unit(field);
+                let mut values: Vec<f64> =
+                    attempts.iter().filter(|row| row.found()).filter_map(|row| row.get(field)).collect();
+                let (low, high) =
+                    proportion::median_interval(trajectory, &mut values).ok_or_else(|| uncommon(place))?;
+                let median = seafix_evaluation::quantile(&mut values, 0.5);
+                let number = |name: &str, value: f64| {
+                    Number::new(Some(value * unit.scale()), self.digits(field), key(name, field.name(), unit))
+                };
+                let numbers = [number("median", median), number("median-low", low), number("median-high", high)];
+                return Ok(Measured::new(numbers, sign).of_fixes(values.len()));
+            }
+            _ => return Err(uncommon(place)),
+        };
+        let is = |row: &&AttemptRow| match group {
             Group::Attempts => true,
             Group::Wrong => row.wrong(),
             _ => row.found(),
         };
-        let events: Vec<bool> = attempts.map(|(_, row)| is(row)).collect();
-        let trials: Vec<&Trial> = [own].into_iter().chain(others).collect();
-        let key =
-            |what: &str| phrases::over(&trials, "/metrics/evaluation", format!("{what} {} of common", group.key()));
+        let key = |what: &str| key(what, group.key(), Unit::Plain);
         if let Quantity::Count(_) = quantity {
-            let n = events.iter().filter(|event| **event).count();
-            return Ok(Measured::single(Number::count(n, key("count")), ""));
+            return Ok(Measured::single(
+                Number::count(attempts.iter().filter(|row| is(row)).count(), key("count")),
+                "",
+            ));
         }
-        let rate = proportion::rate(proportion::is_trajectory(&own.header), &events).ok_or_else(|| uncommon(place))?;
+        let events: Vec<bool> = attempts.iter().map(is).collect();
+        let rate = proportion::rate(trajectory, &events).ok_or_else(|| uncommon(place))?;
         let number = |name: &str, value: f64| Number::new(Some(value), 1, key(name));
         Ok(Measured::new([number("percent", rate[0]), number("low", rate[1]), number("high", rate[2])], " %"))
     }

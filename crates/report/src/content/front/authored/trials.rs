@@ -4,8 +4,12 @@ use seafix_component::{nearest, unknown};
 
 use crate::{
     answer::{AnswerError, Condition, Selection},
-    content::conditions::labels::value,
+    content::{
+        conditions::labels::value,
+        sections::{inspection, objects},
+    },
     format::{distinct, short},
+    run::Run,
     summary::RunSummary,
 };
 
@@ -14,10 +18,10 @@ use crate::{
 pub(super) struct Chosen {
     /// The indices of the trials, in the order of the run; never empty.
     pub(super) members: Vec<usize>,
-    /// The object whose attempts count.
-    pub(super) object: Option<String>,
-    /// The point of interest.
-    pub(super) point: Option<String>,
+    /// The objects whose attempts count; any of them for an empty list.
+    pub(super) objects: Option<Vec<String>>,
+    /// The points of interest; any of them for an empty list.
+    pub(super) points: Option<Vec<String>>,
     /// The number of the first frame that counts.
     pub(super) from: Option<u64>,
     /// Whether frames with several targets in view count, or those with one.
@@ -91,12 +95,18 @@ impl Chosen {
             let remedy = unknown(name, &known);
             return faulty(format!("no axis `{name}`"), remedy.trim_start_matches([',', ';', ' ']));
         }
+        match name {
+            "object" => self.objects = Some(condition.values.clone()),
+            "point" => self.points = Some(condition.values.clone()),
+            _ => {}
+        }
+        if matches!(name, "object" | "point") {
+            return Ok(());
+        }
         let [value] = &condition.values[..] else {
             return faulty(format!("not one value of `{name}`"), "name one");
         };
         match name {
-            "object" => self.object = Some(value.clone()),
-            "point" => self.point = Some(value.clone()),
             "from" => match value.parse() {
                 Ok(frame) => self.from = Some(frame),
                 Err(_) => return faulty(format!("no frame `{value}`"), "give the number of a frame"),
@@ -110,9 +120,28 @@ impl Chosen {
         Ok(())
     }
 
+    /// The same for each single trial and each single object or point of it.
+    pub(super) fn singles(&self, run: &Run) -> Vec<Self> {
+        let each = |of: &Option<Vec<String>>, known: Vec<String>| match of {
+            None => vec![None],
+            Some(names) if names.is_empty() => known.into_iter().map(|name| Some(vec![name])).collect(),
+            Some(names) => names.iter().map(|name| Some(vec![name.clone()])).collect(),
+        };
+        let mut singles = Vec::new();
+        for &index in &self.members {
+            let trial = &run.trials[index];
+            for objects in each(&self.objects, objects::objects(trial)) {
+                for points in each(&self.points, inspection::points(trial)) {
+                    singles.push(Self { members: vec![index], objects: objects.clone(), points, ..self.clone() });
+                }
+            }
+        }
+        singles
+    }
+
     /// Whether the selection names a part of the trials.
     pub(super) fn is_partial(&self) -> bool {
-        self.object.is_some() || self.point.is_some() || self.from.is_some() || self.several.is_some()
+        self.objects.is_some() || self.points.is_some() || self.from.is_some() || self.several.is_some()
     }
 }
 

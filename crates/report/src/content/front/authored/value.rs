@@ -33,20 +33,23 @@ impl Values<'_> {
         let chosen = Chosen::of(self.summary, &term.selection, place)?;
         let Some(extreme) = term.extreme else { return self.of(term.quantity, &chosen, place) };
         let mut all = Vec::new();
-        for &index in &chosen.members {
+        for single in chosen.singles(self.run) {
             // A trial without a fix has no error, and is no extreme.
-            let single = Chosen { members: vec![index], ..chosen.clone() };
             match self.of(term.quantity, &single, place) {
                 Err(error) if error.what != NO_VALUE => return Err(error),
-                found => all.extend(found.ok()),
+                found => all.extend(found.ok().map(|value| (value, single.is_partial()))),
             }
         }
-        let by = |a: &Measured, b: &Measured| a.value().total_cmp(&b.value());
+        let by = |a: &(Measured, bool), b: &(Measured, bool)| a.0.value().total_cmp(&b.0.value());
         let (name, found) = match extreme {
             Extreme::Smallest => ("smallest-of", all.into_iter().min_by(by)),
             Extreme::Largest => ("largest-of", all.into_iter().max_by(by)),
         };
-        let found = found.ok_or_else(|| without(place))?;
+        let (found, is_partial) = found.ok_or_else(|| without(place))?;
+        if is_partial {
+            // The key names the object or the point.
+            return Ok(found);
+        }
         let number = found.number();
         let trials: Vec<&Trial> = chosen.members.iter().map(|&index| &self.run.trials[index]).collect();
         let key = phrases::over(&trials, &number.key.topic, format!("{name} {}", number.key.what));
@@ -57,10 +60,10 @@ impl Values<'_> {
     pub(super) fn of(&self, quantity: Quantity, chosen: &Chosen, place: &str) -> Result<Measured, AnswerError> {
         let part = match quantity {
             Quantity::Count(Group::Frames) | Quantity::FrameRate => chosen.several.is_some(),
-            Quantity::Count(_) | Quantity::Rate(Group::Fixes) => chosen.object.is_some(),
-            Quantity::Median(Field::Position | Field::Tre) => chosen.object.is_some(),
+            Quantity::Count(_) | Quantity::Rate(Group::Fixes) => chosen.objects.is_some(),
+            Quantity::Median(Field::Position | Field::Tre) => chosen.objects.is_some(),
             Quantity::Navigated(..) => chosen.from.is_some(),
-            Quantity::Point(_) => chosen.point.is_some(),
+            Quantity::Point(_) => chosen.points.is_some(),
             _ => false,
         };
         if chosen.is_partial() && !part {
@@ -79,6 +82,14 @@ impl Values<'_> {
             let what = format!("{} trials match, but `{}` is a value of one", chosen.members.len(), quantity.name());
             return Err(AnswerError::new(place, what, "choose one trial, or begin with `smallest` or `largest`"));
         };
+        if [&chosen.objects, &chosen.points].into_iter().flatten().any(|names| names.len() != 1) {
+            let what = format!("several parts match, but `{}` is a value of one", quantity.name());
+            return Err(AnswerError::new(
+                place,
+                what,
+                "choose one object or point, or begin with `smallest` or `largest`",
+            ));
+        }
         self.single(quantity, index, chosen).map_or_else(|| Err(without(place)), |value| known(value, place))
     }
 
@@ -98,7 +109,10 @@ impl Values<'_> {
     /// The value of a quantity of one trial; `None` where it is undefined.
     fn single(&self, quantity: Quantity, index: usize, chosen: &Chosen) -> Option<Measured> {
         let (trial, row) = (&self.run.trials[index], &self.summary.rows[index]);
-        let object = chosen.object.as_deref();
+        let [object, point] = [&chosen.objects, &chosen.points].map(|names| match names.as_deref() {
+            Some([name]) => Some(name.as_str()),
+            _ => None,
+        });
         Some(match quantity {
             Quantity::Count(Group::Frames) => Measured::single(objects::fixed_in_company(trial, chosen.several?).1, ""),
             Quantity::FrameRate => Measured::new(objects::fixed_in_company(trial, chosen.several?).0, " %"),
@@ -118,7 +132,7 @@ impl Values<'_> {
                 let value = navigation::statistic_over(trial, span(trial, chosen)?, name, of, Unit::Millimetres);
                 Measured::single(value, " mm")
             }
-            Quantity::Point(_) => Measured::new(inspection::median(trial, chosen.point.as_deref()?), " mm"),
+            Quantity::Point(_) => Measured::new(inspection::median(trial, point?), " mm"),
             Quantity::Drift(place) => {
                 let drifts = navigation::drift_per_metre(trial)?;
                 Measured::single(drifts[place].clone(), if place < 3 { " mm/m" } else { "" })
