@@ -61,11 +61,10 @@ fn the_numbers_of_an_answer_are_those_of_the_table() {
     ];
     expected.iter().for_each(|part| assert!(page.contains(part), "{part}: {page}"));
     let table = fs::read_to_string(folder.path().join("report/tables/answer.csv")).unwrap();
-    let row: Vec<&str> = table.lines().find(|line| line.contains("horn")).unwrap().split(',').collect();
+    let row = table.lines().find(|line| line.contains("horn")).unwrap();
     let answer = &page[..page.find(" or ").unwrap()];
     let error = answer.rsplit("error ").next().unwrap();
-    assert!(table.contains(&error.replace(" mm", "")), "{error}: {table}");
-    assert_eq!(row[1], "40");
+    assert!(row.contains(&error.replace(" mm", "")) && row.contains(",40,"), "{error}: {row}");
     // The generated answer moves to the appendix, with the claims; the conclusion gives place to the answer.
     let report = fs::read_to_string(folder.path().join("report/report.html")).unwrap();
     assert!(!page.contains("Conclusion.") && report.contains("Claims of the answer"));
