@@ -1,7 +1,7 @@
 //! The files of a report.
 
 use std::{
-    fs,
+    fmt, fs,
     path::{Path, PathBuf},
 };
 
@@ -37,7 +37,6 @@ pub struct Report {
 const PAPERS: [&str; 3] = ["report.html", "report.tex", "report.pdf"];
 
 /// A report in memory, before any of its files is written.
-#[derive(Debug)]
 pub struct Prepared {
     /// One line for each claim of the written answer that does not hold in the logs.
     pub unmet: Vec<String>,
@@ -86,6 +85,13 @@ pub(crate) fn authored(
 ) -> Result<Option<Authored>, ReportError> {
     let authored = answer.map(|answer| Authored::of(answer, run, summary)).transpose();
     authored.map_err(|error| ReportError::Answer { run: run.header().run.clone(), error })
+}
+
+impl fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The files are megabytes.
+        f.debug_struct("Prepared").field("unmet", &self.unmet).field("identity", &self.identity).finish_non_exhaustive()
+    }
 }
 
 impl Prepared {

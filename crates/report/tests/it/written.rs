@@ -35,7 +35,7 @@ fn three_solvers(folder: &Path) {
 
 /// Rates, counts, medians, changes and values of two terms are those of the table, and verification computes each again.
 ///
-/// Seen to fail where a rate is that of all trials, and where the divisor of a ratio is the first term.
+/// Seen to fail where quotes do not hide a comma, and where the divisor of a ratio is the first term.
 #[test]
 fn the_numbers_of_an_answer_are_those_of_the_table() {
     let folder = tempfile::tempdir().unwrap();
