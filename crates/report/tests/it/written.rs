@@ -2,12 +2,13 @@
 
 use std::{fs, path::Path};
 
+use seafix_log::{Axis, Writer};
 use seafix_report::{Answer, Forms, Verified, prepare, verify, verify_answered};
 
 use crate::{
     answers::{front, trial},
     dives,
-    made_up::write_run,
+    made_up::{blind, header, write_run},
 };
 
 /// Writes the report with an answer; the result is its first page's text and its verification.
@@ -93,6 +94,29 @@ fn a_dive_has_values_over_its_frames() {
     let (_, verified) =
         written(folder.path(), answer, &["smallest median poi_error: distance=2, solver=kabsch, point=any > 0"]);
     assert!(verified.holds(), "{verified:#?}");
+}
+
+/// Of 40 attempts, the first 10 of which are rejected, 20 are those of a shorter trial too: half of these have a fix.
+///
+/// Seen to fail where all attempts of the first trial count.
+#[test]
+fn common_attempts_are_those_of_all_trials() {
+    let folder = tempfile::tempdir().unwrap();
+    let axes = |solver| [("source.altitude", "2.0"), ("pipeline.solver", solver)];
+    trial(folder.path(), 1, axes("kabsch"), "Which solver?", 10);
+    let mut header = header(2, 2.0, "horn");
+    header.trial = "002".to_owned();
+    header.axes = axes("horn").map(|(key, value)| Axis { key: key.to_owned(), value: value.to_owned() }).to_vec();
+    let mut writer = Writer::create(&folder.path().join("002.mcap"), &header).unwrap();
+    for place in 0..20 {
+        let mut frame = blind(&header, 0, 2.0);
+        (frame.frame, frame.stamp_ns) = (place, 100 * place);
+        writer.frame(&frame).unwrap();
+    }
+    writer.finish().unwrap();
+    let answer = "{fix-rate: solver=kabsch}, {common fix-rate: solver=kabsch & solver=any} of {common attempts: solver=kabsch & solver=horn}.";
+    let (page, verified) = written(folder.path(), answer, &["common fixes: solver=horn & solver=kabsch = 20"]);
+    assert!(verified.holds() && page.contains("75.0 %, 50.0 % of 20."), "{page}{verified:#?}");
 }
 
 /// A claim that does not hold has one line with its values.
