@@ -278,7 +278,7 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
 /// A claim that does not hold, or a query without a value, stops the publication before anything is written; an answer is
 /// also verified.
 ///
-/// Seen to fail where reports are written before the claims are checked.
+/// Seen to fail where a claim that does not hold is only printed.
 #[test]
 fn a_claim_that_does_not_hold_stops_the_publication() {
     let folder = tempfile::tempdir().unwrap();
