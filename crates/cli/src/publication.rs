@@ -5,10 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix_component::Fault;
-use seafix_component::read_text;
+use seafix_component::{Fault, place_at, read_text};
 use seafix_experiment::Plan;
+use seafix_report::{Answer, AnswerError};
 use serde::Deserialize;
+use toml::Spanned;
 
 const FORMAT: &str = "seafix-reports/1";
 
@@ -30,6 +31,39 @@ struct Entry {
     /// Changed settings, `source.frames=60`; the page states them.
     #[serde(default)]
     set: Vec<String>,
+    /// The answer to the question, words and queries in braces; without it the answer is generated.
+    answer: Option<Spanned<String>>,
+    /// The relations that the words of the answer assert.
+    #[serde(default)]
+    claims: Vec<Spanned<String>>,
+}
+
+impl Entry {
+    /// The written answer, if there is one; the fault has the place of the answer or of the claim in `text`.
+    fn answer(&self, path: &Path, text: &str) -> Result<Option<Answer>, Fault> {
+        let fault = |error: AnswerError, start: usize| {
+            Fault::new(error.what, path)
+                .at(Some(place_at(text, start)))
+                .value(format!("`{}`", error.place))
+                .remedy(error.remedy)
+        };
+        let Some(answer) = &self.answer else {
+            let Some(claim) = self.claims.first() else { return Ok(None) };
+            let error = AnswerError {
+                place: claim.get_ref().clone(),
+                what: "a claim without an answer".to_owned(),
+                remedy: "add `answer`, or remove the claim".to_owned(),
+            };
+            return Err(fault(error, claim.span().start));
+        };
+        let none: [&str; 0] = [];
+        Answer::parse(answer.get_ref(), &none).map_err(|error| fault(error, answer.span().start))?;
+        for claim in &self.claims {
+            Answer::parse(answer.get_ref(), &[claim.get_ref()]).map_err(|error| fault(error, claim.span().start))?;
+        }
+        let claims: Vec<&String> = self.claims.iter().map(Spanned::get_ref).collect();
+        Answer::parse(answer.get_ref(), &claims).map(Some).map_err(|error| fault(error, answer.span().start))
+    }
 }
 
 /// A published experiment.
@@ -38,6 +72,8 @@ pub(crate) struct Published {
     /// The experiment's name, and that of its folders.
     pub(crate) name: String,
     pub(crate) plan: Plan,
+    /// The written answer; `None` for a generated one.
+    pub(crate) answer: Option<Answer>,
 }
 
 /// Reads the list and every experiment in it.
@@ -58,8 +94,14 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Published>, Vec<Fault>> {
     let (mut published, mut names) = (Vec::new(), BTreeSet::new());
     for entry in file.report {
         let experiment: PathBuf = path.parent().unwrap_or(Path::new("")).join(&entry.experiment);
+        let answer = entry.answer(path, &text).unwrap_or_else(|fault| {
+            faults.push(fault);
+            None
+        });
         match Plan::read(&experiment, &entry.set) {
-            Ok(plan) if names.insert(plan.name.clone()) => published.push(Published { name: plan.name.clone(), plan }),
+            Ok(plan) if names.insert(plan.name.clone()) => {
+                published.push(Published { name: plan.name.clone(), plan, answer });
+            }
             Ok(plan) => {
                 let fault = Fault::new("two reports with one name", path).value(format!("`{}`", plan.name));
                 faults.push(fault.remedy("rename one of the experiment files"));
@@ -91,6 +133,13 @@ mod tests {
         assert!(reported_of(&format!("format = 'seafix-reports/2'\n{one}")).contains("unsupported format"));
         assert!(reported_of("format = 'seafix-reports/1'\n").contains("no report"));
         assert!(reported_of("format = 'seafix-reports/1'\n[[report]]\nexperimnt = 'a.toml'\n").contains("list.toml:3"));
+        let answered = |more: &str| format!("format = 'seafix-reports/1'\n{one}{more}\n");
+        assert_eq!(reported(&answered("answer = 'Yes, in {fix-rate: all}.'\nclaims = ['wrong: all = 0']")), Ok(1));
+        let misspelt = reported_of(&answered("answer = 'Yes, in {fixrate: all}.'"));
+        assert!(misspelt.contains("list.toml:4:10: `fixrate: all`; did you mean `fix-rate`?"), "{misspelt}");
+        let unrelated = reported_of(&answered("answer = 'Yes.'\nclaims = ['wrong: all = 0', 'wrong: all']"));
+        assert!(unrelated.contains("no relation in ") && unrelated.contains("list.toml:5:29"), "{unrelated}");
+        assert!(reported_of(&answered("claims = ['wrong: all = 0']")).contains("a claim without an answer"));
         let both = reported_of("format = 'seafix-reports/0'\n[[report]]\nexperiment = 'b.toml'\n");
         assert!(both.contains("unsupported format") && both.contains("b.toml"), "{both}");
     }

@@ -81,7 +81,7 @@ pub fn compare(
     let summary = RunSummary::of(&run);
     let comparisons = paired::comparisons(&run, &summary);
     let page = out.map(|folder| {
-        let document = content::document(&run, &summary, false)?;
+        let document = content::document(&run, &summary, false, None)?;
         claim(folder, "comparison", PAGE)?;
         write(folder, PAGE, print::html(&document, Forms { latex: false, pdf: false, ..Forms::ALL }).as_bytes())
     });

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use seafix_component::Fault;
 use seafix_log::LogError;
 
+use crate::answer::AnswerError;
+
 /// The reason why a report, a summary or a comparison cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
@@ -47,6 +49,14 @@ pub enum ReportError {
         first: PathBuf,
         /// The first log with other axes.
         other: PathBuf,
+    },
+    /// A written answer has no value in this run.
+    #[error("cannot answer in the report on {run}: {error}")]
+    Answer {
+        /// The name of the run.
+        run: String,
+        /// The fault of the answer.
+        error: AnswerError,
     },
     /// A log cannot be read.
     #[error(transparent)]

@@ -56,6 +56,11 @@ impl Field {
         self.quantity().name
     }
 
+    /// The unit in the logs; empty for counts and ratios.
+    pub(crate) fn unit(self) -> &'static str {
+        self.quantity().unit
+    }
+
     /// The topic whose messages have the quantity.
     pub(crate) fn topic(self) -> &'static str {
         self.quantity().topic

@@ -6,12 +6,12 @@ use std::{
 };
 
 use crate::{
-    content,
+    content::{self, Authored},
     error::ReportError,
     print,
     run::Run,
     summary::RunSummary,
-    write::{claim, write},
+    write::{File, claim, write},
 };
 
 /// The file name of the page.
@@ -47,31 +47,53 @@ pub fn index_holds<'a>(findings: impl IntoIterator<Item = &'a str>, folder: &Pat
 
 fn text<'a>(findings: impl IntoIterator<Item = &'a str>) -> String {
     let head = format!(
-        "# What we found\n\nMade by seafix {}. Every sentence below a question is generated from logs and appears in the linked report as well, \
-         where each number has a key with its log, topic and time range.\n",
+        "# What we found\n\nMade by seafix {}. The numbers of every sentence below a question are computed from logs. They appear in the linked report as well, \
+         where each has a key with its log, topic and time range.\n",
         env!("CARGO_PKG_VERSION")
     );
     findings.into_iter().fold(head, |text, section| text + section)
 }
 
-/// The section of one run: question, main figure, answer, findings and links to the report in `folder`.
-pub(crate) fn section(run: &Run, summary: &RunSummary, folder: &Path) -> String {
-    let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let escaped = print::escape_markdown(&name);
-    let there = |file: &str| folder.join(file).exists();
-    let mut text = format!("\n## {escaped}\n\n*{}*\n\n", print::escape_markdown(&run.header().question));
-    if let Some(figure) = MAIN.iter().find(|file| there(file)) {
-        text += &format!("[![The main figure of {escaped}]({name}/{figure})]({name}/report.html)\n\n");
+/// The section of one run: question, main figure, answer, findings and links to its report.
+#[derive(Debug)]
+pub(crate) struct Section {
+    question: String,
+    figure: Option<&'static str>,
+    answer: String,
+    findings: Vec<String>,
+    /// The linked files with their names.
+    links: Vec<[&'static str; 2]>,
+}
+
+impl Section {
+    /// The section of a run whose report has these files.
+    pub(crate) fn of(run: &Run, summary: &RunSummary, authored: Option<&Authored>, files: &[File]) -> Self {
+        let there = |file: &str| files.iter().any(|(name, _)| name == file || name.starts_with(&format!("{file}/")));
+        let (answer, findings) = content::findings(run, summary, authored);
+        let links =
+            [["Report", "report.html"], ["PDF", "report.pdf"], ["tables", "tables"], ["summary", "summary.txt"]];
+        Self {
+            question: print::escape_markdown(&run.header().question),
+            figure: MAIN.into_iter().find(|file| there(file)),
+            answer: print::markdown(&answer),
+            findings: findings.iter().map(|finding| print::markdown(finding)).collect(),
+            links: links.into_iter().filter(|[_, file]| there(file)).collect(),
+        }
     }
-    let (answer, findings) = content::findings(run, summary);
-    text += &format!("**Answer.** {}\n\n", print::markdown(&answer));
-    for finding in findings {
-        text += &format!("- {}\n", print::markdown(&finding));
+
+    /// The text of the section, with links to the report in `folder`.
+    pub(crate) fn text(&self, folder: &Path) -> String {
+        let name = folder.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        let escaped = print::escape_markdown(&name);
+        let mut text = format!("\n## {escaped}\n\n*{}*\n\n", self.question);
+        if let Some(figure) = self.figure {
+            text += &format!("[![The main figure of {escaped}]({name}/{figure})]({name}/report.html)\n\n");
+        }
+        text += &format!("**Answer.** {}\n\n", self.answer);
+        self.findings.iter().for_each(|finding| text += &format!("- {finding}\n"));
+        let links: Vec<String> = self.links.iter().map(|[what, file]| format!("[{what}]({name}/{file})")).collect();
+        text + &format!("\n{}\n", links.join(", "))
     }
-    let links = [("Report", "report.html"), ("PDF", "report.pdf"), ("tables", "tables"), ("summary", "summary.txt")];
-    let links = links.iter().filter(|(_, file)| there(file));
-    let links: Vec<String> = links.map(|(what, file)| format!("[{what}]({name}/{file})")).collect();
-    text + &format!("\n{}\n", links.join(", "))
 }
 
 /// The candidates for the main figure, in order of preference.

@@ -25,6 +25,7 @@
 //! assert!(error.to_string().contains("no-such-run"));
 //! ```
 
+mod answer;
 mod compare;
 mod content;
 mod disparity;
@@ -55,13 +56,14 @@ mod terminal;
 mod verify;
 mod write;
 
+pub use answer::{Answer, AnswerError};
 pub use compare::{Compared, compare};
 pub use error::ReportError;
 pub use forms::Forms;
 pub use index::{claim_index, index, index_holds};
 pub use summary::{Distribution, Limits, Row, RunSummary, StageTimeSummary};
-pub use verify::{Mismatch, Verified, verify};
-pub use write::{Report, report};
+pub use verify::{Mismatch, Verified, verify, verify_answered};
+pub use write::{Prepared, Report, prepare, report};
 
 use std::path::Path;
 

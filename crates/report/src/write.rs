@@ -1,7 +1,7 @@
 //! The files of a report.
 
 use std::{
-    fs,
+    fmt, fs,
     path::{Path, PathBuf},
 };
 
@@ -9,11 +9,13 @@ use rayon::prelude::*;
 use seafix_component::{MARKER, Marker, Ownership, PartialFile, create_real_folder};
 
 use crate::{
-    content,
+    answer::Answer,
+    content::{self, Authored},
     document::{Block, Document, Figure, Table},
     error::ReportError,
     forms::Forms,
-    index, print,
+    index::Section,
+    print,
     run::Run,
     summary::RunSummary,
 };
@@ -34,6 +36,16 @@ pub struct Report {
 /// The files of the forms, by order of [`Forms`].
 const PAPERS: [&str; 3] = ["report.html", "report.tex", "report.pdf"];
 
+/// A report in memory, before any of its files is written.
+pub struct Prepared {
+    /// One line for each claim of the written answer that does not hold in the logs.
+    pub unmet: Vec<String>,
+    files: Vec<File>,
+    identity: String,
+    summary: RunSummary,
+    section: Section,
+}
+
 /// A file: its name in the folder of the report, and its bytes.
 pub(crate) type File = (String, Vec<u8>);
 
@@ -47,20 +59,63 @@ pub(crate) type File = (String, Vec<u8>);
 /// [`ReportError`] when the run has no log, a log cannot be read, the folder is not empty and has no marker of a report,
 /// or a file cannot be written.
 pub fn report(run_dir: &Path, folder: &Path, forms: Forms) -> Result<Report, ReportError> {
+    earlier(folder)?;
+    prepare(run_dir, forms, None)?.write(folder)
+}
+
+/// Makes the report on the logs in `run_dir` with a written answer, or with a generated one, without writing it.
+///
+/// # Errors
+/// [`ReportError`] when the run has no log, a log cannot be read, or the answer has no value in this run.
+pub fn prepare(run_dir: &Path, forms: Forms, answer: Option<&Answer>) -> Result<Prepared, ReportError> {
     let run = Run::read(run_dir)?;
-    let earlier = earlier(folder)?;
     let summary = RunSummary::of(&run);
-    let files = files(&run, &summary, forms)?;
-    replace(folder, earlier, &run.header().run, &files)?;
-    let page = files.iter().map(|(name, _)| name).find(|name| name.starts_with("report."));
-    let page = page.map_or_else(|| folder.to_owned(), |name| folder.join(name));
-    let findings = index::section(&run, &summary, folder);
-    Ok(Report { folder: folder.to_owned(), page, summary, findings })
+    let authored = authored(&run, &summary, answer)?;
+    let files = files(&run, &summary, forms, authored.as_ref())?;
+    let section = Section::of(&run, &summary, authored.as_ref(), &files);
+    let unmet = authored.map(|authored| authored.unmet()).unwrap_or_default();
+    Ok(Prepared { unmet, files, identity: run.header().run.clone(), summary, section })
+}
+
+/// The written answer with its values in a run.
+pub(crate) fn authored(
+    run: &Run,
+    summary: &RunSummary,
+    answer: Option<&Answer>,
+) -> Result<Option<Authored>, ReportError> {
+    let authored = answer.map(|answer| Authored::of(answer, run, summary)).transpose();
+    authored.map_err(|error| ReportError::Answer { run: run.header().run.clone(), error })
+}
+
+impl fmt::Debug for Prepared {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The files are megabytes.
+        f.debug_struct("Prepared").field("unmet", &self.unmet).field("identity", &self.identity).finish_non_exhaustive()
+    }
+}
+
+impl Prepared {
+    /// Writes the report into `folder`, in place of an earlier one.
+    ///
+    /// # Errors
+    /// [`ReportError`] when the folder is not empty and has no marker of a report, or a file cannot be written.
+    pub fn write(self, folder: &Path) -> Result<Report, ReportError> {
+        replace(folder, earlier(folder)?, &self.identity, &self.files)?;
+        let page = self.files.iter().map(|(name, _)| name).find(|name| name.starts_with("report."));
+        let page = page.map_or_else(|| folder.to_owned(), |name| folder.join(name));
+        let findings = self.section.text(folder);
+        Ok(Report { folder: folder.to_owned(), page, summary: self.summary, findings })
+    }
 }
 
 /// All files of a report.
-pub(crate) fn files(run: &Run, summary: &RunSummary, forms: Forms) -> Result<Vec<File>, ReportError> {
-    let document = content::document(run, summary, forms.small)?;
+pub(crate) fn files(
+    run: &Run,
+    summary: &RunSummary,
+    forms: Forms,
+    authored: Option<&Authored>,
+) -> Result<Vec<File>, ReportError> {
+    let document = content::document(run, summary, forms.small, authored)?;
     let html = || forms.html.then(|| print::html(&document, forms).into_bytes());
     let latex = || forms.latex.then(|| print::latex(&document).into_bytes());
     let pdf = || forms.pdf.then(|| print::pdf(&document));

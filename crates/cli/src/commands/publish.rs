@@ -9,7 +9,7 @@ use clap::Args;
 use rayon::prelude::*;
 use seafix_component::counted;
 use seafix_experiment::{Existing, Options, Remade, RunError, kept_identity, remake, run};
-use seafix_report::{Forms, Report, claim_index, index, index_holds, report};
+use seafix_report::{Forms, Prepared, Report, claim_index, index, index_holds, prepare, verify_answered};
 
 use super::report::{failure, verified};
 use crate::{
@@ -71,9 +71,9 @@ impl Publish {
             let how = if self.run(one)? { "kept run" } else { "new run" };
             notify(&format!("{}: {how}", one.name));
         }
-        let written = |one: &Published| report(&self.runs.join(&one.name), &self.out.join(&one.name), Forms::SMALL);
-        let written: Vec<_> = list.par_iter().map(written).collect();
-        let written: Vec<Report> = written.into_iter().collect::<Result<_, _>>().map_err(failure)?;
+        let Some(prepared) = self.prepare(&list)? else { return Ok(FINDINGS) };
+        let written = list.iter().zip(prepared).map(|(one, report)| report.write(&self.out.join(&one.name)));
+        let written: Vec<Report> = written.collect::<Result<_, _>>().map_err(failure)?;
         written.iter().for_each(|report| notify(&format!("report: {}", report.page.display())));
         if self.only.is_empty() {
             self.distinguish_others(&list);
@@ -81,6 +81,31 @@ impl Publish {
             print(&format!("{}\n", page.display()))?;
         }
         Ok(DONE)
+    }
+
+    /// Makes all reports before any is written; `None` if a claim does not hold, which is printed.
+    fn prepare(&self, list: &[Published]) -> Result<Option<Vec<Prepared>>, Failure> {
+        let one = |one: &Published| prepare(&self.runs.join(&one.name), Forms::SMALL, one.answer.as_ref());
+        let made: Vec<_> = list.par_iter().map(one).collect();
+        let (mut prepared, mut faulty): (Vec<Prepared>, Option<Failure>) = (Vec::new(), None);
+        for report in made {
+            match report.map_err(failure) {
+                Ok(report) => prepared.push(report),
+                Err(failure) => {
+                    faulty.get_or_insert(Failure { code: failure.code, lines: Vec::new() }).lines.extend(failure.lines);
+                }
+            }
+        }
+        if let Some(failure) = faulty {
+            return Err(failure);
+        }
+        let unmet: String = list
+            .iter()
+            .zip(&prepared)
+            .flat_map(|(one, report)| report.unmet.iter().map(|line| format!("{}: {line}\n", one.name)))
+            .collect();
+        print(&unmet)?;
+        Ok(unmet.is_empty().then_some(prepared))
     }
 
     /// The options of a run without durations: it has the same bytes on every machine.
@@ -137,7 +162,8 @@ impl Publish {
         let (mut holding, mut findings) = (0, Vec::new());
         let mut unreadable: Option<Failure> = None;
         for one in list {
-            match verified(&self.runs.join(&one.name), &self.out.join(&one.name)) {
+            let (run, folder) = (self.runs.join(&one.name), self.out.join(&one.name));
+            match verified(&run, &folder, |run, folder| verify_answered(run, folder, one.answer.as_ref())) {
                 Ok((holds, section)) => {
                     holding += usize::from(holds);
                     findings.push(section);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use seafix_experiment::changed_outputs;
-use seafix_report::{Forms, ReportError, Verified, claim_index, index, report, verify};
+use seafix_report::{Answer, Forms, ReportError, Verified, claim_index, index, prepare, verify};
 
 use crate::{
     exit::{DONE, Ended, FINDINGS, Failure, INPUT, OUTPUT, USAGE},
@@ -31,6 +31,14 @@ pub(crate) struct Report {
     /// Write nothing: compute every printed number again from the logs, and list differences of report and run.
     #[arg(long, conflicts_with_all = ["html", "latex", "pdf", "index"])]
     verify: bool,
+    /// The answer to the question: words, and queries in braces whose values are computed from the logs, such as
+    /// `{fix-rate: method=the defaults}` [default: a generated answer].
+    #[arg(long, value_name = "TEXT", conflicts_with = "verify")]
+    answer: Option<String>,
+    /// A relation that the words of the answer assert, such as `fix-rate: method=a > fix-rate: method=b`; repeatable. The
+    /// report is not written if it does not hold (exit code 1).
+    #[arg(long, value_name = "CLAIM", requires = "answer")]
+    claim: Vec<String>,
     /// Also write README.md with the findings of all runs into the folder of the reports.
     #[arg(long, requires = "out")]
     index: bool,
@@ -46,12 +54,19 @@ impl Report {
             (false, false, false) => Forms::ALL,
             (html, latex, pdf) => Forms { html, latex, pdf, small: false },
         };
+        let answer = self.answer()?;
         if let (true, Some(out)) = (self.index, &self.out) {
             claim_index(out).map_err(failure)?;
         }
         let mut findings = Vec::new();
         for (run, folder) in self.runs.iter().zip(&folders) {
-            let written = report(run, folder, forms).map_err(failure)?;
+            let prepared = prepare(run, forms, answer.as_ref()).map_err(failure)?;
+            if !prepared.unmet.is_empty() {
+                let unmet = prepared.unmet.iter().map(|line| format!("{}: {line}\n", run.display()));
+                print(&unmet.collect::<String>())?;
+                return Ok(FINDINGS);
+            }
+            let written = prepared.write(folder).map_err(failure)?;
             print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
             findings.push(written.findings);
         }
@@ -60,6 +75,17 @@ impl Report {
             print(&format!("findings: {}\n", page.display()))?;
         }
         Ok(DONE)
+    }
+
+    /// The written answer; it is about one run.
+    fn answer(&self) -> Result<Option<Answer>, Failure> {
+        let Some(text) = &self.answer else { return Ok(None) };
+        if self.runs.len() > 1 {
+            let line = format!("cannot give {} runs one answer; report each run alone", self.runs.len());
+            return Err(Failure::new(USAGE, line));
+        }
+        let parsed = Answer::parse(text, &self.claim);
+        parsed.map(Some).map_err(|error| Failure::new(USAGE, format!("cannot read the answer: {error}")))
     }
 
     /// The folder of each report.
@@ -86,7 +112,7 @@ impl Report {
     fn verify_all(&self, folders: &[PathBuf]) -> Ended {
         let mut code = DONE;
         for (run, folder) in self.runs.iter().zip(folders) {
-            if !verified(run, folder)?.0 {
+            if !verified(run, folder, verify)?.0 {
                 code = FINDINGS;
             }
         }
@@ -96,7 +122,11 @@ impl Report {
 
 /// Verifies a report and the files of its run and prints the result. Returns whether everything is unchanged, and the
 /// run's section of the page of all reports.
-pub(crate) fn verified(run: &Path, folder: &Path) -> Result<(bool, String), Failure> {
+pub(crate) fn verified(
+    run: &Path,
+    folder: &Path,
+    verify: impl Fn(&Path, &Path) -> Result<Verified, ReportError>,
+) -> Result<(bool, String), Failure> {
     let verified = verify(run, folder).map_err(failure)?;
     let changed = changed_outputs(run).map_err(|fault| Failure::faults(INPUT, &[fault]))?;
     let full = changed.is_empty();
@@ -114,6 +144,7 @@ fn message(verified: &Verified, folder: &str) -> String {
     for wrong in &verified.mismatches {
         text += &format!("{}: printed {}, logged {}: {}\n", wrong.file, wrong.printed, wrong.logged, wrong.key);
     }
+    verified.unmet.iter().for_each(|line| text += &format!("{folder}: {line}\n"));
     let Verified { missing, changed, strays, .. } = verified;
     let unlike =
         [(missing, "is missing"), (changed, "differs from the logs"), (strays, "does not belong to this report")];
@@ -130,10 +161,15 @@ fn message(verified: &Verified, folder: &str) -> String {
     )
 }
 
-/// The failure of an error: an unreadable log is a failure of input, an unwritable report one of output.
+/// The failure of an error: an unreadable log is a failure of input, an answer without a value one of usage, an unwritable
+/// report one of output.
 pub(crate) fn failure(error: ReportError) -> Failure {
     let output =
         matches!(error, ReportError::Io { doing: "write", .. } | ReportError::Foreign { .. } | ReportError::Folder(_));
-    let code = if output { OUTPUT } else { INPUT };
+    let code = match error {
+        _ if output => OUTPUT,
+        ReportError::Answer { .. } => USAGE,
+        _ => INPUT,
+    };
     Failure::new(code, error)
 }

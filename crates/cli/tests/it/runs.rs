@@ -275,6 +275,50 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     assert!(code == 0 && out.contains("in order"), "{out}");
 }
 
+/// A claim that does not hold, or a query without a value, stops the publication before anything is written; an answer is
+/// also verified.
+///
+/// Seen to fail where a claim that does not hold is only printed.
+#[test]
+fn a_claim_that_does_not_hold_stops_the_publication() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("a.toml"), EXPERIMENT).unwrap();
+    let publish = |answer: &str, more: &[&str]| {
+        let list = format!(
+            "format = 'seafix-reports/1'\n[[report]]\nexperiment = 'a.toml'\nset = ['source.frames=3']\n{answer}\n"
+        );
+        fs::write(folder.join("list.toml"), list).unwrap();
+        seafix(folder, &[&["publish", "list.toml"], more].concat())
+    };
+    let (code, out, error) = publish("answer = 'Yes.'\nclaims = ['attempts: all < 0']", &[]);
+    assert!(code == 1 && out.contains("a: the claim `attempts: all < 0` does not hold: "), "{out}{error}");
+    assert!(!folder.join("reports/a").exists(), "nothing is written");
+    let (code, _, error) = publish("answer = 'Yes, {fixes: colour=red}.'", &[]);
+    assert!(code == 2 && error.contains("no axis `colour`") && !folder.join("reports/a").exists(), "{error}");
+    let (code, _, error) = publish("answer = 'Yes, {fixs: all}.'", &[]);
+    assert!(code == 2 && error.contains("list.toml:5:10") && error.contains("did you mean `fixes`"), "{error}");
+
+    let answer = "answer = 'Yes, in {attempts: all} attempts.'\nclaims = ['attempts: all > 0']";
+    assert_eq!(publish(answer, &[]).0, 0);
+    let page = fs::read_to_string(folder.join("reports/README.md")).unwrap();
+    assert!(page.contains("**Answer.** Yes, in "), "{page}");
+    assert_eq!(publish(answer, &["--verify"]).0, 0);
+    let (code, out, _) = publish("answer = 'No.'", &["--verify"]);
+    assert!(code == 1 && out.contains("report.html differs from the logs"), "{out}");
+    let (code, out, _) =
+        publish("answer = 'Yes, in {attempts: all} attempts.'\nclaims = ['wrong: all > 9']", &["--verify"]);
+    assert!(code == 1 && out.contains("the claim `wrong: all > 9` does not hold"), "{out}");
+
+    let report = |more: &[&str]| seafix(folder, &[&["report", "runs/reports/a", "--out", "mine"], more].concat());
+    let (code, out, _) = report(&["--answer", "Yes.", "--claim", "wrong: all > 9"]);
+    assert!(code == 1 && out.contains("runs/reports/a: the claim") && !folder.join("mine").exists(), "{out}");
+    let (code, _, error) = report(&["--answer", "Yes, {fixs: all}."]);
+    assert!(code == 2 && error.contains("cannot read the answer: unknown quantity `fixs`"), "{error}");
+    assert_eq!(report(&["--answer", "Yes, in {attempts: all}.", "--claim", "attempts: all > 0"]).0, 0);
+    assert_eq!(report(&["--verify"]).0, 0);
+}
+
 /// A run is kept exactly as long as its results are those of the program; a repeated part has the bytes of the kept
 /// run. Seen to fail with unfinished runs kept.
 #[test]

@@ -10,24 +10,31 @@ mod sections;
 use rayon::prelude::*;
 
 use findings::abstract_;
+pub(crate) use front::Authored;
 use sections::{
-    ablation, data, failures, hypotheses, inspection, integrity, method, navigation, objects, protocol, reproduce,
-    results, significance, threats, time,
+    ablation, claims, data, failures, hypotheses, inspection, integrity, method, navigation, objects, protocol,
+    reproduce, results, significance, threats, time,
 };
 
 use crate::{
     document::{Document, Section, Text},
     error::ReportError,
     format::sentence_case,
-    paired,
+    paired::{self, Comparison},
     run::Run,
     summary::RunSummary,
 };
 
 /// The report on a run.
 ///
-/// A `small` one has few small pictures and no text that depends on the program's version.
-pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<Document, ReportError> {
+/// A `small` one has few small pictures and no text that depends on the program's version. An `authored` answer takes the
+/// place of the generated one.
+pub(crate) fn document(
+    run: &Run,
+    summary: &RunSummary,
+    small: bool,
+    authored: Option<&Authored>,
+) -> Result<Document, ReportError> {
     let header = run.header();
     let title = if header.title.is_empty() { &header.run } else { &header.title };
     let (comparisons, failures) = rayon::join(|| paired::comparisons(run, summary), || failures::section(run, small));
@@ -48,8 +55,9 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
     ];
     let made: Vec<Option<Section>> = made.par_iter().map(|section| section()).collect();
     let mut findings = Section::new("Findings");
-    abstract_::section(run, summary, &comparisons).into_iter().for_each(|text| findings.say(text));
-    let before = [findings, hypotheses::section(run, &comparisons), method];
+    sentences(run, summary, &comparisons, authored).into_iter().for_each(|text| findings.say(text));
+    let claims = authored.and_then(|authored| claims::section(&authored.claims));
+    let before = [findings].into_iter().chain(claims).chain([hypotheses::section(run, &comparisons), method]);
     let after = [
         failures,
         time::section(run, summary),
@@ -57,17 +65,25 @@ pub(crate) fn document(run: &Run, summary: &RunSummary, small: bool) -> Result<D
         reproduce::section(run),
         reproduce::configuration(run),
     ];
-    let mut sections: Vec<Section> = before.into_iter().chain(made.into_iter().flatten()).chain(after).collect();
+    let mut sections: Vec<Section> = before.chain(made.into_iter().flatten()).chain(after).collect();
     Ok(Document {
         title: sentence_case(title),
         run: header.run.clone(),
         question: header.question.clone(),
-        front: front::blocks(run, summary, &comparisons, &mut sections),
+        front: front::blocks(run, summary, &comparisons, &mut sections, authored),
         sections,
+        answer: authored.map(|authored| authored.answer.clone()),
     })
 }
 
 /// The answer to the question of the experiment, then the sentences of the findings.
-pub(crate) fn findings(run: &Run, summary: &RunSummary) -> (Text, Vec<Text>) {
-    (front::answer(run, summary), abstract_::section(run, summary, &paired::comparisons(run, summary)))
+pub(crate) fn findings(run: &Run, summary: &RunSummary, authored: Option<&Authored>) -> (Text, Vec<Text>) {
+    let answer = authored.map_or_else(|| front::answer(run, summary), |authored| authored.text.clone());
+    (answer, sentences(run, summary, &paired::comparisons(run, summary), authored))
+}
+
+/// The sentences of the findings; beside a written answer, the generated one with the values of the trials comes first.
+fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison], authored: Option<&Authored>) -> Vec<Text> {
+    let generated = authored.map(|_| front::answer(run, summary));
+    generated.into_iter().chain(abstract_::section(run, summary, comparisons)).collect()
 }

@@ -113,9 +113,10 @@ pub(crate) fn pooled_rate(trials: &[&Trial], group: &str, (k, n): (usize, usize)
         let attempts = trials.iter().flat_map(|trial| trial.attempts());
         proportion::interval(true, &attempts.map(|(_, row)| is_of(row, group)).collect::<Vec<bool>>())
     };
-    [("percent", k as f64 / n as f64), ("low", low), ("high", high)].map(|(what, fraction)| {
+    // 100 k / n as everywhere: 100 (k / n) rounds ties such as 102 of 160 differently.
+    [("percent", 100.0 * k as f64 / n as f64), ("low", 100.0 * low), ("high", 100.0 * high)].map(|(what, percent)| {
         let key = over(trials, "/metrics/evaluation", format!("{what} {group} of attempted"));
-        Number::new((n > 0).then_some(100.0 * fraction), 1, key)
+        Number::new((n > 0).then_some(percent), 1, key)
     })
 }
 

@@ -6,7 +6,7 @@ mod table;
 pub(crate) use span::{Span, Text, bold, code, italic, plain_text, sub, sup, text};
 pub(crate) use table::{Cell, Head, Line, Table};
 
-use crate::figure::Drawing;
+use crate::{answer::Answer, figure::Drawing};
 
 /// A report.
 #[derive(Debug)]
@@ -19,6 +19,8 @@ pub(crate) struct Document {
     pub(crate) front: Vec<Block>,
     /// The sections of the appendix.
     pub(crate) sections: Vec<Section>,
+    /// The written answer, which the page records; `None` for a generated one.
+    pub(crate) answer: Option<Answer>,
 }
 
 /// A numbered section.

@@ -13,6 +13,10 @@ use crate::{
 
 /// The name of the meta element that records the forms of a report.
 pub(crate) const FORMS: &str = "seafix-forms";
+/// The name of the meta element that records a written answer with its queries.
+pub(crate) const ANSWER: &str = "seafix-answer";
+/// The name of the meta elements that record the claims of a written answer.
+pub(crate) const CLAIM: &str = "seafix-claim";
 
 /// The complete page.
 ///
@@ -29,6 +33,10 @@ pub(crate) fn html(document: &Document, forms: Forms) -> String {
                 meta name="color-scheme" content="light dark";
                 meta name="generator" content={ "seafix-report " (env!("CARGO_PKG_VERSION")) };
                 meta name=(FORMS) content=(forms.words());
+                @if let Some(answer) = &document.answer {
+                    meta name=(ANSWER) content=(answer.text());
+                    @for claim in answer.claims() { meta name=(CLAIM) content=(claim); }
+                }
                 // An empty icon, because browsers otherwise request one from the server.
                 link rel="icon" href="data:,";
                 title { (plain(&document.title)) }

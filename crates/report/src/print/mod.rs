@@ -11,7 +11,7 @@ mod unicode;
 
 pub(crate) use bibtex::bibtex;
 pub(crate) use data::{csv, json};
-pub(crate) use html::{FORMS, html};
+pub(crate) use html::{ANSWER, CLAIM, FORMS, html};
 pub(crate) use latex::latex;
 pub(crate) use markdown::{escape as escape_markdown, markdown};
 pub(crate) use pdf::{figure_pdf, pdf};

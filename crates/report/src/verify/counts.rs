@@ -6,8 +6,8 @@ use crate::{
     field::Field,
     paired, proportion,
     verify::{
-        evaluate::{error, found, rows},
         logs::{Log, Row},
+        rows::{error, found, rows},
     },
 };
 

@@ -18,7 +18,9 @@ use crate::{
     rms,
     verify::{
         counts::{end_of, fraction_of, histogram, pooled},
-        logs::{Log, Logs, Row, Seen},
+        logs::{Log, Logs, Seen},
+        rows::{error, found, rows, value},
+        written::{combined, extreme, f1, in_common},
     },
 };
 
@@ -40,12 +42,14 @@ pub(super) fn evaluate(key: &Key, logs: &mut Logs) -> Result<Answer, ReportError
     Ok(answer(&key.what, key.span, &all).ok_or_else(|| format!("unknown quantity `{}`", key.what)))
 }
 
-pub(super) fn rows(log: &Log, span: [u64; 2]) -> impl Iterator<Item = &Row> {
-    log.sample(span).flat_map(|frame| &frame.rows)
-}
-
 /// The value of a quantity: `None` if it is unknown, `Some(None)` for a dash.
 fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    if let Some(of) = what.strip_prefix("combined ") {
+        return combined(of, span, logs, answer).map(Some);
+    }
+    if let Some((name, of)) = what.split_once(' ').filter(|(name, _)| matches!(*name, "smallest-of" | "largest-of")) {
+        return extreme(name, of, span, logs, answer);
+    }
     let (what, scale) = match what {
         _ if what.ends_with(" in mm") => (what.trim_end_matches(" in mm"), 1e3),
         _ if what.ends_with(" in deg") => (what.trim_end_matches(" in deg"), 1_f64.to_degrees()),
@@ -64,6 +68,9 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             "greatest" => each.iter().copied().reduce(f64::max),
             _ => (!each.is_empty()).then(|| quantile(&mut each, 0.5)),
         });
+    }
+    if let Some(group) = rest.strip_suffix(" of common") {
+        return Some(in_common(first, group, span, logs)?.map(|value| value * scale));
     }
     if let Some((quantity, point)) = rest.split_once(" at the point ") {
         return Some(poi(first, quantity, point, span, log)?.map(|value| value * scale));
@@ -128,6 +135,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
         ("count", "logged") => Some(rows(log, span).count() as f64),
         ("count", group) => Some(pooled(logs, group, span)? as f64),
         ("percent" | "low" | "high", group) => fraction_of(first, group, scale, span, logs)?,
+        ("f1", _) => f1(log, span),
         ("sum", fields) => {
             // Correct pairs are known for fixes only.
             let (above, below) = fields.split_once(" by ")?;
@@ -229,18 +237,6 @@ fn of_median(name: &str, log: &Log, mut values: Vec<f64>) -> Option<Option<f64>>
         "median-high" => Some(interval(&mut values).map(|ends| ends.1)),
         _ => statistic(name, values),
     }
-}
-
-fn value(row: &Row, field: Field) -> Option<f64> {
-    if field == Field::Candidates { Some(row.candidates as f64) } else { field.of(&row.record) }
-}
-
-pub(super) fn found(row: &TargetRecord) -> bool {
-    row.outcome == Outcome::Fix && row.evaluation.wrong != Some(true)
-}
-
-pub(super) fn error(row: &TargetRecord, field: Field) -> f64 {
-    if found(row) { field.of(row).unwrap_or(f64::INFINITY) } else { f64::INFINITY }
 }
 
 /// The value of a quantity of fix intervals: `count`, `seconds`, `path-length`, drift or amplitude.
@@ -412,7 +408,8 @@ fn in_pairs(which: &str, what: &str, logs: &[&Log], span: [u64; 2]) -> Option<f6
     let field = Field::named(what);
     let of = |record: &TargetRecord, is_fix: bool| match field {
         None => Some(f64::from(u8::from(is_fix))),
-        Some(field) => field.of(record).filter(|_| is_fix),
+        // The effort of a search counts without a fix too.
+        Some(field) => field.of(record).filter(|_| is_fix || field == Field::Tests),
     };
     let keyed = |log: &Log| -> BTreeMap<(u64, String), Option<f64>> {
         let rows = log.sample(span).flat_map(|frame| frame.rows.iter().map(move |row| (frame.number, row)));

@@ -3,6 +3,8 @@
 mod counts;
 mod evaluate;
 mod logs;
+mod rows;
+mod written;
 
 use std::{
     fs,
@@ -10,14 +12,15 @@ use std::{
 };
 
 use crate::{
+    answer::Answer,
     error::ReportError,
     forms::Forms,
-    index,
+    index::Section,
     number::{Key, Number},
-    print::FORMS,
+    print::{ANSWER, CLAIM, FORMS},
     run::Run,
     summary::RunSummary,
-    write::{files, strangers},
+    write::{authored, files, strangers},
 };
 use evaluate::evaluate;
 use logs::Logs;
@@ -37,6 +40,8 @@ pub struct Verified {
     pub changed: Vec<String>,
     /// The files in the folder that the logs do not generate.
     pub strays: Vec<String>,
+    /// One line for each claim of the written answer that does not hold in the logs.
+    pub unmet: Vec<String>,
     /// The report's section of the page that [`index`](crate::index) writes, generated from the logs.
     pub findings: String,
 }
@@ -55,42 +60,51 @@ pub struct Mismatch {
 }
 
 impl Verified {
-    /// Whether the report agrees with the logs in every number and file.
+    /// Whether the report agrees with the logs in every number, file and claim.
     pub fn holds(&self) -> bool {
         let full = self.missing.is_empty() && self.changed.is_empty() && self.strays.is_empty();
-        full && self.mismatches.is_empty()
+        full && self.mismatches.is_empty() && self.unmet.is_empty()
     }
 }
 
 /// Verifies the report in `folder` against the logs in `run_dir`.
 ///
 /// Every printed number is computed again from its key and compared to the last printed digit. Every file is generated
-/// again and compared byte by byte. The code that evaluates keys is independent of the code that writes reports.
+/// again and compared byte by byte, with the written answer that the page records. The code that evaluates keys is
+/// independent of the code that writes reports.
 ///
 /// # Errors
 /// [`ReportError`] when the folder has no report, or a log cannot be read.
 pub fn verify(run_dir: &Path, folder: &Path) -> Result<Verified, ReportError> {
+    let page = String::from_utf8_lossy(&read(folder, PAGE)?).into_owned();
+    // A record that was changed into no answer gives another page, which is then reported as changed.
+    let answer = recorded(&page, ANSWER).first().and_then(|text| Answer::parse(text, &recorded(&page, CLAIM)).ok());
+    verify_answered(run_dir, folder, answer.as_ref())
+}
+
+/// Verifies the report in `folder` as [`verify`] does, as one with this written answer or with a generated one.
+///
+/// # Errors
+/// [`ReportError`] when the folder has no report, a log cannot be read, or the answer has no value in this run.
+pub fn verify_answered(run_dir: &Path, folder: &Path, answer: Option<&Answer>) -> Result<Verified, ReportError> {
     let mut verified = Verified::default();
     let mut logs = Logs::new(run_dir);
-    let read = |name: &str| {
-        let path = folder.join(name);
-        fs::read(&path).map_err(|source| ReportError::Io { doing: "read", path, source })
-    };
-    let name = "report.html";
-    let page = String::from_utf8_lossy(&read(name)?).into_owned();
+    let page = String::from_utf8_lossy(&read(folder, PAGE)?).into_owned();
     for (key, printed) in of_page(&page) {
-        verified.check(name, &key, &printed, &mut logs)?;
+        verified.check(PAGE, &key, &printed, &mut logs)?;
     }
     // The caller lists changed logs.
     let run = Run::read_as_it_is(run_dir)?;
     let summary = RunSummary::of(&run);
-    let made = files(&run, &summary, forms(&page))?;
+    let authored = authored(&run, &summary, answer)?;
+    let made = files(&run, &summary, forms(&page), authored.as_ref())?;
     verified.files = made.len();
-    verified.findings = index::section(&run, &summary, folder);
+    verified.findings = Section::of(&run, &summary, authored.as_ref(), &made).text(folder);
+    verified.unmet = authored.map(|authored| authored.unmet()).unwrap_or_default();
     let name_of = |path: PathBuf| path.strip_prefix(folder).unwrap_or(&path).display().to_string();
     verified.strays = strangers(folder, &made).into_iter().map(name_of).collect();
     for (name, bytes) in made {
-        let Ok(there) = read(&name) else {
+        let Ok(there) = read(folder, &name) else {
             verified.missing.push(name);
             continue;
         };
@@ -124,11 +138,23 @@ impl Verified {
     }
 }
 
+/// The file with the printed numbers.
+const PAGE: &str = "report.html";
+
+fn read(folder: &Path, name: &str) -> Result<Vec<u8>, ReportError> {
+    let path = folder.join(name);
+    fs::read(&path).map_err(|source| ReportError::Io { doing: "read", path, source })
+}
+
 /// The forms that a page records; all forms without a record.
 fn forms(page: &str) -> Forms {
-    let as_number =
-        page.split_once(&format!("<meta name=\"{FORMS}\" content=\"")).and_then(|(_, rest)| rest.split_once('"'));
-    as_number.map_or(Forms::ALL, |(words, _)| Forms::of_words(words))
+    recorded(page, FORMS).first().map_or(Forms::ALL, |words| Forms::of_words(words))
+}
+
+/// The contents of the meta elements of this name.
+fn recorded(page: &str, name: &str) -> Vec<String> {
+    let begin = format!("<meta name=\"{name}\" content=\"");
+    page.split(&begin).skip(1).filter_map(|rest| rest.split_once('"')).map(|(text, _)| unescape(text)).collect()
 }
 
 /// A value in the printed format of `printed`.

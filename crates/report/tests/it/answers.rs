@@ -8,7 +8,7 @@ use seafix_report::{Forms, report, verify};
 use crate::made_up::{blind, header};
 
 /// Writes a trial of 40 frames, of which the first `rejected` have no fix.
-fn trial(folder: &Path, index: usize, axes: [(&str, &str); 2], question: &str, rejected: u64) {
+pub(crate) fn trial(folder: &Path, index: usize, axes: [(&str, &str); 2], question: &str, rejected: u64) {
     let mut header = header(index, 2.0, axes[1].1);
     header.question = question.to_owned();
     header.trial = format!("{index:03}");
@@ -28,6 +28,11 @@ pub(crate) fn page(folder: &Path) -> String {
     let out = folder.join("report");
     report(folder, &out, Forms::ALL).unwrap();
     assert!(verify(folder, &out).unwrap().holds());
+    front(&out)
+}
+
+/// The text of the first page of the report in a folder, after the question.
+pub(crate) fn front(out: &Path) -> String {
     let page = fs::read_to_string(out.join("report.html")).unwrap();
     let (_, page) = page.split_once("class=\"question\"").unwrap();
     let page = page.split_once("class=\"appendix\"").unwrap().0;

@@ -13,7 +13,7 @@ use crate::{
 type Errors = [f64; 2];
 
 /// Writes a trial of 40 frames, 0.1 s and 0.1 m apart along x, with a fix at every twentieth frame.
-fn trial(folder: &Path, index: usize, axis: [&str; 2], question: &str, errors: impl Fn(u64) -> Errors) {
+pub(crate) fn trial(folder: &Path, index: usize, axis: [&str; 2], question: &str, errors: impl Fn(u64) -> Errors) {
     let mut header = header(index, 3.0, "kabsch");
     header.trial = format!("{index:03}");
     header.axes = vec![Axis { key: axis[0].to_owned(), value: axis[1].to_owned() }];

@@ -17,3 +17,4 @@ mod reach;
 mod rows;
 mod sentences;
 mod verified;
+mod written;

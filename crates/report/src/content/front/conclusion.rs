@@ -22,9 +22,27 @@ use crate::{
     summary::RunSummary,
 };
 
-/// The clearest difference of what the question asks for, the published figures of the experiment, and the limits of the
-/// result.
-pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
+/// The clearest difference of what the question asks for if it `concludes`, the published figures of the experiment, and
+/// the limits of the result.
+pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparison], concludes: bool) -> Vec<Text> {
+    let mut shown = if concludes { differences(run, summary, comparisons) } else { Vec::new() };
+    let mut paragraphs = Vec::new();
+    let concludes = !shown.is_empty();
+    shown.extend(summary.published.iter().map(|sentence| text![sentence.clone()]));
+    if !shown.is_empty() {
+        let mut conclusion = text![if concludes { bold("Conclusion.") } else { "".into() }];
+        shown.into_iter().for_each(|sentence| {
+            conclusion.push(" ".into());
+            conclusion.extend(sentence);
+        });
+        paragraphs.push(conclusion);
+    }
+    paragraphs.push(text![bold("Limits. "), limits(run, summary)]);
+    paragraphs
+}
+
+/// The clearest difference of what the question asks for.
+fn differences(run: &Run, summary: &RunSummary, comparisons: &[Comparison]) -> Vec<Text> {
     let (kind, asked) = (Kind::of(run, summary), Asked::of(&summary.question));
     let mut shown: Vec<Text> = Vec::new();
     if asked.rate {
@@ -39,19 +57,7 @@ pub(super) fn sentences(run: &Run, summary: &RunSummary, comparisons: &[Comparis
     if accuracy {
         shown.extend(significance::sentences(run, comparisons, 1));
     }
-    let mut paragraphs = Vec::new();
-    let concludes = !shown.is_empty();
-    shown.extend(summary.published.iter().map(|sentence| text![sentence.clone()]));
-    if !shown.is_empty() {
-        let mut conclusion = text![if concludes { bold("Conclusion.") } else { "".into() }];
-        shown.into_iter().for_each(|sentence| {
-            conclusion.push(" ".into());
-            conclusion.extend(sentence);
-        });
-        paragraphs.push(conclusion);
-    }
-    paragraphs.push(text![bold("Limits. "), limits(run, summary)]);
-    paragraphs
+    shown
 }
 
 /// The difference between the highest and the lowest rate of fixes, over common attempts; `None` without any.

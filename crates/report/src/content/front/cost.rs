@@ -2,18 +2,14 @@
 
 use super::{
     contrast::Contrast,
-    measured::{Measured, capitalised},
+    measured::{capitalised, counted_median as median},
     ranking::{self, Case, Words},
 };
 use crate::{
-    content::{
-        conditions::{axes, labels::Labels},
-        phrases::{self, Unit},
-    },
+    content::conditions::{axes, labels::Labels},
     document::{Text, text},
     field::Field,
     format::placed,
-    proportion,
     run::{Run, Trial},
     summary::RunSummary,
 };
@@ -91,14 +87,4 @@ pub(super) fn conclusion(run: &Run, summary: &RunSummary) -> Option<Text> {
 /// The median number of pair tests of a trial.
 pub(super) fn tests(trial: &Trial) -> Text {
     text![median(trial, Field::Tests).number()]
-}
-
-/// The median of a count over all attempts of a trial.
-fn median(trial: &Trial, field: Field) -> Measured {
-    let mut values: Vec<f64> = trial.attempts().filter_map(|(_, row)| row.get(field)).collect();
-    let interval = proportion::median_interval(proportion::is_trajectory(&trial.header), &mut values);
-    let median = interval.map(|_| seafix_evaluation::quantile(&mut values, 0.5));
-    let ends = [interval.map(|ends| ends.0), interval.map(|ends| ends.1)];
-    let number = |name, value| phrases::statistic(trial, name, field, "attempted", value, (Unit::Plain, 0));
-    Measured::new([number("median", median), number("median-low", ends[0]), number("median-high", ends[1])], "")
 }

@@ -65,6 +65,16 @@ pub(super) fn ratios(trial: &Trial, row: &Row) -> Text {
     text![position, " / ", points]
 }
 
+/// The RMS of an error over all fixes of a trial (m); `None` for another quantity, or without bounds.
+pub(super) fn rms(row: &Row, field: Field) -> Option<f64> {
+    Some(Quantity::named(field)?.of(row.limits.as_ref()?)[0])
+}
+
+/// The RMS of an error over all fixes of a trial in multiples of its bound, with its interval; `None` for another quantity.
+pub(super) fn ratio(trial: &Trial, row: &Row, field: Field) -> Option<Measured> {
+    Some(measured(trial, row, Quantity::named(field)?))
+}
+
 /// The first and the last of sorted values: `0.996 [0.986, 1.005] to 0.998 [0.988, 1.007]`.
 fn range(values: &[Measured]) -> Text {
     let mut message = Text::new();
@@ -83,6 +93,11 @@ enum Quantity {
 }
 
 impl Quantity {
+    /// The error with a bound that this quantity is.
+    fn named(field: Field) -> Option<Self> {
+        [Self::Position, Self::Tre].into_iter().find(|quantity| quantity.field() == field)
+    }
+
     fn field(self) -> Field {
         match self {
             Self::Position => Field::Position,

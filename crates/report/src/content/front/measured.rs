@@ -12,6 +12,7 @@ use crate::{
     format::counted,
     navigation_quantity::NavigationQuantity,
     number::Number,
+    proportion,
     run::{Run, Trial},
     summary::{Distribution, Row, RunSummary},
 };
@@ -35,6 +36,43 @@ impl Measured {
     /// The value with the ends of its interval, in a unit with the space before it, such as ` %`.
     pub(super) fn new([value, low, high]: [Number; 3], unit: &'static str) -> Self {
         Self { value, ends: [low, high], unit, without: String::new() }
+    }
+
+    /// A value without an interval.
+    pub(super) fn single(value: Number, unit: &'static str) -> Self {
+        let unknown = Number { value: None, ..value.clone() };
+        Self::new([value, unknown.clone(), unknown], unit)
+    }
+
+    /// A median of `count` fixes, whose number stands in place of the interval if it is small.
+    pub(super) fn of_fixes(self, count: usize) -> Self {
+        let without = if count < MIN_FIXES { counted(count, "fix", "fixes") } else { String::new() };
+        Self { without, ..self }
+    }
+
+    /// The same with another unit.
+    pub(super) fn with_unit(self, unit: &'static str) -> Self {
+        Self { unit, ..self }
+    }
+
+    /// The same with another number, such as the same value under another key.
+    pub(super) fn with_number(self, value: Number) -> Self {
+        Self { value, ..self }
+    }
+
+    /// The unit with the space before it.
+    pub(super) fn unit(&self) -> &'static str {
+        self.unit
+    }
+
+    /// The numbers at the ends of the interval; unknown for a value without one.
+    pub(super) fn ends(&self) -> [Number; 2] {
+        self.ends.clone()
+    }
+
+    /// Whether an interval, or words in its place, follow the value in a text.
+    pub(super) fn has_ends(&self) -> bool {
+        self.interval().is_some() || !self.without.is_empty()
     }
 
     /// The value before rounding, in its unit; NaN where it is unknown.
@@ -153,9 +191,24 @@ pub(super) fn median_of(
     (unit, suffix): (Unit, &'static str),
 ) -> Measured {
     let digits = phrases::decimals(summary.rows.iter().map(|row| of(row).map(|s| s.median)), unit);
+    median_with(trial, field, (unit, digits), suffix)
+}
+
+/// The median of a quantity over the fixes of a trial, with a number of decimals; too few fixes are named in place of an
+/// interval.
+pub(super) fn median_with(trial: &Trial, field: Field, unit: (Unit, usize), suffix: &'static str) -> Measured {
     let count = trial.attempts().filter(|(_, row)| row.found() && row.get(field).is_some()).count();
-    let without = if count < MIN_FIXES { counted(count, "fix", "fixes") } else { String::new() };
-    Measured { without, ..Measured::new(phrases::median(trial, field, (unit, digits)), suffix) }
+    Measured::new(phrases::median(trial, field, unit), suffix).of_fixes(count)
+}
+
+/// The median of a count over all attempts of a trial.
+pub(super) fn counted_median(trial: &Trial, field: Field) -> Measured {
+    let mut values: Vec<f64> = trial.attempts().filter_map(|(_, row)| row.get(field)).collect();
+    let interval = proportion::median_interval(proportion::is_trajectory(&trial.header), &mut values);
+    let median = interval.map(|_| seafix_evaluation::quantile(&mut values, 0.5));
+    let ends = [interval.map(|ends| ends.0), interval.map(|ends| ends.1)];
+    let number = |name, value| phrases::statistic(trial, name, field, "attempted", value, (Unit::Plain, 0));
+    Measured::new([number("median", median), number("median-low", ends[0]), number("median-high", ends[1])], "")
 }
 
 /// The root mean square of a navigated error over the frames of a part of a trial.

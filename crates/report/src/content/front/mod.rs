@@ -2,6 +2,7 @@
 
 mod acceptance;
 mod along;
+mod authored;
 mod cases;
 mod cells;
 mod company;
@@ -35,18 +36,25 @@ use crate::{
 };
 use kind::{Asked, Kind};
 
+pub(crate) use authored::{Authored, Checked};
+
 /// The blocks of the first page; the main figure is taken from the section that has it.
+///
+/// A written answer takes the place of the generated answer and conclusion.
 pub(crate) fn blocks(
     run: &Run,
     summary: &RunSummary,
     comparisons: &[Comparison],
     sections: &mut [Section],
+    authored: Option<&Authored>,
 ) -> Vec<Block> {
-    let mut blocks = vec![Block::Paragraph(emphasised(answer(run, summary)))];
+    let text = authored.map_or_else(|| answer(run, summary), |authored| authored.text.clone());
+    let mut blocks = vec![Block::Paragraph(emphasised(text))];
     let figures = Kind::of(run, summary).figures(Asked::of(&summary.question));
     blocks.extend(figure::take(figures, sections));
     blocks.extend(table::block(run, summary));
-    blocks.extend(conclusion::sentences(run, summary, comparisons).into_iter().map(Block::Paragraph));
+    blocks
+        .extend(conclusion::sentences(run, summary, comparisons, authored.is_none()).into_iter().map(Block::Paragraph));
     blocks
 }
 

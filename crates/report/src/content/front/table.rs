@@ -6,7 +6,7 @@ use super::{
     cells::{LINES, rate_of, without_unit},
     contrast::Contrast,
     grid,
-    kind::Kind,
+    kind::{Asked, Kind},
     limited,
     measured::{Sample, error, median, navigated_rms},
 };
@@ -65,11 +65,17 @@ fn table(run: &Run, summary: &RunSummary, lines: Vec<(String, Vec<usize>)>) -> T
         let what = if navigates { "error of fixes" } else { error(summary).0 };
         heads.push(Head::numbers(format!("median {what} (mm)")));
     }
+    let drifts = navigates && single && Asked::of(&summary.question).drift;
     if navigates && single {
-        heads.push(Head::numbers("navigated error RMS (mm)"));
+        heads.extend(["navigated error RMS (mm)", "odometry alone RMS (mm)"].map(Head::numbers));
+    }
+    if drifts {
+        heads.push(Head::numbers("drift between fixes (mm/m)"));
     }
     let errors = match (single, navigates) {
-        (true, true) => ", median errors of the fixes, and RMS errors of the navigated pose",
+        (true, true) => {
+            ", median errors of the fixes, and RMS errors of the navigated pose and of odometry alone from the first fix"
+        }
         (true, false) => " and median errors of the fixes",
         _ => "",
     };
@@ -107,8 +113,16 @@ fn table(run: &Run, summary: &RunSummary, lines: Vec<(String, Vec<usize>)>) -> T
             cells.push(Cell { text: shown, ..Cell::default() });
             if navigates {
                 let trial = &run.trials[*index];
-                let rms = navigated_rms(trial, NavigationQuantity::Position, trial.span());
-                let shown = if rms.value().is_nan() { text!["–"] } else { without_unit(rms.text()) };
+                for quantity in [NavigationQuantity::Position, NavigationQuantity::AlonePosition] {
+                    let rms = navigated_rms(trial, quantity, trial.span());
+                    let shown = if rms.value().is_nan() { text!["–"] } else { without_unit(rms.text()) };
+                    cells.push(Cell { text: shown, ..Cell::default() });
+                }
+            }
+            if drifts {
+                let drift = navigation::drift_per_metre(&run.trials[*index]);
+                let shown =
+                    drift.map_or_else(|| text!["–"], |[all, low, high, _]| text![all, " (", low, " to ", high, ")"]);
                 cells.push(Cell { text: shown, ..Cell::default() });
             }
         }

@@ -90,9 +90,14 @@ pub(crate) fn inspects(trial: &Trial) -> bool {
     trial.header.configuration.contains("kind = \"inspection\"")
 }
 
+/// The points of interest in view of any frame.
+pub(crate) fn points(trial: &Trial) -> Vec<String> {
+    distinct(trial.views().map(|point| trial.point(point).to_owned()))
+}
+
 /// The points of interest with the smallest and the largest median error; `None` for fewer than two.
 pub(crate) fn extremes(trial: &Trial) -> Option<[String; 2]> {
-    let points = distinct(trial.views().map(|point| trial.point(point).to_owned()));
+    let points = points(trial);
     let median = |point: &String| {
         let mut errors = errors(trial, point);
         (!errors.is_empty()).then(|| seafix_evaluation::quantile(&mut errors, 0.5))

@@ -2,6 +2,7 @@
 
 pub(crate) mod ablation;
 pub(crate) mod breakdown;
+pub(crate) mod claims;
 pub(crate) mod data;
 pub(crate) mod failures;
 pub(crate) mod hypotheses;

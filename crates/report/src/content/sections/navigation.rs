@@ -282,7 +282,13 @@ pub(crate) fn statistic(trial: &Trial, name: &str, quantity: NavigationQuantity,
 }
 
 /// A statistic of a quantity over the frames of a part of a trial that have it.
-fn statistic_over(trial: &Trial, span: [u64; 2], name: &str, quantity: NavigationQuantity, unit: Unit) -> Number {
+pub(crate) fn statistic_over(
+    trial: &Trial,
+    span: [u64; 2],
+    name: &str,
+    quantity: NavigationQuantity,
+    unit: Unit,
+) -> Number {
     let mut values = over(trial, quantity, span);
     let n = values.len() as f64;
     let value = match name {
