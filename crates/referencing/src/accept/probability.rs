@@ -7,7 +7,7 @@ use crate::{
     a_contrario::{AContrario, absence::by_nfa, expected_sets},
     problem::{Correspondence, Problem},
     search::{
-        consensus::edge_nfa::ln_nfa_of,
+        consensus::edge_nfa::{Counted, of_counted},
         feature_pose::fitted,
         features::FeatureSet,
         identification::Identification,
@@ -40,9 +40,13 @@ impl Probability {
 
     /// The probabilities of points and edges that a search counted; as [`counted`](Self::counted) without edges.
     pub(super) fn counted_features(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspondence]) -> Self {
-        match nfa_of_features(problem, pairs, edges) {
+        match counted_of(problem, pairs, edges) {
             None => Self::counted(problem, pairs),
-            Some(all) => Self::of(by_nfa(all.min(expected_sets(problem, pairs))), 0.0),
+            // As for a search with a posterior: the most probable kind of absence holds.
+            Some(of) => {
+                let by_number = by_nfa(libm::exp(of.ln_nfa).min(expected_sets(problem, pairs)));
+                Self::of(larger(by_number, by_nfa(libm::exp(-of.ln_evidence))), 0.0)
+            }
         }
     }
 
@@ -63,15 +67,15 @@ impl Probability {
     pub(super) const NOTHING_FOUND: Self = Self { absent: 0.5, wrong: 1.0 };
 }
 
-/// The number of false alarms of points and edges that a search counted, about their pose; `None` without edges, without
-/// a prior, and for features that determine no pose.
-fn nfa_of_features(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspondence]) -> Option<f64> {
+/// What speaks for points and edges that a search counted, about their pose; `None` without edges, without a prior, and
+/// for features that determine no pose.
+fn counted_of(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspondence]) -> Option<Counted> {
     if edges.is_empty() {
         return None;
     }
     let set = FeatureSet { points: pairs.to_vec(), edges: edges.to_vec() };
     let (pose, _) = fitted(problem, &set, None)?;
-    ln_nfa_of(problem, &set, &pose.inverse()).map(libm::exp)
+    of_counted(problem, &set, &pose.inverse())
 }
 
 /// What is known of a set of pairs: the parts of which its probabilities are made.
@@ -102,7 +106,7 @@ impl<'a> Evidence<'a> {
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
         let nfa_with_edges = match &found.posterior {
             Some(_) => ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp),
-            None => nfa_of_features(problem, &found.pairs, &found.edges),
+            None => counted_of(problem, &found.pairs, &found.edges).map(|of| libm::exp(of.ln_nfa)),
         };
         let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
         let nfa_independent = support.map(|support| libm::exp(support.ln_nfa));

@@ -15,6 +15,15 @@ use super::{
 };
 use crate::{problem::Problem, search::features::FeatureSet};
 
+/// What speaks for a set that a search counted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counted {
+    /// ln of the number of false alarms.
+    pub(crate) ln_nfa: f64,
+    /// ln of the evidence of the pose against clutter alone.
+    pub(crate) ln_evidence: f64,
+}
+
 /// Number of steps from the pose of a set to that with its prior.
 const STEPS: usize = 4;
 
@@ -38,15 +47,15 @@ pub(in crate::search) fn ln_nfa(joined: &Joined<'_>, mode: &Mode) -> Option<f64>
     Some(min + libm::log(GATES.len() as f64))
 }
 
-/// [`ln_nfa`] of a set with edges that a search counted, about a pose of the set.
+/// [`ln_nfa`] of a set with edges that a search counted, about a pose of the set, and the evidence (nats) of the set.
 ///
 /// Pairs that the prior's largest rotation excludes do not count. `None` without a prior, and for a set that fits no
 /// motion.
-pub(crate) fn ln_nfa_of(
+pub(crate) fn of_counted(
     problem: &Problem<'_>,
     set: &FeatureSet,
     camera_from_object: &Transform<Camera, Object>,
-) -> Option<f64> {
+) -> Option<Counted> {
     let prior_terms = PriorTerms::of(problem)?;
     prior_terms.known.as_ref()?;
     let graph = ConsistencyGraph::of(problem, &prior_terms);
@@ -66,16 +75,9 @@ pub(crate) fn ln_nfa_of(
     let members: Vec<usize> = points.collect();
     let of_edges = (0..edges.vertices.len()).filter(|&v| set.edges.binary_search(&edges.vertices[v].pair).is_ok());
     let of_edges: Vec<usize> = of_edges.collect();
-    let (motion, _) = joined.fit(&members, &of_edges, &Motion::of(camera_from_object), STEPS)?;
-    let mode = Mode {
-        members,
-        edges: of_edges,
-        motion,
-        ln_evidence: f64::NAN,
-        ln_even: f64::NAN,
-        ln_clutter_density: f64::NAN,
-    };
-    ln_nfa(&joined, &mode)
+    let (motion, factor) = joined.fit(&members, &of_edges, &Motion::of(camera_from_object), STEPS)?;
+    let mode = joined.mode(members, of_edges, motion, &factor)?;
+    Some(Counted { ln_nfa: ln_nfa(&joined, &mode)?, ln_evidence: mode.ln_evidence })
 }
 
 /// The number of members of a mode within a gate.

@@ -230,6 +230,9 @@ fn print_the_table_of_edges() {
             ("absent, wide prior", Frame { present: false, clutter: (60, 30), ..WIDE }),
             ("absent, parallel", Frame { present: false, clutter: (60, 30), parallel: true, ..SEEN }),
         ] {
+            if std::env::var("ONLY").is_ok_and(|only| !format!("{by}, {name}").contains(&only)) {
+                continue;
+            }
             let frames = std::env::var("FRAMES").ok().and_then(|frames| frames.parse().ok()).unwrap_or(300);
             let start = std::time::Instant::now();
             let counts = tally_by(&*search, frame, frames, 7);
