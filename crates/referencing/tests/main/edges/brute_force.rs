@@ -279,8 +279,8 @@ fn compared(seed: u64, orientation: bool) -> Option<usize> {
     Some(size)
 }
 
-/// Fails if the bound of the number of edges is one too small, if the last line is omitted, and if the triples of three
-/// edges are not tested for mirror images.
+/// Fails if the last line is omitted, if the sign of the distance of two edges is ignored, and if triples with an edge are
+/// not tested for mirror images.
 #[test]
 fn exact_searches_with_edges_are_brute_force() {
     let sizes: Vec<usize> = (0..600).flat_map(|seed| [false, true].map(|by| compared(seed, by))).flatten().collect();
