@@ -192,7 +192,7 @@ mod tests {
 
     /// Fails if the place along the edge is not compared.
     #[test]
-    fn a_point_tells_an_edge_from_another_place_on_its_line() {
+    fn a_point_distinguishes_an_edge_from_another_place_on_its_line() {
         let at = Vector3::new(0.4, 0.2, 0.1);
         let (place, noise) = ((pose() * Point::from(at)).coords, Matrix3::identity() * 1e-6);
         let agrees = |part| point_agrees_along(&at, (&place, &noise), &pair(0, part, false), 3.0);

@@ -1,7 +1,5 @@
 //! Maximum clique: the largest admissible set, with a proof.
 
-mod with_edges;
-
 use rand::Rng;
 use seafix_component::{Component, Settings};
 use serde::{Deserialize, Serialize};
@@ -13,6 +11,7 @@ use super::{
     grow::{feasible, so_far},
     identification::{Identification, Rejected, Search},
     limits::{BUDGET, MAX_TIES, NEEDED, bounded},
+    maximum_clique_edges,
     orientation::{Sense, unmirrored, wholly_mirrored},
 };
 use crate::{
@@ -83,7 +82,7 @@ impl Search for MaximumClique {
 
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         if problem.edges.with_candidates() > 0 {
-            return with_edges::search(self, problem);
+            return maximum_clique_edges::search(self, problem);
         }
         feasible(problem, self.max_pairs)?;
         let budget = self.budget;

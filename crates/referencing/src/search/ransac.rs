@@ -1,7 +1,5 @@
 //! RANSAC: poses of random triples.
 
-mod with_edges;
-
 use rand::{Rng, RngExt};
 use seafix_component::{Component, Settings, in_range};
 use serde::{Deserialize, Serialize};
@@ -12,6 +10,7 @@ use super::{
     identification::{Identification, Rejected, Search},
     limits::{BUDGET, NEEDED, bounded},
     pose::{fitted, fraction, refined},
+    ransac_edges,
 };
 use crate::problem::{Correspondence, Problem};
 
@@ -73,7 +72,7 @@ impl Search for Ransac {
 
     fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         if problem.edges.with_candidates() > 0 {
-            return with_edges::search(self, problem, rng);
+            return ransac_edges::search(self, problem, rng);
         }
         feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);

@@ -57,7 +57,7 @@ impl Brute<'_> {
     }
 
     /// Whether a value is at most a bound, up to rounding.
-    fn at_most(&mut self, value: f64, bound: f64) -> bool {
+    fn up_to(&mut self, value: f64, bound: f64) -> bool {
         self.doubtful |= (value - bound).abs() < ROUNDING;
         value <= bound
     }
@@ -66,14 +66,14 @@ impl Brute<'_> {
         let ([known_a, seen_a], [known_b, seen_b]) = (self.places(a), self.places(b));
         match (known_a, seen_a, known_b, seen_b) {
             (Place::Point(p), Place::Point(c), Place::Point(q), Place::Point(d)) => {
-                self.at_most(((p - q).norm() - (c - d).norm()).abs(), DELTA)
+                self.up_to(((p - q).norm() - (c - d).norm()).abs(), DELTA)
             }
             (Place::Point(p), Place::Point(c), Place::Line(e, f), Place::Line(g, h))
             | (Place::Line(e, f), Place::Line(g, h), Place::Point(p), Place::Point(c)) => {
                 let away =
                     |p: Vector3<f64>, e: Vector3<f64>, f: Vector3<f64>| (p - e).cross(&(f - e).normalize()).norm();
                 let foot = |p: Vector3<f64>, e: Vector3<f64>, f: Vector3<f64>| (p - e).dot(&(f - e).normalize());
-                self.at_most((away(p, e, f) - away(c, g, h)).abs(), DISTANCE)
+                self.up_to((away(p, e, f) - away(c, g, h)).abs(), DISTANCE)
                     && self.overlap((f - e).norm(), (h - g).norm(), foot(p, e, f), foot(c, g, h), DISTANCE)
             }
             (Place::Line(a, b), Place::Line(c, d), Place::Line(e, f), Place::Line(g, h)) => {
@@ -88,17 +88,17 @@ impl Brute<'_> {
         // The line's ends along the edge.
         let (low, high) = (known - seen, known - seen + line);
         let needed = OVERLAP * edge.min(line);
-        self.at_most(needed - slack, edge - low) && self.at_most(needed - slack, high)
+        self.up_to(needed - slack, edge - low) && self.up_to(needed - slack, high)
     }
 
     fn edges_agree(&mut self, known: [[Vector3<f64>; 2]; 2], seen: [[Vector3<f64>; 2]; 2]) -> bool {
         let along = |of: [[Vector3<f64>; 2]; 2]| of.map(|[a, b]| (b - a).normalize());
         let ([d, e], [u, v]) = (along(known), along(seen));
-        if !self.at_most((d.angle(&e) - u.angle(&v)).abs(), ANGLE) {
+        if !self.up_to((d.angle(&e) - u.angle(&v)).abs(), ANGLE) {
             return false;
         }
         let (sine, sine_seen) = (d.cross(&e).norm(), u.cross(&v).norm());
-        let parallel = self.at_most(sine, PARALLEL) | self.at_most(sine_seen, PARALLEL);
+        let parallel = self.up_to(sine, PARALLEL) | self.up_to(sine_seen, PARALLEL);
         if parallel {
             return self.parallel_agree(known, seen, sine);
         }
@@ -107,7 +107,7 @@ impl Brute<'_> {
         };
         let (of_model, of_lines) = (signed(known, d, e), signed(seen, u, v));
         let off = if self.orientation { of_model - of_lines } else { of_model.abs() - of_lines.abs() };
-        if !self.at_most(off.abs(), DISTANCE) {
+        if !self.up_to(off.abs(), DISTANCE) {
             return false;
         }
         // The feet of the common perpendicular: a + s d − b − t e is orthogonal to both.
@@ -129,7 +129,7 @@ impl Brute<'_> {
         for (one, other) in [(0, 1), (1, 0)] {
             let off = (distance(known[one], known[other]) - distance(seen[one], seen[other])).abs();
             let slope = sine * (length(known[other]) + length(seen[other])) / 2.0;
-            if !self.at_most(off, DISTANCE + slope) {
+            if !self.up_to(off, DISTANCE + slope) {
                 return false;
             }
         }
@@ -145,7 +145,7 @@ impl Brute<'_> {
             let needed = OVERLAP * (y.1 - y.0).min(x.1 - x.0);
             common = (common.0.max(x.0 + needed - y.1), common.1.min(x.1 - needed - y.0));
         }
-        self.at_most(common.0, common.1 + DISTANCE + sine * (length(known[0]) + length(known[1])))
+        self.up_to(common.0, common.1 + DISTANCE + sine * (length(known[0]) + length(known[1])))
     }
 
     /// Whether a subset of the set with its last member is a mirror image.
@@ -190,7 +190,7 @@ impl Brute<'_> {
             _ => ANGLE,
         };
         let [known, seen] = volumes.into_iter().max_by(|a, b| a[0].abs().total_cmp(&b[0].abs())).expect("a volume");
-        let decisive = !self.at_most(known.abs(), floor);
+        let decisive = !self.up_to(known.abs(), floor);
         self.doubtful |= decisive && seen.abs() < ROUNDING;
         decisive && known * seen <= 0.0
     }

@@ -28,12 +28,12 @@ fn order(count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
 
 /// The registry: a search states that it uses edges if it does. Fails if `ransac` does not.
 #[test]
-fn a_search_with_edges_says_so_in_the_catalogue() {
+fn a_search_with_edges_states_so_in_the_catalogue() {
     let named: Vec<&str> = searches().iter().map(|(name, _)| *name).collect();
     assert_eq!(named, ["maximum-clique", "ransac", "rigid-consensus"]);
     for listing in SEARCHES.listings() {
-        let says = listing.properties.iter().any(|(key, value)| *key == "features" && value.contains("edges"));
-        assert_eq!(says, named.contains(&listing.name), "{}", listing.name);
+        let states = listing.properties.iter().any(|(key, value)| *key == "features" && value.contains("edges"));
+        assert_eq!(states, named.contains(&listing.name), "{}", listing.name);
     }
 }
 

@@ -5,7 +5,7 @@ use rand::{Rng, RngExt};
 use seafix_geometry::{Camera, Object, Transform};
 use smallvec::SmallVec;
 
-use super::Ransac;
+use super::ransac::Ransac;
 use crate::{
     problem::Problem,
     search::{

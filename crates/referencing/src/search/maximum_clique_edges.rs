@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::MaximumClique;
+use super::maximum_clique::MaximumClique;
 use crate::{
     edge_coherence::PARALLEL,
     problem::Problem,
