@@ -65,7 +65,7 @@ const TOLERANCE: Tolerance = Tolerance::Sigmas(3.0);
 /// With `delta` but neither `covariances` nor `sigma`, the standard deviation is Δ / (3 √2): at that noise nearly all
 /// true pairs agree.
 ///
-/// The search ``rigid-consensus`` identifies edges and the solver ``mahalanobis`` uses them; others use points alone.
+/// The searches ``rigid-consensus``, ``maximum-clique`` and ``ransac`` identify edges and the solver ``mahalanobis`` uses them; others use points alone.
 ///
 /// References
 /// ----------

@@ -7,8 +7,8 @@ use crate::space_line::SpaceLine;
 /// Sine of the angle below which two edges count as parallel, so that their shortest distance is undefined.
 pub(crate) const PARALLEL: f64 = 0.2;
 /// Tolerances (rad, m) for the errors of the model.
-const ANGLE_FLOOR: f64 = 0.02;
-const DISTANCE_FLOOR: f64 = 5e-3;
+pub(crate) const ANGLE_FLOOR: f64 = 0.02;
+pub(crate) const DISTANCE_FLOOR: f64 = 5e-3;
 
 /// The sine of the angle between two model edges if it and their shortest distance agree with those of the measured
 /// lines, each within `sigmas` of its own standard deviations; `None` if they do not.
@@ -53,27 +53,34 @@ pub(crate) fn point_agrees(
 }
 
 /// The relation of two lines in space.
-struct Relation {
+pub(crate) struct Relation {
     /// From 0 to π/2.
     angle: f64,
-    sine: f64,
-    /// The shortest distance of the lines.
-    distance: f64,
+    /// The sine and the cosine of the angle between the directions.
+    pub(crate) sine: f64,
+    pub(crate) cosine: f64,
+    /// The shortest distance of the lines, positive if the second passes on the side of d × e.
+    pub(crate) signed: f64,
+    /// Its magnitude.
+    pub(crate) distance: f64,
     /// The places of the shortest distance, along each direction from its origin.
-    feet: [f64; 2],
+    pub(crate) feet: [f64; 2],
 }
 
 impl Relation {
-    fn of([a, b]: [&Vector3<f64>; 2], [d, e]: [Vector3<f64>; 2]) -> Self {
+    pub(crate) fn of([a, b]: [&Vector3<f64>; 2], [d, e]: [Vector3<f64>; 2]) -> Self {
         let normal = d.cross(&e);
         let (sine, cosine) = (normal.norm(), d.dot(&e));
         let step = b - a;
         let square = (sine * sine).max(1e-12);
         let (x, y) = (step.dot(&d), step.dot(&e));
+        let signed = step.dot(&normal) / sine.max(1e-6);
         Self {
             angle: libm::atan2(sine, cosine.abs()),
             sine,
-            distance: step.dot(&normal).abs() / sine.max(1e-6),
+            cosine,
+            signed,
+            distance: signed.abs(),
             feet: [(x - cosine * y) / square, (cosine * x - y) / square],
         }
     }
@@ -84,7 +91,7 @@ fn block(line: &SpaceLine, i: usize, k: usize) -> Matrix2<f64> {
 }
 
 /// The variance (rad²) of a line's direction in the plane that it spans with another.
-fn angular_variance(line: &SpaceLine, other: &SpaceLine) -> f64 {
+pub(crate) fn angular_variance(line: &SpaceLine, other: &SpaceLine) -> f64 {
     let in_plane = other.direction - line.direction * line.direction.dot(&other.direction);
     let toward = in_plane.try_normalize(1e-6).unwrap_or(line.across[0]);
     let u = Vector2::new(line.across[0].dot(&toward), line.across[1].dot(&toward));
@@ -93,7 +100,7 @@ fn angular_variance(line: &SpaceLine, other: &SpaceLine) -> f64 {
 }
 
 /// The variance (m²) of a line's offset along a normal at a distance (m) from its first end.
-fn offset_variance(line: &SpaceLine, normal: &Vector3<f64>, at: f64) -> f64 {
+pub(crate) fn offset_variance(line: &SpaceLine, normal: &Vector3<f64>, at: f64) -> f64 {
     let s = at / line.length();
     let u = Vector2::new(line.across[0].dot(normal), line.across[1].dot(normal));
     let mixed = block(line, 0, 1) + block(line, 1, 0);

@@ -161,7 +161,7 @@ impl Problem<'_> {
     }
 
     /// The number of standard deviations of the tolerance; three for a fixed one.
-    fn sigmas(&self) -> f64 {
+    pub(crate) fn sigmas(&self) -> f64 {
         match self.tolerance {
             Tolerance::Sigmas(sigmas) => sigmas,
             Tolerance::Fixed(_) => 3.0,

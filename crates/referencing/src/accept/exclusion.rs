@@ -54,7 +54,7 @@ impl Judge<'_> {
             }
             let mut fitting: Vec<Hypothesis> = all.into_iter().filter(|fewer| self.residuals(fewer).is_ok()).collect();
             if !fitting.is_empty() {
-                fitting.retain(|fewer| !fewer.edges.is_empty() || self.a_contrario(&fewer.pairs).is_ok());
+                fitting.retain(|fewer| self.a_contrario(&fewer.pairs, &fewer.edges).is_ok());
                 return fitting;
             }
         }

@@ -20,7 +20,7 @@ use crate::{
     chi_square::chi_square,
     observations::Observations,
     problem::{Correspondence, Prior, PriorBound, Problem},
-    search::{grow::elsewhere, identification::Identification},
+    search::{feature_sets, features::FeatureSet, grow::elsewhere, identification::Identification},
     site::model::ModelPoint,
     solve::{
         covariance::association::association,
@@ -37,7 +37,7 @@ pub(super) struct Judge<'a> {
     pub(super) acceptance: &'a Acceptance,
     /// The distance (m, RMS over the model points) beyond which two poses are different answers.
     pub(super) alert_limit: f64,
-    /// The number of pairs of the largest tested set.
+    /// The number of pairs of the largest tested set; of points and edges if the search counts.
     pub(super) largest: usize,
     /// Whether a search selected the sets, so that false alarms are possible.
     pub(super) searched: bool,
@@ -60,11 +60,17 @@ impl Judge<'_> {
     }
 
     /// Whether a set that a search counted is improbable to be a false alarm.
-    pub(super) fn a_contrario(&self, pairs: &[Correspondence]) -> Result<(), RejectionReason> {
-        match self.searched {
-            true => self.present(Probability::counted(self.problem, pairs).wrong, pairs.len()),
-            false => Ok(()),
+    ///
+    /// A search that weighs evidence has weighed a set with edges.
+    pub(super) fn a_contrario(
+        &self,
+        pairs: &[Correspondence],
+        edges: &[Correspondence],
+    ) -> Result<(), RejectionReason> {
+        if !self.searched || (!edges.is_empty() && self.near.is_some()) {
+            return Ok(());
         }
+        self.present(Probability::counted_features(self.problem, pairs, edges).wrong, pairs.len())
     }
 
     /// The outcome of the set and its alternatives: one pose, several, or none.
@@ -80,7 +86,8 @@ impl Judge<'_> {
             }
         };
         let mut full: Vec<(usize, Hypothesis)> = Vec::new();
-        let others = found.alternatives.iter().map(|pairs| (pairs, &[][..]));
+        let edges_of = |place: usize| found.alternative_edges.get(place).map_or(&[][..], Vec::as_slice);
+        let others = found.alternatives.iter().enumerate().map(|(place, pairs)| (pairs, edges_of(place)));
         let sets = std::iter::once((&found.pairs, &found.edges[..])).chain(others);
         for (place, (pairs, edges)) in sets.enumerate() {
             match self.hypothesis_of(pairs, edges) {
@@ -159,8 +166,14 @@ impl Judge<'_> {
     /// It applies if the search returned no alternative. The other pose consists of pairs that contradict the fix. If
     /// it passes every test with a score no lower than the fix's, the outcome is ambiguous.
     pub(super) fn against_elsewhere(&self, fix: Box<Fix>) -> (Outcome, Option<Alternative>) {
-        let sets = elsewhere(self.problem, &fix.object_from_camera);
-        let others = sets.iter().filter_map(|pairs| self.hypothesis(pairs).ok());
+        let sets = match fix.edges.is_empty() {
+            true => elsewhere(self.problem, &fix.object_from_camera)
+                .into_iter()
+                .map(|points| FeatureSet { points, edges: Vec::new() })
+                .collect(),
+            false => feature_sets::elsewhere(self.problem, &fix.object_from_camera),
+        };
+        let others = sets.iter().filter_map(|set| self.hypothesis_of(&set.points, &set.edges).ok());
         let apart = others.filter(|other| self.apart(&fix.object_from_camera, &other.pose));
         let Some(mut other) = apart.min_by(by_score) else { return (Outcome::Fix(fix), None) };
         let stands = other.score >= fix.score
@@ -214,7 +227,9 @@ impl Judge<'_> {
         let data = self.observations(pairs, edges);
         let pose = self.solve(&data)?;
         let likelihood = likelihood::maximum(&data, &pose);
-        let fewer = self.largest.saturating_sub(pairs.len()) as f64 * chi_square(3, self.acceptance.confidence);
+        // A search that counts has counted the edges; another weighs them.
+        let size = pairs.len() + if self.near.is_none() { edges.len() } else { 0 };
+        let fewer = self.largest.saturating_sub(size) as f64 * chi_square(3, self.acceptance.confidence);
         let of = |pose, likelihood: Likelihood| {
             let score = -0.5 * (likelihood.cost + fewer + self.off_prior(&likelihood.pose));
             let (pairs, edges) = (pairs.to_vec(), edges.to_vec());

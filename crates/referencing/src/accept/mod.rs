@@ -81,9 +81,10 @@ pub fn judge(
     let alert_limit = alert_limit(problem.model, acceptance);
     let found = match solver.takes_edges() {
         true => found,
-        false => Identification { edges: Vec::new(), ..found },
+        false => Identification { edges: Vec::new(), alternative_edges: Vec::new(), ..found },
     };
     let largest = std::iter::once(&found.pairs).chain(&found.alternatives).map(Vec::len).max().unwrap_or(0);
+    let largest = if found.posterior.is_none() { largest.max(found.pairs.len() + found.edges.len()) } else { largest };
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
     let supported = found.posterior.as_ref().is_some_and(|posterior| posterior.support.is_some());
@@ -139,7 +140,7 @@ pub fn judge(
         Outcome::Rejected(_) => judge.best_pose(&found.pairs, &found.edges),
     };
     // A proof for the complete set does not hold for a subset.
-    let thinned = matches!(&outcome, Outcome::Fix(fix) if fix.pairs.len() < found.pairs.len());
+    let thinned = matches!(&outcome, Outcome::Fix(fix) if fix.pairs.len() < found.pairs.len() || fix.edges.len() < found.edges.len());
     Attempt {
         nfa: Some(nfa),
         p_absent: Some(probability.absent),

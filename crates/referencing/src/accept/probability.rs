@@ -7,6 +7,9 @@ use crate::{
     a_contrario::{AContrario, absence::by_nfa, expected_sets},
     problem::{Correspondence, Problem},
     search::{
+        consensus::edge_nfa::{Counted, of_counted},
+        feature_pose::fitted,
+        features::FeatureSet,
         identification::Identification,
         limits::NEEDED,
         posterior::{COPY, PosteriorProbabilities},
@@ -35,6 +38,18 @@ impl Probability {
         Self::of(by_nfa(expected_sets(problem, pairs)), 0.0)
     }
 
+    /// The probabilities of points and edges that a search counted; as [`counted`](Self::counted) without edges.
+    pub(super) fn counted_features(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspondence]) -> Self {
+        match counted_of(problem, pairs, edges) {
+            None => Self::counted(problem, pairs),
+            // As for a search with a posterior: the most probable kind of absence holds.
+            Some(of) => {
+                let by_number = by_nfa(libm::exp(of.ln_nfa).min(expected_sets(problem, pairs)));
+                Self::of(larger(by_number, by_nfa(libm::exp(-of.ln_evidence))), 0.0)
+            }
+        }
+    }
+
     /// The probabilities for one of `count` poses between which the data do not decide.
     pub(super) fn among(self, count: usize) -> Self {
         Self::of(self.absent, 1.0 - 1.0 / count.max(1) as f64)
@@ -52,12 +67,23 @@ impl Probability {
     pub(super) const NOTHING_FOUND: Self = Self { absent: 0.5, wrong: 1.0 };
 }
 
+/// What speaks for points and edges that a search counted, about their pose; `None` without edges, without a prior, and
+/// for features that determine no pose.
+fn counted_of(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspondence]) -> Option<Counted> {
+    if edges.is_empty() {
+        return None;
+    }
+    let set = FeatureSet { points: pairs.to_vec(), edges: edges.to_vec() };
+    let (pose, _) = fitted(problem, &set, None)?;
+    of_counted(problem, &set, &pose.inverse())
+}
+
 /// What is known of a set of pairs: the parts of which its probabilities are made.
 pub(super) struct Evidence<'a> {
     problem: &'a Problem<'a>,
     pairs: &'a [Correspondence],
-    /// The number of identified edges.
-    edges: usize,
+    /// The identified edges.
+    edges: &'a [Correspondence],
     /// The number of false alarms of points and edges together.
     nfa_with_edges: Option<f64>,
     /// The number of false alarms by independent pairs of a large putative set.
@@ -78,13 +104,16 @@ impl<'a> Evidence<'a> {
     ) -> Self {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(problem.model, limit));
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
-        let nfa_with_edges = ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp);
+        let nfa_with_edges = match &found.posterior {
+            Some(_) => ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp),
+            None => counted_of(problem, &found.pairs, &found.edges).map(|of| libm::exp(of.ln_nfa)),
+        };
         let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
         let nfa_independent = support.map(|support| libm::exp(support.ln_nfa));
         Self {
             problem,
             pairs: &found.pairs,
-            edges: found.edges.len(),
+            edges: &found.edges,
             nfa_with_edges,
             nfa_independent,
             posterior,
@@ -100,7 +129,7 @@ impl<'a> Evidence<'a> {
     /// The probabilities of the answer.
     pub(super) fn probability(&self) -> Probability {
         match self.posterior {
-            None => Probability::counted(self.problem, self.pairs),
+            None => Probability::counted_features(self.problem, self.pairs, self.edges),
             Some(posterior) => self.weighted(&posterior),
         }
     }
@@ -149,7 +178,7 @@ impl<'a> Evidence<'a> {
         let unseen = (absent * NEEDED as f64 / (self.problem.model.len() + 1) as f64).min(1.0);
         // Too few edges as well: one at most.
         let edges = self.problem.edges.with_candidates() as f64;
-        let unseen = if self.edges > 0 { unseen * (2.0 / (edges + 1.0)).min(1.0) } else { unseen };
+        let unseen = if self.edges.is_empty() { unseen } else { unseen * (2.0 / (edges + 1.0)).min(1.0) };
         let permuted = by_nfa(self.a_contrario.at_their_pose());
         let absent_by_any = larger(larger(absent, permuted), by_nfa(self.nfa()));
         let present = 1.0 - absent;

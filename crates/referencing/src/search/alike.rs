@@ -61,7 +61,7 @@ pub(super) fn slack(problem: &Problem<'_>, pair: Correspondence) -> f64 {
 }
 
 /// The maximum number of points along one line through two of them.
-fn largest_along_a_line(points: &[Vector3<f64>]) -> usize {
+pub(super) fn largest_along_a_line(points: &[Vector3<f64>]) -> usize {
     let extent = points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f64::max);
     let mut max = points.len().min(2);
     for (i, a) in points.iter().enumerate() {

@@ -1,8 +1,10 @@
 //! The consistency graph: candidate pairs as vertices, structural coherence as edges.
 
+use std::ops::Range;
+
 use seafix_geometry::Point;
 
-use super::{bitset::BitMatrix, edges::Sites};
+use super::{bitset::BitMatrix, edges::Sites, features::Features, orientation::Sense};
 use crate::{
     lanes::{LANES, ones_of},
     problem::{Correspondence, Problem, Tolerance},
@@ -65,6 +67,27 @@ impl Association {
         Self { vertices, adjacency, pair_tests: count * count.saturating_sub(1) / 2 }
     }
 
+    /// The graph of points and edges, numbered as [`Features::numbered`] says; edges agree in one sense.
+    pub(super) fn with_edges(features: &Features<'_>, sense: Sense) -> Self {
+        let (points, count) = (features.points.len(), features.len());
+        let of_points = Self::of(features.problem);
+        let mut adjacency = BitMatrix::zeros(count);
+        if of_points.vertices == features.points {
+            for v in 0..points {
+                of_points.adjacency.ones(v).filter(|&w| w > v).for_each(|w| adjacency.connect(v, w));
+            }
+        } else {
+            connect(&mut adjacency, features, sense, 0..points);
+        }
+        connect(&mut adjacency, features, sense, points..count);
+        let tests = count as u64;
+        Self {
+            vertices: (0..count).map(|v| features.numbered(v)).collect(),
+            adjacency,
+            pair_tests: tests * tests.saturating_sub(1) / 2,
+        }
+    }
+
     /// The subgraph of the vertices to keep.
     pub(super) fn restricted(&self, keep: impl Fn(Correspondence) -> bool) -> Self {
         let kept: Vec<usize> = (0..self.vertices.len()).filter(|&v| keep(self.vertices[v])).collect();
@@ -75,6 +98,13 @@ impl Association {
             self.adjacency.ones(v).filter_map(|w| place[w]).filter(|&k| k > i).for_each(|k| adjacency.connect(i, k));
         }
         Self { vertices: kept.iter().map(|&v| self.vertices[v]).collect(), adjacency, pair_tests: 0 }
+    }
+}
+
+/// Connects some vertices with the coherent ones before them.
+fn connect(adjacency: &mut BitMatrix, features: &Features<'_>, sense: Sense, of: Range<usize>) {
+    for b in of {
+        (0..b).filter(|&a| features.coherent(a, b, sense)).for_each(|a| adjacency.connect(a, b));
     }
 }
 

@@ -117,6 +117,7 @@ impl Search for Backtracking {
         Ok(Identification {
             edges: Vec::new(),
             alternatives: ties.iter().map(|set| run.pairs(set)).collect(),
+            alternative_edges: Vec::new(),
             alternatives_complete,
             optimal: complete,
             undecided,

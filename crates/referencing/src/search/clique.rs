@@ -1,8 +1,11 @@
 //! Exact search for the largest cliques of the consistency graph, within a budget.
 
+use std::borrow::Cow;
+
 use super::{
     association::Association,
     bitset::{BitSet, degrees},
+    features::Features,
     local::{Local, Workshop},
     orientation::Sense,
     quadruples::Quadruples,
@@ -37,8 +40,14 @@ pub(super) struct Cliques {
 /// are sorted by model point, so that the last ones, with one model point fewer than required, begin no clique.
 /// Vertices with too few neighbours are removed first (k-core). Orientation removes vertices while the clique grows;
 /// all bounds hold without it, so that the answer remains exact.
+///
+/// A graph may hold pairs of edges after those of points. Triples with an edge are then tested as quadruples of points are.
 pub(super) struct Search<'a> {
     graph: &'a Association,
+    /// The vertices of a graph with edges.
+    features: Option<&'a Features<'a>>,
+    /// The number of vertices that are pairs of points; they come first.
+    points: usize,
     volumes: Volumes<'a>,
     quadruples: Quadruples,
     /// The required sense of quadruples.
@@ -65,6 +74,21 @@ struct Stop;
 
 impl<'a> Search<'a> {
     pub(super) fn new(problem: &'a Problem<'a>, graph: &'a Association, sense: Sense, budget: u64) -> Self {
+        Self::over(problem, graph, None, sense, budget)
+    }
+
+    /// The search over the graph of points and edges, which must have been made for the same sense.
+    pub(super) fn with_edges(features: &'a Features<'a>, graph: &'a Association, sense: Sense, budget: u64) -> Self {
+        Self::over(features.problem, graph, Some(features), sense, budget)
+    }
+
+    fn over(
+        problem: &'a Problem<'a>,
+        graph: &'a Association,
+        features: Option<&'a Features<'a>>,
+        sense: Sense,
+        budget: u64,
+    ) -> Self {
         let count = graph.vertices.len();
         let (all, alive) = (Vec::from_iter(0..count), BitSet::full(count));
         let mut degree = Vec::new();
@@ -74,9 +98,12 @@ impl<'a> Search<'a> {
             let new = graph.vertices.get(v + 1).is_none_or(|next| next.model != graph.vertices[v].model);
             models_from[v] = models_from.get(v + 1).copied().unwrap_or(0) + usize::from(new);
         }
+        let points = features.map_or(count, |features| features.points.len());
         Self {
             graph,
-            volumes: Volumes::of(problem, &graph.vertices),
+            features,
+            points,
+            volumes: Volumes::of(problem, &graph.vertices[..points]),
             quadruples: Quadruples::default(),
             sense,
             left: budget,
@@ -239,9 +266,29 @@ impl<'a> Search<'a> {
         if self.sense == Sense::Any {
             return false;
         }
-        let members = decisive_members(clique);
+        if let Some(features) = self.features {
+            let members = decisive_members(clique);
+            self.left = self.left.saturating_sub((members.len() * members.len() / 2) as u64);
+            let pairs = members.iter().enumerate().flat_map(|(k, &a)| members[..k].iter().map(move |&b| (a, b)));
+            if pairs.into_iter().any(|(a, b)| features.refuses([a, b, vertex], self.sense)) {
+                return true;
+            }
+            if vertex >= self.points {
+                return false;
+            }
+        }
+        let points = self.points_of(clique);
+        let members = decisive_members(&points);
         self.left = self.left.saturating_sub(Quadruples::count(members.len()));
         self.quadruples.refused(&self.volumes, self.sense, members, vertex)
+    }
+
+    /// The members that are pairs of points.
+    fn points_of<'c>(&self, clique: &'c [usize]) -> Cow<'c, [usize]> {
+        match self.features {
+            None => Cow::Borrowed(clique),
+            Some(_) => clique.iter().copied().filter(|&v| v < self.points).collect(),
+        }
     }
 
     fn keep(&mut self, clique: &[usize]) {
@@ -296,16 +343,34 @@ impl<'a> Search<'a> {
 
     /// Removes the candidates that would form a rejected quadruple with `added` and two members of the clique.
     fn orient(&mut self, local: &Local, clique: &[usize], added: usize, candidates: &mut BitSet) -> Result<(), Stop> {
-        if self.sense == Sense::Any || clique.len() < 2 {
+        if self.sense == Sense::Any || clique.is_empty() || (self.features.is_none() && clique.len() < 2) {
             return Ok(());
         }
-        let members = decisive_members(clique);
+        if let Some(features) = self.features {
+            for candidate in candidates.iter().collect::<Vec<_>>() {
+                let third = local.vertices[candidate];
+                let members = decisive_members(clique);
+                let first = members.iter().position(|&other| features.refuses([other, added, third], self.sense));
+                if first.is_some() {
+                    candidates.remove(candidate);
+                }
+                self.spend(first.map_or(members.len(), |place| place + 1) as u64)?;
+            }
+            if added >= self.points {
+                return Ok(());
+            }
+        }
+        let points = self.points_of(clique);
+        let members = decisive_members(&points);
         let mut planes = Vec::with_capacity(members.len() * members.len() / 2);
         for (i, &a) in members.iter().enumerate() {
             planes.extend(members[..i].iter().map(|&b| self.volumes.plane([a, b, added])));
         }
         for candidate in candidates.iter().collect::<Vec<_>>() {
             let fourth = local.vertices[candidate];
+            if fourth >= self.points {
+                continue;
+            }
             let first = planes.iter().position(|plane| self.volumes.refuses(self.sense, plane, fourth));
             if first.is_some() {
                 candidates.remove(candidate);

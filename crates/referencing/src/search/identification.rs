@@ -57,6 +57,11 @@ use crate::{
 /// # Ok::<(), Rejected>(())
 /// ```
 pub trait Search: Send + Sync + std::fmt::Debug {
+    /// Whether the search identifies edges. Others identify the points alone, as if the problem had no edges.
+    fn takes_edges(&self) -> bool {
+        false
+    }
+
     /// The best set of correspondences by the measure of this search.
     ///
     /// # Errors
@@ -73,6 +78,8 @@ pub struct Identification {
     pub edges: Vec<Correspondence>,
     /// Other sets of the same size that the search found.
     pub alternatives: Vec<Vec<Correspondence>>,
+    /// The edges of each alternative, in the same order; empty if no alternative has edges.
+    pub alternative_edges: Vec<Vec<Correspondence>>,
     /// Whether `alternatives` holds every other set of the same size.
     pub alternatives_complete: bool,
     /// Whether the set is proved to be optimal: no admissible set is larger or, for a search by likelihood, more
@@ -96,6 +103,7 @@ impl Identification {
             pairs,
             edges: Vec::new(),
             alternatives: Vec::new(),
+            alternative_edges: Vec::new(),
             alternatives_complete: false,
             optimal: false,
             consensus_bound: bound,

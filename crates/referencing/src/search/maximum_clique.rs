@@ -11,6 +11,7 @@ use super::{
     grow::{feasible, so_far},
     identification::{Identification, Rejected, Search},
     limits::{BUDGET, MAX_TIES, NEEDED, bounded},
+    maximum_clique_edges,
     orientation::{Sense, unmirrored, wholly_mirrored},
 };
 use crate::{
@@ -24,6 +25,12 @@ use crate::{
 /// Every two pairs are coherent, the set is one-to-one, and no four pairs are a mirror image of the model. The answer
 /// is exact within the budget. Among sets of one size the minimum residual of a rigid fit decides, then the
 /// coordinates. Time O(K²) for the graph of K candidate pairs, then exponential in K at worst.
+///
+/// With edges, one graph holds the candidate pairs of both kinds, and the size counts points and edges alike. A point and
+/// an edge agree by the distance from the line and by the place along it; two edges by the angle of their directions, by
+/// their signed distance and by their places along the lines, each within its own standard deviations. Triples with an
+/// edge are tested for mirror images as quadruples of points are. Lines without measured depth are not used. A problem
+/// without edges is searched as before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct MaximumClique {
@@ -49,6 +56,7 @@ impl Default for MaximumClique {
 
 impl Component for MaximumClique {
     const NAME: &'static str = "maximum-clique";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "the largest coherent, one-to-one, unmirrored set, by branch and bound";
     const SOURCE: &'static str = "San Segundo, Rodríguez-Losada, Jiménez, An exact bit-parallel algorithm for the \
                                   maximum clique problem, 2011; the graph: Bailey et al., 2000";
@@ -59,6 +67,7 @@ impl Component for MaximumClique {
         ),
         ("exact", "within its budget; the answer states whether it is proved, and the bound"),
         ("time", "K²/2 pair tests for K candidate pairs, then exponential at worst"),
+        ("features", "points and straight edges"),
     ];
 
     fn check(&self) -> Result<(), String> {
@@ -67,7 +76,14 @@ impl Component for MaximumClique {
 }
 
 impl Search for MaximumClique {
+    fn takes_edges(&self) -> bool {
+        true
+    }
+
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        if problem.edges.with_candidates() > 0 {
+            return maximum_clique_edges::search(self, problem);
+        }
         feasible(problem, self.max_pairs)?;
         let budget = self.budget;
         let graph = Association::of(problem);
@@ -125,6 +141,7 @@ impl Search for MaximumClique {
             edges: Vec::new(),
             pairs,
             alternatives,
+            alternative_edges: Vec::new(),
             alternatives_complete: all,
             optimal,
             consensus_bound: largest.bound,

@@ -10,6 +10,7 @@ use super::{
     identification::{Identification, Rejected, Search},
     limits::{BUDGET, NEEDED, bounded},
     pose::{fitted, fraction, refined},
+    ransac_edges,
 };
 use crate::problem::{Correspondence, Problem};
 
@@ -22,6 +23,9 @@ use crate::problem::{Correspondence, Problem};
 /// Not exact. Triples are sampled until one of true pairs was among them with the probability `confidence`, according
 /// to the best inlier fraction, or until the budget ends: O(w⁻³) triples for a fraction w of true pairs, N residuals
 /// for each coherent one. The best pose is fitted again to the pairs that it explains.
+///
+/// With edges, a sample is two edges, or three features of either kind, and the score is the sum over both kinds; the
+/// residual of an edge is that of the worst of its four offsets. A problem without edges is searched as before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Ransac {
@@ -43,7 +47,7 @@ impl Default for Ransac {
 
 impl Component for Ransac {
     const NAME: &'static str = "ransac";
-    const VERSION: u32 = 2;
+    const VERSION: u32 = 3;
     const SUMMARY: &'static str = "the best of the poses of random coherent triples";
     const SOURCE: &'static str = "Fischler, Bolles, Random sample consensus, 1981; the score: Torr, Zisserman, MLESAC, \
                                   2000; the edge-length check: Zhou, Park, Koltun, Open3D, 2018";
@@ -51,6 +55,7 @@ impl Component for Ransac {
         ("maximises", "Σ (1 − r²) over the pairs that a pose explains, over poses of random coherent triples (MSAC)"),
         ("exact", "no: triples are sampled until one was true with the given confidence"),
         ("time", "O(w⁻³) triples for a fraction w of true pairs, N residuals for each coherent one"),
+        ("features", "points and straight edges"),
     ];
 
     fn check(&self) -> Result<(), String> {
@@ -61,7 +66,14 @@ impl Component for Ransac {
 }
 
 impl Search for Ransac {
+    fn takes_edges(&self) -> bool {
+        true
+    }
+
     fn search(&self, problem: &Problem<'_>, rng: &mut dyn Rng) -> Result<Identification, Rejected> {
+        if problem.edges.with_candidates() > 0 {
+            return ransac_edges::search(self, problem, rng);
+        }
         feasible(problem, self.max_pairs)?;
         let vertices = vertices(problem);
         let count = vertices.len();

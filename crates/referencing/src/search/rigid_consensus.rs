@@ -139,6 +139,7 @@ impl Component for RigidConsensus {
             "time",
             "K²/2 pair tests for K candidate pairs, then usually as much again; at most its budget, and 2.5 times that for alternatives",
         ),
+        ("features", "points and straight edges"),
     ];
 
     fn check(&self) -> Result<(), String> {
@@ -169,6 +170,10 @@ const ROUNDING: f64 = 1e-9;
 const PAIRS_A_WORD: u64 = 16;
 
 impl Search for RigidConsensus {
+    fn takes_edges(&self) -> bool {
+        true
+    }
+
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         let enough = |edges: usize| 2 * problem.candidates.with_candidates() + 3 * edges >= ENOUGH;
         match feasible(problem, self.max_pairs) {
@@ -336,6 +341,7 @@ impl Search for RigidConsensus {
         Ok(Identification {
             edges: identified,
             alternatives: Vec::new(),
+            alternative_edges: Vec::new(),
             alternatives_complete: false,
             // A proof for the pose does not hold for the rest of its pairs after some were dropped.
             optimal: evidence_gap == Some(0.0) && pairs.len() == best.members.len() && best.edges.is_empty(),

@@ -170,16 +170,16 @@ fn three_points_of_much_clutter_are_random() {
     }
     scene.candidates = Candidates::all(6, scene.cloud.len());
     let (kabsch, three) = (Kabsch::default(), scene.pairs()[..3].to_vec());
-    match scene.judge(&kabsch, |judge| judge.a_contrario(&three)) {
+    match scene.judge(&kabsch, |judge| judge.a_contrario(&three, &[])) {
         Err(RejectionReason::Absent { p_wrong, max: MaxPWrong::Balanced, identified: 3, model: 6 }) => {
             assert!(p_wrong > 1e-2, "{p_wrong}")
         }
         other => panic!("{other:?}"),
     }
     let all = scene.pairs();
-    assert_eq!(scene.judge(&kabsch, |judge| judge.a_contrario(&all)), Ok(()));
+    assert_eq!(scene.judge(&kabsch, |judge| judge.a_contrario(&all, &[])), Ok(()));
     scene.searched = false;
-    assert_eq!(scene.judge(&kabsch, |judge| judge.a_contrario(&three)), Ok(()));
+    assert_eq!(scene.judge(&kabsch, |judge| judge.a_contrario(&three, &[])), Ok(()));
 }
 
 /// Fails if a NaN passes, and if the limit is not the setting's.

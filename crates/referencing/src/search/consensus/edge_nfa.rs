@@ -1,10 +1,31 @@
 //! The number of false alarms of a mode with edges.
 
+use std::{cell::Cell, collections::BTreeSet};
+
+use seafix_geometry::{Camera, Object, Transform};
+
 use super::{
     edge_terms::{EdgeTerms, EdgeVertex},
+    graph::ConsistencyGraph,
     joined::Joined,
-    likelihood::Mode,
+    likelihood::{Mode, Terms},
+    local_maxima::Climb,
+    motion::Motion,
+    prior_terms::PriorTerms,
 };
+use crate::{problem::Problem, search::features::FeatureSet};
+
+/// What speaks for a set that a search counted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counted {
+    /// ln of the number of false alarms.
+    pub(crate) ln_nfa: f64,
+    /// ln of the evidence of the pose against clutter alone.
+    pub(crate) ln_evidence: f64,
+}
+
+/// Number of steps from the pose of a set to that with its prior.
+const STEPS: usize = 4;
 
 /// The gates: χ² of four and of three degrees of freedom at 50, 75, 90 and 99 %.
 const GATES: [[f64; 2]; 4] = [[3.357, 2.366], [5.385, 4.108], [7.779, 6.251], [13.277, 11.345]];
@@ -24,6 +45,39 @@ pub(in crate::search) fn ln_nfa(joined: &Joined<'_>, mode: &Mode) -> Option<f64>
     let of_gate = |gate: [f64; 2]| ln_poses + ln_tail(&probabilities(joined, gate), fitting(joined, mode, gate));
     let min = GATES.into_iter().map(of_gate).fold(f64::INFINITY, f64::min);
     Some(min + libm::log(GATES.len() as f64))
+}
+
+/// [`ln_nfa`] of a set with edges that a search counted, about a pose of the set, and the evidence (nats) of the set.
+///
+/// Pairs that the prior's largest rotation excludes do not count. `None` without a prior, and for a set that fits no
+/// motion.
+pub(crate) fn of_counted(
+    problem: &Problem<'_>,
+    set: &FeatureSet,
+    camera_from_object: &Transform<Camera, Object>,
+) -> Option<Counted> {
+    let prior_terms = PriorTerms::of(problem)?;
+    prior_terms.known.as_ref()?;
+    let graph = ConsistencyGraph::of(problem, &prior_terms);
+    let terms = Terms::of(problem, &prior_terms, &graph);
+    let edges = EdgeTerms::of(problem, &prior_terms)?;
+    let none = BTreeSet::new();
+    let climb = Climb {
+        model: problem.model,
+        terms: &terms,
+        prior_terms: &prior_terms,
+        graph: &graph,
+        taken: &none,
+        compared: Cell::new(0),
+    };
+    let joined = Joined { climb: &climb, edges: &edges, taken: &none };
+    let points = (0..graph.vertices.len()).filter(|&v| set.points.binary_search(&graph.vertices[v]).is_ok());
+    let members: Vec<usize> = points.collect();
+    let of_edges = (0..edges.vertices.len()).filter(|&v| set.edges.binary_search(&edges.vertices[v].pair).is_ok());
+    let of_edges: Vec<usize> = of_edges.collect();
+    let (motion, factor) = joined.fit(&members, &of_edges, &Motion::of(camera_from_object), STEPS)?;
+    let mode = joined.mode(members, of_edges, motion, &factor)?;
+    Some(Counted { ln_nfa: ln_nfa(&joined, &mode)?, ln_evidence: mode.ln_evidence })
 }
 
 /// The number of members of a mode within a gate.

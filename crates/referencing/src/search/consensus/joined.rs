@@ -75,7 +75,14 @@ impl Joined<'_> {
         of_points + of_edges + fractions + prior_terms.ln_density(motion) + ln_volume(factor)
     }
 
-    fn mode(&self, members: Vec<usize>, mut edges: Vec<usize>, motion: Motion, factor: &Factor) -> Option<Mode> {
+    /// The mode of some features at their MAP motion; `None` if the prior's box excludes it.
+    pub(in crate::search) fn mode(
+        &self,
+        members: Vec<usize>,
+        mut edges: Vec<usize>,
+        motion: Motion,
+        factor: &Factor,
+    ) -> Option<Mode> {
         // The last step may move an edge off its line.
         edges.retain(|&v| self.edges.vertices[v].placed(&motion).is_some());
         let Climb { model, terms, prior_terms, .. } = self.climb;

@@ -1,6 +1,9 @@
 //! Laws of edges: the bound of the solvers, and the search with acceptance.
 
 mod bound;
+mod brute_force;
+mod laws;
 mod near;
+mod planted;
 mod scene;
 mod search;
