@@ -269,7 +269,8 @@ impl PipelineStages {
             true => measured.lines.into(),
             false => {
                 if corners.enabled {
-                    corners.add_to(&mut output.cloud, &measured, rig, &*self.front_end.triangulator);
+                    let triangulator = &*self.front_end.triangulator;
+                    corners.add_to(&mut output.cloud, measured.segments(), &measured.matches, rig, triangulator);
                 }
                 Arc::default()
             }

@@ -8,7 +8,7 @@ use seafix_geometry::{
 use serde::{Deserialize, Serialize};
 
 use super::{fit::FittedSegment, matcher::SegmentMatch};
-use crate::{line_front_end::LineOutput, triangulate::Triangulator};
+use crate::triangulate::Triangulator;
 
 /// The settings of corners that are intersections of straight edges.
 ///
@@ -21,8 +21,8 @@ use crate::{line_front_end::LineOutput, triangulate::Triangulator};
 pub struct EdgeCorners {
     /// Whether corners are made from edges.
     pub enabled: bool,
-    /// Maximum distance of the corner from the nearer end of each segment, as a fraction of the segment's length: texture
-    /// and occlusion shorten segments.
+    /// Maximum distance of the corner beyond the nearer end of each segment, as a fraction of the segment's length:
+    /// texture and occlusion shorten segments.
     pub max_gap_fraction: f64,
     /// Minimum angle between the edges (degrees).
     pub min_angle_deg: f64,
@@ -54,18 +54,19 @@ impl EdgeCorners {
         in_range(sure, "confidence", confidence, "above 0, at most 1 (no test)")
     }
 
-    /// Adds the corners of the segments in `lines` to a cloud, each triangulated as its other points are.
+    /// Adds the corners of the matched segments of both images to a cloud, each triangulated as its other points are.
     ///
     /// A corner and a point of the cloud that agree within their covariances are one; the more accurate one stays.
     /// Corners at both ends of an edge share its errors, which their covariances do not express.
     pub fn add_to(
         &self,
         cloud: &mut Vec<MeasuredPoint>,
-        lines: &LineOutput,
+        segments: [&[FittedSegment]; 2],
+        matches: &[SegmentMatch],
         rig: &StereoRig,
         triangulator: &dyn Triangulator,
     ) {
-        let pairs = self.pairs(rig, lines);
+        let pairs = self.pairs(rig, segments, matches);
         for corner in pairs.iter().filter_map(|pair| triangulator.measured(rig, pair, self.confidence)) {
             let better = |point: &MeasuredPoint| agree(point, &corner) && spread(point) <= spread(&corner);
             if !cloud.iter().any(better) {
@@ -79,8 +80,12 @@ impl EdgeCorners {
     ///
     /// The offsets of an edge in both images are correlated, and with them the pixels of a corner:
     /// Σ = B C Bᵀ, with C the covariance of the four lines' offsets at the corner and B their intersection.
-    fn pairs(&self, rig: &StereoRig, lines: &LineOutput) -> Vec<UncertainPixels> {
-        let ([left, right], matches) = (lines.segments(), &lines.matches);
+    fn pairs(
+        &self,
+        rig: &StereoRig,
+        [left, right]: [&[FittedSegment]; 2],
+        matches: &[SegmentMatch],
+    ) -> Vec<UncertainPixels> {
         let mut all = Vec::new();
         for (i, first) in matches.iter().enumerate() {
             for second in &matches[..i] {
@@ -130,6 +135,9 @@ impl EdgeCorners {
         }
         let at = a.ends[0] + directions[0] * ((b.ends[0] - a.ends[0]).perp(&directions[1]) / sine);
         let (pixel, jacobian) = camera.project_with_jacobian(&Point::<Camera>::from(at.push(1.0)))?;
+        if !camera.contains(&pixel, 0.0) {
+            return None;
+        }
         let jacobian: Matrix2<f64> = jacobian.fixed_view::<2, 2>(0, 0).into();
         let mut normals = Matrix2::zeros();
         let mut weights = [[0.0; 2]; 2];
@@ -137,8 +145,8 @@ impl EdgeCorners {
             let place = |direction: &Vector2<f64>| (direction - segment.ends[0]).dot(&along);
             let (here, end) = (place(&at), place(&segment.ends[1]));
             let tangent = jacobian * along;
-            let gap = here.abs().min((here - end).abs()) * tangent.norm();
-            if !(gap <= self.max_gap_fraction * segment.length) {
+            let beyond = (-here).max(here - end) * tangent.norm();
+            if !(-INSIDE..=self.max_gap_fraction * segment.length).contains(&beyond) {
                 return None;
             }
             let normal = Vector2::new(-tangent.y, tangent.x).normalize();
@@ -153,6 +161,8 @@ impl EdgeCorners {
     }
 }
 
+/// The maximum distance (px) of a corner from the end of a segment that passes it: blur lengthens segments a little.
+const INSIDE: f64 = 4.0;
 /// The distance (px) within which two corners are one.
 const SAME: f64 = 1.0;
 

@@ -12,7 +12,8 @@ use super::{
 fn corners(images: &[Image; 2], rig: &StereoRig, settings: &EdgeCorners) -> Vec<MeasuredPoint> {
     let triangulator = Optimal(PointRules { calibration_px: 0.0, ..PointRules::default() });
     let mut cloud = Vec::new();
-    settings.add_to(&mut cloud, &measured(images, rig, "overlap-profile", 0.0), rig, &triangulator);
+    let lines = measured(images, rig, "overlap-profile", 0.0);
+    settings.add_to(&mut cloud, lines.segments(), &lines.matches, rig, &triangulator);
     cloud
 }
 
