@@ -122,7 +122,7 @@ mod tests {
     ///
     /// Fails if the volume of a kind is zero, and if the noise is taken to be a hundred times as great.
     #[test]
-    fn every_kind_of_triple_tells_an_object_from_its_image() {
+    fn every_kind_of_triple_distinguishes_an_object_from_its_image() {
         let noise = Matrix3::identity() * 1e-6;
         let reflected = |p: Vector3<f64>| Vector3::new(p.x, p.y, -p.z);
         let moved = |p: Vector3<f64>| p + Vector3::new(0.0, 0.0, 3.0);
