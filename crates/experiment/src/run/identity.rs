@@ -38,7 +38,7 @@ pub const SHARED: [SharedPart; 8] = [
     // The order of the stages on a stereo pair.
     SharedPart { name: "front-end", version: 2, used: |used| used.images },
     // The navigator, the pose graph and key frames.
-    SharedPart { name: "navigation", version: 1, used: |used| used.navigates },
+    SharedPart { name: "navigation", version: 2, used: |used| used.navigates },
     // Sites, dives, sensors, noisy points, problems and random streams.
     SharedPart { name: "simulation", version: 1, used: |used| used.simulated },
     // Images of dives and of the virtual site.
