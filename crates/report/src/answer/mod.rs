@@ -48,7 +48,7 @@ impl Answer {
     /// ```
     /// use seafix_report::Answer;
     /// let answer = Answer::parse("Yes, in {fix-rate: method=new} of the attempts.", &["fix-rate: method=new > 50"])?;
-    /// assert!(Answer::parse("{fixrate: method=new}", &[]).unwrap_err().to_string().contains("did you mean `fix-rate`"));
+    /// assert!(Answer::parse("{fixrate: method=new}", &[""; 0]).unwrap_err().to_string().contains("did you mean `fix-rate`"));
     /// # Ok::<(), seafix_report::AnswerError>(())
     /// ```
     pub fn parse(text: &str, claims: &[impl AsRef<str>]) -> Result<Self, AnswerError> {
