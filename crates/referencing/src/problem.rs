@@ -7,9 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     candidates::Candidates,
-    edge_coherence::{edges_agree, point_agrees},
     site::{edge::ModelEdge, model::ModelPoint},
-    space_line::SpaceLine,
 };
 
 /// The prior: the camera's pose before the fix, with its uncertainty.
@@ -139,25 +137,6 @@ impl Problem<'_> {
     /// distances in model and cloud of at most Δ (closed).
     pub fn coherent(&self, a: Correspondence, b: Correspondence) -> bool {
         a.model != b.model && a.cloud != b.cloud && self.agrees(a, b, self.measured(a.cloud, b.cloud))
-    }
-
-    /// Structural coherence of two pairs of edges: different edges and lines, whose angle and shortest distance agree.
-    pub fn coherent_edges(&self, a: Correspondence, b: Correspondence) -> bool {
-        let ends = |pair: Correspondence| self.edges.model[pair.model].places(self.model).map(|end| end.coords);
-        let line = |pair: Correspondence| SpaceLine::of(&self.edges.lines[pair.cloud]);
-        let (Some(one), Some(other)) = (line(a), line(b)) else { return false };
-        a.model != b.model
-            && a.cloud != b.cloud
-            && edges_agree([&ends(a), &ends(b)], [&one, &other], self.sigmas()).is_some()
-    }
-
-    /// Structural coherence of a pair of points and a pair of edges: the distance of the point from the line agrees.
-    pub fn coherent_point_edge(&self, point: Correspondence, edge: Correspondence) -> bool {
-        let Some(line) = SpaceLine::of(&self.edges.lines[edge.cloud]) else { return false };
-        let ends = self.edges.model[edge.model].places(self.model).map(|end| end.coords);
-        let seen = &self.cloud[point.cloud].position;
-        let model = (&self.model[point.model].at.coords, &ends);
-        point_agrees(model, (&seen.at.coords, &seen.covariance), &line, self.sigmas())
     }
 
     /// The number of standard deviations of the tolerance; three for a fixed one.

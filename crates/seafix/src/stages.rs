@@ -265,16 +265,12 @@ impl PipelineStages {
             self.line_front_end.run([l.unwrap_or(left), r.unwrap_or(right)], rig, &mut measured);
         }
         // An edge serves as itself or by its corners: as both, its errors would count twice.
-        let lines = match identified {
-            true => measured.lines.into(),
-            false => {
-                if corners.enabled {
-                    let triangulator = &*self.front_end.triangulator;
-                    corners.add_to(&mut output.cloud, measured.segments(), &measured.matches, rig, triangulator);
-                }
-                Arc::default()
-            }
-        };
+        if !identified {
+            let triangulator = &*self.front_end.triangulator;
+            corners.add_to(&mut output.cloud, measured.segments(), &measured.matches, rig, triangulator);
+            measured.lines.clear();
+        }
+        let lines = measured.lines.into();
         let points = output.cloud[..].into();
         Cloud { keypoints, points, lines, times, total_ms: milliseconds(start) }
     }

@@ -54,7 +54,7 @@ fn slides(y: [f64; 2], x: [f64; 2]) -> [f64; 2] {
 ///
 /// The signed distance must be that of the object (`Proper`), that of its mirror image (`Mirrored`), or either (`Any`).
 /// Edges that are nearly parallel have no sign; the distances of the middle of each from the other are compared.
-pub(super) fn edges_agree(a: &DirectedEdge, b: &DirectedEdge, sigmas: f64, sense: Sense) -> bool {
+pub(super) fn directed_edges_agree(a: &DirectedEdge, b: &DirectedEdge, sigmas: f64, sense: Sense) -> bool {
     let (one, other) = (&a.line, &b.line);
     let known = Relation::of([&a.model[0], &b.model[0]], [a.along, b.along]);
     let seen = Relation::of([&one.ends[0], &other.ends[0]], [one.direction, other.direction]);
@@ -171,7 +171,11 @@ mod tests {
         for (mirrored, of) in [(false, Sense::Proper), (true, Sense::Mirrored)] {
             let [a, b] = [0, 1].map(|k| pair(k, [0.1, 0.9], mirrored));
             for sense in [Sense::Proper, Sense::Mirrored, Sense::Any] {
-                assert_eq!(edges_agree(&a, &b, 3.0, sense), sense == of || sense == Sense::Any, "{of:?} {sense:?}");
+                assert_eq!(
+                    directed_edges_agree(&a, &b, 3.0, sense),
+                    sense == of || sense == Sense::Any,
+                    "{of:?} {sense:?}"
+                );
             }
         }
     }
@@ -180,14 +184,14 @@ mod tests {
     #[test]
     fn parallel_edges_have_a_distance_and_a_common_slide() {
         let [a, b] = [0, 2].map(|k| pair(k, [0.1, 0.9], false));
-        assert!(edges_agree(&a, &b, 3.0, Sense::Proper));
+        assert!(directed_edges_agree(&a, &b, 3.0, Sense::Proper));
         // The same edge twice: the lines coincide and the edges do not.
         let twice = DirectedEdge { line: a.line, ..b.clone() };
-        assert!(!edges_agree(&a, &twice, 3.0, Sense::Proper));
+        assert!(!directed_edges_agree(&a, &twice, 3.0, Sense::Proper));
         // Lines that overlap their edges at no common slide: the ends of one, and a part 1.5 m further of the other.
         let beyond = pair(2, [1.6, 2.4], false);
-        assert!(!edges_agree(&a, &beyond, 3.0, Sense::Proper));
-        assert!(edges_agree(&a, &pair(2, [0.6, 1.4], false), 3.0, Sense::Proper));
+        assert!(!directed_edges_agree(&a, &beyond, 3.0, Sense::Proper));
+        assert!(directed_edges_agree(&a, &pair(2, [0.6, 1.4], false), 3.0, Sense::Proper));
     }
 
     /// Fails if the place along the edge is not compared.

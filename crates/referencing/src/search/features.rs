@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::{
     association::vertices,
-    directed_edge::{DirectedEdge, edges_agree, point_agrees_along},
+    directed_edge::{DirectedEdge, directed_edges_agree, point_agrees_along},
     handedness::{self, Feature},
     orientation::Sense,
 };
@@ -45,7 +45,7 @@ impl FeatureSet {
     }
 }
 
-/// Whether so many points and edges can determine a pose.
+/// Whether this number of points and edges can determine a pose.
 pub(super) fn enough(points: usize, edges: usize) -> bool {
     2 * points + 3 * edges >= ENOUGH
 }
@@ -160,7 +160,7 @@ impl<'a> Features<'a> {
             (Some(one), Some(other)) => {
                 one.pair.model != other.pair.model
                     && one.pair.cloud != other.pair.cloud
-                    && edges_agree(&one.directed, &other.directed, sigmas, sense)
+                    && directed_edges_agree(&one.directed, &other.directed, sigmas, sense)
             }
         }
     }
