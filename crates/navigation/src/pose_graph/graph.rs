@@ -6,7 +6,7 @@ use faer::{
     sparse::{SparseColMat, Triplet},
 };
 use nalgebra::{Matrix6, SMatrix, Vector6};
-use seafix_geometry::{Camera, Covariance6, Transform, World, right_jacobian_inverse};
+use seafix_geometry::{Camera, Transform, World, right_jacobian_inverse};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 pub use self::solution::GraphSolution;
