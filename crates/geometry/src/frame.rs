@@ -23,7 +23,8 @@ frames! {
     RightCamera,
     /// The vehicle: x forward, y to starboard, z down.
     Body,
-    /// The world of the survey: north, east, down.
+    /// The world of the survey and of the prior: north, east, down in simulated dives, any right-handed frame in
+    /// others.
     World,
     /// A known object: origin P1, x along P1→P3, z along (P2−P1)×(P3−P1), y = z × x.
     ///

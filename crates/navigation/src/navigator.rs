@@ -227,7 +227,7 @@ impl<'a> Navigator<'a> {
         due
     }
 
-    /// Whether a fix would be due at an instant without a motion, `seconds` after the last one.
+    /// Whether a fix would be due at a frame that the odometry skipped, `seconds` after its last motion.
     ///
     /// The pose is neither propagated nor dropped.
     pub fn blind(&mut self, seconds: f64, in_view: bool) -> bool {

@@ -132,7 +132,8 @@ impl<'a> Observations<'a> {
         self.points.iter().map(|point| point.residual(object_from_camera)).collect()
     }
 
-    /// The fit RMS (m): the RMS of the residuals C·H − P over all points (the paper's measure).
+    /// The RMS of the residuals C·H − P over all points (m). Over correctly identified points it is the fit RMS, the
+    /// paper's measure.
     pub fn residual_rms(&self, object_from_camera: &Transform<Object, Camera>) -> f64 {
         let sum: f64 = self.points.iter().map(|point| point.residual(object_from_camera).norm_squared()).sum();
         (sum / self.points.len().max(1) as f64).sqrt()

@@ -45,8 +45,8 @@ pub struct Pipeline {
     pub segment_matcher: Choice,
     /// The triangulation of matched segments.
     pub lines: LineRules,
-    /// Corners that are intersections of edges. They join the points of the cloud where edges are not identified as
-    /// such.
+    /// Corners that are intersections of edges. They become points of the cloud, unless the edges are identified
+    /// themselves.
     pub edge_corners: EdgeCorners,
     /// The gates of the candidate selection ("shells" in the paper).
     pub gate: Gate,

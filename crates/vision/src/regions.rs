@@ -11,7 +11,7 @@ pub struct Regions {
     discs: Vec<Disc>,
 }
 
-/// The pixels within a distance of one.
+/// The pixels within `radius` of `centre`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
     /// The centre (px).

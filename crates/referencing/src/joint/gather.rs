@@ -39,7 +39,7 @@ pub enum Unadded {
         /// The number of points with an ambiguous candidate.
         points: usize,
     },
-    /// Its pairs are too probable to be a false alarm (a-contrario test).
+    /// Its pairs are too likely to be a false alarm (a-contrario test).
     #[error("P(wrong) of {size} points near their predictions is {p_wrong:.1e}, at most {max} is allowed")]
     AContrario {
         /// The number of pairs.

@@ -10,9 +10,10 @@ use crate::{
 
 /// A search for correspondences between model points and cloud points (data association).
 ///
-/// Every search has a budget of pair tests beyond the tests that build its graph (default 10⁷). A search that spends it
-/// returns the best set so far, with `optimal` false and `undecided` set to [`Rejected::Budget`]. It returns
-/// [`Rejected::Budget`] as the error if no three pairs were found to agree.
+/// Every search has a budget: pair tests beyond the tests that build its graph (default 10⁷), or the words of the
+/// graph that `rigid-consensus` reads. A search that spends it returns the best set so far, with `optimal` false and
+/// `undecided` set to [`Rejected::Budget`]. It returns [`Rejected::Budget`] as the error if no three pairs were found
+/// to agree.
 ///
 /// A minimal search takes the first coherent candidate of each model point:
 ///

@@ -23,7 +23,7 @@ use crate::problem::{Correspondence, Problem};
 /// card for an invisible point.
 ///
 /// The search visits every interpretation longer than the best, unless `enough` stops it at the first that is long
-/// enough, as in the original. With `enough` = 1 no longer set passes the model test, but longer sets that are only
+/// enough, as in the original. With `enough` = 1, no set with more points passes the model test; one that is only
 /// coherent may exist. Exponential: Π (m_i + 1) for lists of m_i.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]

@@ -80,8 +80,8 @@ use crate::{a_contrario::coordinates::shuffled, problem::Problem, solve::likelih
 ///
 /// A problem of more than 256 model points with candidates begins with guided seeds: the pairs that share most
 /// compatible pairs with a seed begin a set (second-order compatibility, Chen et al. 2022). Sets of interest then have
-/// many members. Once so many of these were seeds that a set would have been missed with a probability of 10⁻⁴, the
-/// enumeration need not be complete. The seeds take at most the budget once more, in words of the graph.
+/// many members. The seeding suffices, and the enumeration need not be complete, once the probability that it has
+/// missed such a set is 10⁻⁴. The seeds take at most the budget once more, in words of the graph.
 ///
 /// # Large putative sets
 ///

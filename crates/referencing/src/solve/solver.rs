@@ -71,7 +71,7 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
 
     /// Whether the answer is exact to rounding, so that equivalent inputs give equal answers.
     ///
-    /// A general-purpose optimiser that evaluates costs only ends 1e-4 standard deviations from the minimum.
+    /// An optimiser without derivatives stops 1e-4 standard deviations from the minimum.
     fn to_rounding(&self) -> bool {
         true
     }

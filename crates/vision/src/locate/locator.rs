@@ -64,8 +64,8 @@ pub struct Pair {
 pub trait Locator: Send + Sync + std::fmt::Debug {
     /// Replaces `places` by the corner at each key point, in their order.
     ///
-    /// `None` marks a key point without a corner of this locator's kind, or with one that the fit does not determine
-    /// better.
+    /// `None` marks a key point without a corner of this locator's kind, or with a corner whose place the fit
+    /// determines no better than the detector did.
     fn locate_into(
         &self,
         image: &Image,

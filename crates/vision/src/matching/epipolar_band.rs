@@ -22,10 +22,10 @@ use crate::workspace::Workspace;
 /// The distance is Euclidean between numbers and Hamming between bits. A pair passes if its distance is less than
 /// `ratio` times the distance to the second nearest, seen from either side. With `neighbours`, pairs compete by weight
 /// instead: the inverse squared distance times the support of the pairs around it (relaxation labelling). A pair is
-/// ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; so are the pairs around it
-/// that seem unambiguous. Where many are, the pattern is matched as one: each shift by a period is a domain, and the one
-/// whose borders or descriptors fit three standard errors better than any other is taken. Where there is none, each
-/// neighbourhood decides as before, and ambiguous pairs are rejected.
+/// ambiguous if its whole neighbourhood fits as well one period of a repeated pattern further; its neighbours then
+/// count as ambiguous too. If many pairs are ambiguous, the pattern is matched as one: each shift by a period is a
+/// hypothesis, and the shift whose borders or descriptors fit three standard errors better than those of any other is
+/// taken. Without such a shift each neighbourhood decides as before, and ambiguous pairs are rejected.
 ///
 /// Limit: descriptors of different kinds or lengths do not match.
 ///

@@ -1,9 +1,9 @@
-use super::*;
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
 };
-use seafix_geometry::Covariance6;
+
+use super::*;
 
 /// An approximately normal random number: the sum of twelve uniform ones.
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
