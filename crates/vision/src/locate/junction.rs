@@ -22,8 +22,9 @@ use crate::{image::Image, keypoint::Keypoint, workspace::Workspace};
 /// The covariance is A⁻¹ (Σ w² (gᵀd)² g gᵀ) A⁻¹ with A = Σ w g gᵀ and d = x − p, from the distances of the lines to p.
 ///
 /// It is a junction only if the lines of its edges pass closer to it than their normals: the ratio of Σ w (gᵀd)² to
-/// Σ w (g×d)² is at most `max_ratio`. Texture has a larger ratio, and its error would exceed the stated one. The default
-/// was chosen on the known corners of two renderers in four scenes.
+/// Σ w (g×d)² is at most `max_ratio`. Edges that meet in no point have a larger ratio, and an error above the stated one.
+/// A corner that is rounded by some pixels passes the default, which was chosen on the known corners of two renderers in
+/// four scenes.
 ///
 /// Source: Förstner and Gülch, *A fast operator for detection and precise location of distinct points, corners and
 /// centres of circular features*, ISPRS 1987.
