@@ -2,7 +2,7 @@
 
 #![allow(clippy::print_stdout)]
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use seafix::nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use seafix::{Localizer, Outcome, PosePrior, Rig, Site, StereoImages, geometry::Transform};
 
 fn main() -> Result<(), seafix::Error> {

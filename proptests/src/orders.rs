@@ -442,7 +442,7 @@ pub fn happens(navigator: &mut Navigator<'_>, site: &Site, steps: usize, happeni
         Happening::Lost => navigator.advance(1.0, None),
         Happening::Fix(kind) => return Did::Fix(navigator.fix(&site.fix(kind, steps))),
         Happening::Due(in_view) => return Did::Said(navigator.due(in_view)),
-        Happening::Blind(in_view) => return Did::Said(navigator.blind(BLIND, in_view)),
+        Happening::Blind(in_view) => return Did::Said(navigator.due_without_motion(BLIND, in_view)),
         Happening::Settle(well) => {
             return Did::Said(navigator.settle(&site.settled(steps, well), "found again".to_owned()));
         }

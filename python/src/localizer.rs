@@ -4,7 +4,7 @@ use std::{path::PathBuf, time::Instant};
 
 use pyo3::prelude::*;
 use seafix::{
-    Error, FrameData, Hints, PosePrior as WorldPrior, SensorFrame,
+    Error, FrameData, Hints, PosePrior as LibraryPrior, SensorFrame,
     geometry::{MeasuredPoint, Point, UncertainPoint},
 };
 
@@ -161,7 +161,7 @@ impl Localizer {
 
 impl Localizer {
     fn answers(&self, py: Python<'_>, frame_data: FrameData, prior: Option<&PosePrior>) -> PyResult<Vec<Answer>> {
-        let prior: Option<WorldPrior> = prior.map(PosePrior::in_world);
+        let prior: Option<LibraryPrior> = prior.map(PosePrior::in_world);
         let frame = SensorFrame { stamp_ns: 0, frame_data, prior, hints: Hints::Nothing, readings: Vec::new() };
         let start = Instant::now();
         let result = detached(py, || self.inner.process(&frame))?;

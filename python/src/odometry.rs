@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, ndarray::aview2};
 use pyo3::{exceptions::PyValueError, prelude::*};
 use seafix::{
     component::Choice,
-    odometry::{ODOMETRIES, OdometryOutcome, OdometrySession, StereoPair},
+    navigation::{ODOMETRIES, OdometryOutcome, OdometrySession, StereoPair},
     vision::Threads,
 };
 

@@ -3,7 +3,7 @@
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use seafix::{
-    PosePrior as WorldPrior,
+    PosePrior as LibraryPrior,
     geometry::{Camera, Covariance6, Object, Transform},
     referencing::{Prior, PriorBound},
 };
@@ -103,8 +103,8 @@ impl PosePrior {
 
 impl PosePrior {
     /// The prior in the world, for a localizer.
-    pub(crate) fn in_world(&self) -> WorldPrior {
-        WorldPrior { world_from_camera: self.pose.relabel(), covariance: Covariance6::new(self.covariance.matrix) }
+    pub(crate) fn in_world(&self) -> LibraryPrior {
+        LibraryPrior { world_from_camera: self.pose.relabel(), covariance: Covariance6::new(self.covariance.matrix) }
     }
 }
 

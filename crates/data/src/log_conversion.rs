@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Quaternion, UnitQuaternion};
-use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 use seafix_evaluation::{Solved, alert_limit};
 use seafix_geometry::{
     Covariance6, Frame, MeasuredLine, MeasuredPoint, NormalOffset, Object, Pixel, Point, StereoPixels, StereoSegments,
@@ -73,7 +73,7 @@ pub fn inputs(sensor_frame: &SensorFrame, cloud: &[MeasuredPoint], targets: &[Ta
             .map(|pixels| std::array::from_fn(|r| std::array::from_fn(|c| pixels.covariance[(r, c)])))
             .collect(),
         names: match &sensor_frame.hints {
-            Hints::Names(names) => Some(site_points(names)),
+            Hints::Labels(names) => Some(site_points(names)),
             _ => None,
         },
         problem: match &sensor_frame.hints {
@@ -235,7 +235,7 @@ pub fn line(record: &Line) -> MeasuredLine {
 /// The hints in a log's record.
 pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint], lines: &[MeasuredLine]) -> Hints {
     if let Some(names) = &inputs.names {
-        return Hints::Names(indices(names));
+        return Hints::Labels(indices(names));
     }
     let Some(problem) = &inputs.problem else { return Hints::Nothing };
     let point = |point: &seafix_log::ModelPoint| ModelPoint {
@@ -256,9 +256,9 @@ pub fn hints(inputs: &Inputs, cloud: &[MeasuredPoint], lines: &[MeasuredLine]) -
 }
 
 /// The prior pose.
-pub fn prior(inputs: &Inputs) -> Option<WorldPrior> {
+pub fn prior(inputs: &Inputs) -> Option<PosePrior> {
     let (pose, covariance) = inputs.prior.as_ref()?;
-    Some(WorldPrior { world_from_camera: transform(pose), covariance: covariance6(covariance) })
+    Some(PosePrior { world_from_camera: transform(pose), covariance: covariance6(covariance) })
 }
 
 /// The truth in a log's record, for objects that were `surveyed`.

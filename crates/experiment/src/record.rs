@@ -1,6 +1,6 @@
 //! Conversion of results to log records.
 
-use seafix::{FrameResult, Hints, NavigationState, SensorFrame, TargetAttempt};
+use seafix::{FrameResult, Hints, Motion, NavigationState, SensorFrame, TargetAttempt};
 use seafix_component::Registry;
 use seafix_data::{
     log_conversion::{self, model, rows3, rows6},
@@ -85,7 +85,7 @@ pub(crate) fn frame(
     targets: &[Target],
 ) -> FrameRecord {
     let pipeline = trial.stages.settings();
-    let search = if matches!(sensor_frame.hints, Hints::Names(_)) { LABELLED } else { &pipeline.search.name };
+    let search = if matches!(sensor_frame.hints, Hints::Labels(_)) { LABELLED } else { &pipeline.search.name };
     let solver = &pipeline.solver.name;
     let mut attempts: Vec<TargetRecord> =
         frame_result.attempts.iter().map(|attempt| target(attempt, &targets[attempt.target], search, solver)).collect();
@@ -198,15 +198,16 @@ fn navigation(navigation_state: &NavigationState, targets: &[Target]) -> Navigat
         object_from_camera: pose.object_pose.object_from_camera.rows(),
         covariance: rows6(&pose.object_pose.covariance.matrix),
     };
-    let step = navigation_state.odometry.step;
     NavigationRecord {
         state: navigation_state.state.to_string(),
         due: navigation_state.due,
         pose: navigation_state.pose.as_ref().map(pose),
         odometry_only: navigation_state.odometry_only.as_ref().map(pose),
-        odometry: OdometryStep {
-            lost: navigation_state.odometry.lost.clone(),
-            motion: step.map(|step| (step.motion.rows(), rows6(&step.covariance.matrix))),
+        odometry: match &navigation_state.odometry {
+            Motion::First => OdometryStep::default(),
+            Motion::Known(step) => OdometryStep::known(step.motion.rows(), rows6(&step.covariance.matrix)),
+            Motion::Skipped(why) => OdometryStep::skipped(why),
+            Motion::Unknown(why) => OdometryStep::unknown(why),
         },
         events: navigation_state.events.iter().map(logged).collect(),
         errors: NavigationErrors::default(),

@@ -148,7 +148,7 @@ quantities! {
     VISIBLE: Target Integer "visible" "" "/metrics/evaluation" "The number of model points that both cameras truly see." = |r: &TargetRecord| count(r.evaluation.visible);
     IDENTIFIED: Target Integer "identified" "" "/metrics/evaluation" "The number of identified pairs." = |r: &TargetRecord| count(r.evaluation.identified);
     CORRECT_PAIRS: Target Integer "correct_pairs" "" "/metrics/evaluation" "The number of identified pairs within 2 px of the true projections in both images." = |r: &TargetRecord| count(r.evaluation.correct_pairs);
-    EDGES_VISIBLE: Target Integer "edges_visible" "" "/metrics/evaluation" "The number of model edges that face the camera and lie in both images by at least a quarter; bodies that hide them are not considered." = |r: &TargetRecord| count(r.evaluation.edges_visible);
+    EDGES_VISIBLE: Target Integer "edges_visible" "" "/metrics/evaluation" "The number of model edges that face the camera and of whose length at least a quarter lies in both images; bodies that hide them are not considered." = |r: &TargetRecord| count(r.evaluation.edges_visible);
     EDGES_IDENTIFIED: Target Integer "edges_identified" "" "/metrics/evaluation" "The number of identified edges." = |r: &TargetRecord| count(r.evaluation.edges_identified);
     CORRECT_EDGES: Target Integer "correct_edges" "" "/metrics/evaluation" "The number of identified edges whose measured line lies within 2 px of the true edge at both ends, in both images." = |r: &TargetRecord| count(r.evaluation.correct_edges);
     FIT_RMS: Target Real "fit_rms" "m" "/metrics/evaluation" "The RMS residual of the correctly identified pairs at the estimated pose (the paper's measure)." = |r: &TargetRecord| r.evaluation.fit_rms;
@@ -164,7 +164,7 @@ quantities! {
     RESIDUAL_RMS: Target Real "residual_rms" "m" "/referencing/result" "The RMS residual of all identified pairs at the estimated pose." = |r: &TargetRecord| r.residual_rms;
     OPTIMAL: Target Flag "optimal" "" "/referencing/result" "Whether the search proved its set the best." = |r: &TargetRecord| r.optimal;
     CONSENSUS_BOUND: Target Integer "consensus_bound" "" "/referencing/result" "An upper bound of the size of any admissible set." = |r: &TargetRecord| r.consensus_bound.map(|n| n as i64);
-    NFA: Target Real "nfa" "" "/referencing/result" "The number of false alarms: the expected number of random sets at least as large." = |r: &TargetRecord| r.nfa;
+    NFA: Target Real "nfa" "" "/referencing/result" "The number of false alarms: the expected number of random sets that are at least as large and fit at least as well." = |r: &TargetRecord| r.nfa;
     PAIR_TESTS: Target Integer "pair_tests" "" "/referencing/result" "The number of pair tests of the search." = |r: &TargetRecord| r.pair_tests.map(|n| n as i64);
     CANDIDATES: Target Integer "candidates" "" "/referencing/candidates" "The number of candidate pairs." = |r: &TargetRecord| Some(r.candidates.iter().map(Vec::len).sum::<usize>() as i64);
     DETECT_MS: Frame Real "detect_ms" "ms" "/metrics/timing" "The duration of filters and detection, both images." = |r: &FrameRecord| r.times.detect_ms;

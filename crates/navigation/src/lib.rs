@@ -3,7 +3,7 @@
 //! - An [`Odometry`] estimates the motion of a stereo rig from image pairs or from sensor readings ([`Reading`]). Its
 //!   result is an [`OdometryTrajectory`]: segments of poses relative to the first camera, and the outcome of every
 //!   pair. A pair without a reliable motion is [`Lost`]; no motion is invented.
-//! - An [`ObjectPose`] is a fix propagated by odometry.
+//! - An [`ObjectPose`] is the pose of a fix with its covariance, at the fix or propagated by odometry.
 //! - A [`Navigator`] asks its [`Policy`] whether a fix is due, joins a new fix with the propagated pose by its
 //!   [`Fusion`], and detects displaced objects.
 //! - A [`PoseGraph`] holds key frames, odometry, fixes and loops; [`Traverse`] extends it during a dive.

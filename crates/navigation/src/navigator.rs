@@ -14,13 +14,13 @@ use crate::{
 /// The basis of the navigated pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// The prior pose alone: there is no fix, or the last one could not be propagated to this instant.
+    /// The prior pose alone: there is no fix yet, or the odometry has had a break since.
     Prior,
     /// A search: a fix is due and an object should be in view, but no fix has been accepted.
     Searching,
-    /// A fix of this instant.
+    /// A fix, or a recognised key frame, of this instant.
     Fixed,
-    /// A fix propagated by odometry.
+    /// A fix propagated by odometry; at a skipped frame, to the last frame before it.
     DeadReckoning,
 }
 
@@ -230,7 +230,7 @@ impl<'a> Navigator<'a> {
     /// Whether a fix would be due at a frame that the odometry skipped, `seconds` after its last motion.
     ///
     /// The pose is neither propagated nor dropped.
-    pub fn blind(&mut self, seconds: f64, in_view: bool) -> bool {
+    pub fn due_without_motion(&mut self, seconds: f64, in_view: bool) -> bool {
         let due = self.is_due(seconds, in_view);
         if self.state == State::Fixed || self.state == State::Searching && !(due && in_view) {
             self.turn(self.carried(), "no motion to this instant: the last pose is kept".to_owned());

@@ -2,7 +2,7 @@
 //!
 //! The steps follow the paper. A [`Site`] describes the known objects, and each search looks for one [`Target`]. Stage
 //! 1, [`candidates()`], selects the cloud points that the prior allows for each model point. Stage 2, a [`Search`],
-//! finds the largest structurally coherent set among them. A [`Solver`] computes the rigid motion. [`compute_fix()`]
+//! finds the best structurally coherent set among them, by its size or by the evidence of its pose. A [`Solver`] computes the rigid motion. [`compute_fix()`]
 //! runs search and solver, tests the result, and returns a fix or the reason for its rejection. This crate uses neither
 //! images nor ground truth.
 //!

@@ -17,12 +17,12 @@ pub enum NavigationEvent {
         /// The reason.
         why: String,
     },
-    /// A fix that became the navigated pose.
+    /// An accepted fix, combined with the navigated pose.
     FixTaken {
         /// The object's name.
         object: String,
     },
-    /// A fix that is less accurate than the navigated pose, which stays.
+    /// A fix of another object at which the pose would be much less accurate; the navigated pose stays.
     FixLessAccurate {
         /// The object's name.
         object: String,

@@ -21,9 +21,10 @@ use crate::{
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Keyframes {
-    /// Whether the pose graph is written to the run's folder, as `<trial>.pose-graph`.
-    pub add_keyframes: bool,
-    /// The pose graph of an earlier run, relative to the experiment file; none if empty.
+    /// Whether the session returns its pose graph at the end; a run writes it as `<trial>.pose-graph` into its folder.
+    pub write_file: bool,
+    /// The pose graph of an earlier run, relative to the experiment file; none if empty. A session of the library takes it
+    /// as the argument `map` instead.
     pub read: String,
     /// The SHA-256 of the file `read`; any file is accepted if empty. The log holds the hash of the file that was read.
     pub sha256: String,
@@ -185,9 +186,9 @@ impl<'a> KeyframeMapper<'a> {
         }
     }
 
-    /// The pose graph in its file format; `None` unless `add-keyframes` is set.
+    /// The pose graph in its file format; `None` unless `write-file` is set.
     pub fn finish(self) -> Option<String> {
         let pose_graph = self.traverse.finish();
-        self.keyframes.add_keyframes.then(|| pose_graph.text(&self.keyframes.settings.recognition))
+        self.keyframes.write_file.then(|| pose_graph.text(&self.keyframes.settings.recognition))
     }
 }

@@ -1,38 +1,21 @@
 //! Fixes from stereo pairs or clouds.
 
-use seafix_geometry::{Camera, Covariance6, MeasuredPoint, Transform, World};
+use seafix_geometry::MeasuredPoint;
 use seafix_io::Rig;
 use seafix_navigation::PoseGraph;
-use seafix_referencing::{Outcome, Search, Site, Solver, Target, TargetKind};
+use seafix_referencing::{BestPose, Outcome, Search, Site, Solver, Target, TargetKind};
 use seafix_vision::{Descriptor, Detector, Matcher};
 
 use crate::{
     error::Error,
     images::{StereoImages, check_sizes},
-    navigation::NavigationStack,
+    navigation_stack::NavigationStack,
     pipeline::{Pipeline, invalid_setting},
     random,
-    sensor_frame::{FrameData, Hints, SensorFrame, WorldPrior},
+    sensor_frame::{FrameData, Hints, PosePrior, SensorFrame},
     session::NavigationSession,
     stages::{FrameResult, PipelineStages, View},
 };
-
-/// A prior pose of the left camera in the world, with its covariance.
-pub type PosePrior = WorldPrior;
-
-impl WorldPrior {
-    /// A prior with equal standard deviations on all axes: `attitude` (rad) and `position` (m).
-    ///
-    /// ```
-    /// use seafix::{PosePrior, geometry::Transform};
-    ///
-    /// let prior = PosePrior::isotropic(Transform::identity(), 0.5_f64.to_radians(), 0.1);
-    /// assert!((prior.covariance.position_sigma() - 0.1 * 3_f64.sqrt()).abs() < 1e-12);
-    /// ```
-    pub fn isotropic(world_from_camera: Transform<World, Camera>, attitude: f64, position: f64) -> Self {
-        Self { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }
-    }
-}
 
 /// The outcome for one target.
 #[derive(Debug, Clone)]
@@ -41,6 +24,12 @@ pub struct TargetOutcome {
     pub name: String,
     /// The fix, or the reason why there is none.
     pub outcome: Outcome,
+    /// The probability that the object is absent.
+    pub p_absent: Option<f64>,
+    /// The probability that the pose of the fix or, without one, [`best`](Self::best) is not the object's.
+    pub p_wrong: Option<f64>,
+    /// The best pose of an outcome that is no fix, for a threshold of the user's own; `None` if nothing determines a pose.
+    pub best: Option<BestPose>,
 }
 
 /// A pipeline that computes fixes for the objects of one site from one stereo rig.
@@ -170,7 +159,8 @@ impl Localizer {
 
     /// Outcomes of a stereo pair, one for each target in view by the prior.
     ///
-    /// Without a prior every target is searched in the complete cloud.
+    /// Without a prior every target is searched in the complete cloud; with one, so are objects without a pose in the
+    /// world.
     ///
     /// # Errors
     /// [`Error::ImageSize`]: an image of another size than its camera is calibrated for.
@@ -265,6 +255,9 @@ impl Localizer {
         let outcome = |attempt: crate::stages::TargetAttempt| TargetOutcome {
             name: self.targets[attempt.target].name.clone(),
             outcome: attempt.answer.outcome,
+            p_absent: attempt.answer.p_absent,
+            p_wrong: attempt.answer.p_wrong,
+            best: attempt.answer.best,
         };
         result.attempts.into_iter().map(outcome).collect()
     }

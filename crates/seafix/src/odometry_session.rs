@@ -13,19 +13,19 @@ use crate::{
 
 /// An odometry at work on a sequence of frames. It is independent of fixes, so that trials with the same odometry share
 /// it.
-pub struct TrialOdometry<'a>(Box<dyn OdometrySession + 'a>);
+pub struct OdometryRun<'a>(Box<dyn OdometrySession + 'a>);
 
 /// The odometry's result for one frame.
 pub struct OdometryResult {
     /// Whether the frame extended a segment, began one, or was skipped.
-    pub followed: OdometryOutcome,
+    pub outcome: OdometryOutcome,
     /// The last waypoint and the index of its segment.
     pub latest: Option<(usize, Waypoint)>,
     /// The duration (ms).
     pub ms: f64,
 }
 
-impl<'a> TrialOdometry<'a> {
+impl<'a> OdometryRun<'a> {
     /// The odometry before its first frame.
     pub fn begin(odometry: &'a dyn Odometry, rig: &'a StereoRig, body_from_camera: Transform<Body, Camera>) -> Self {
         Self(odometry.begin(rig, body_from_camera, Threads::One))
@@ -39,8 +39,8 @@ impl<'a> TrialOdometry<'a> {
         let start = Instant::now();
         let pair = stereo_pair(sensor_frame)?;
         sensor_frame.readings.iter().for_each(|reading| self.0.sense(reading));
-        let followed = self.0.advance(&pair).map_err(|error| error.to_string())?;
-        Ok(OdometryResult { followed, latest: self.0.latest(), ms: milliseconds(start) })
+        let outcome = self.0.advance(&pair).map_err(|error| error.to_string())?;
+        Ok(OdometryResult { outcome, latest: self.0.latest(), ms: milliseconds(start) })
     }
 
     /// The error of the rig's disparities that the motion has revealed; `None` if it has revealed none.

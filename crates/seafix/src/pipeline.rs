@@ -17,7 +17,8 @@ use crate::stages::PipelineStages;
 pub struct Pipeline {
     /// The target of a search: each object in view, each object followed by a joint fix, or the complete site.
     pub target: TargetKind,
-    /// The number of frames of a joint fix, 1 to 1000: the current frame and those before it.
+    /// The number of frames of a joint fix, 1 to 1000: the current frame and those before it. A fix from a single pair has
+    /// only the current one.
     pub window: usize,
     /// The filters applied to each image, in order; none by default.
     pub filters: Vec<Choice>,

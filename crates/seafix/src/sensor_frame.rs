@@ -17,7 +17,7 @@ pub struct SensorFrame {
     /// The stereo pair or the cloud.
     pub frame_data: FrameData,
     /// The prior pose of the left camera in the world, if one is known.
-    pub prior: Option<WorldPrior>,
+    pub prior: Option<PosePrior>,
     /// Correspondences or a coherence problem supplied with the data.
     pub hints: Hints,
     /// The readings of the navigation sensors since the previous frame, in the order of arrival.
@@ -42,7 +42,7 @@ pub enum Hints {
     #[default]
     Nothing,
     /// The label of each cloud point as (object, point) indices, each at most once. No search runs.
-    Names(Vec<(usize, usize)>),
+    Labels(Vec<(usize, usize)>),
     /// A coherence problem with model, tolerance, candidates and prior of its own. The settings `gate` and `tolerance` of
     /// the pipeline do not apply.
     Problem(Arc<CoherenceProblem>),
@@ -61,10 +61,24 @@ pub enum FrameData {
 
 /// A prior pose of the left camera in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WorldPrior {
+pub struct PosePrior {
     /// The pose.
     pub world_from_camera: Transform<World, Camera>,
     /// The covariance of ξ = (φ, ρ) in `T_true = T · Exp(ξ)`: rotation (rad) first, then translation (m), both along the
     /// axes of the camera.
     pub covariance: Covariance6<World, Camera>,
+}
+
+impl PosePrior {
+    /// A prior with equal standard deviations on all axes: `attitude` (rad) and `position` (m).
+    ///
+    /// ```
+    /// use seafix::{PosePrior, geometry::Transform};
+    ///
+    /// let prior = PosePrior::isotropic(Transform::identity(), 0.5_f64.to_radians(), 0.1);
+    /// assert!((prior.covariance.position_sigma() - 0.1 * 3_f64.sqrt()).abs() < 1e-12);
+    /// ```
+    pub fn isotropic(world_from_camera: Transform<World, Camera>, attitude: f64, position: f64) -> Self {
+        Self { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }
+    }
 }

@@ -5,8 +5,8 @@ use std::cell::OnceCell;
 use rand::Rng;
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_navigation::{
-    ConsiderStates, Event, Navigated, Navigator, ObjectPose, OdometryOutcome as Followed, PoseGraph, RangeOffset,
-    RelativeMotion, State,
+    ConsiderStates, Event, Navigated, Navigator, ObjectPose, OdometryOutcome, PoseGraph, RangeOffset, RelativeMotion,
+    State,
 };
 use seafix_referencing::{Outcome, Prior, PriorBound, Target};
 use seafix_vision::Regions;
@@ -17,16 +17,12 @@ use crate::{
     event::NavigationEvent,
     images::check_sizes,
     keyframe_mapper::KeyframeMapper,
-    navigation::NavigationStack,
-    odometry_session::{OdometryResult, TrialOdometry, stereo_pair},
+    navigation_stack::NavigationStack,
+    odometry_session::{OdometryResult, OdometryRun, stereo_pair},
     random,
     sensor_frame::{FrameData, SensorFrame},
     stages::{Cloud, FrameResult, PipelineStages, View},
 };
-
-/// The suffix of [`Motion::lost`] that marks a break of the trajectory. A skipped frame is no break: the next motion
-/// spans it.
-pub const UNKNOWN_MOTION: &str = "the motion to this frame is unknown";
 
 /// A function that replaces the motion of the odometry, given the time since the first frame (s).
 pub type MotionFilter<'a> = Box<dyn FnMut(f64, Option<RelativeMotion>) -> Option<RelativeMotion> + Send + 'a>;
@@ -73,7 +69,7 @@ pub struct NavigationSession<'a> {
     filter: Option<MotionFilter<'a>>,
     body_from_camera: Transform<Body, Camera>,
     /// The odometry of [`push`](Self::push); `None` before the first frame.
-    odometry: Option<TrialOdometry<'a>>,
+    odometry: Option<OdometryRun<'a>>,
     frames: u64,
     seed: u64,
     latest: FrameResult,
@@ -111,14 +107,16 @@ pub struct NavigationState {
 }
 
 /// The motion of the odometry to a frame.
-#[derive(Debug, Clone, Default)]
-pub struct Motion {
-    /// The reason why the motion to this frame is unknown; empty if it is known, and at the first frame. It ends in
-    /// [`UNKNOWN_MOTION`] where the trajectory is broken and begins again at this frame. Otherwise the frame was
-    /// skipped, and the next motion spans it.
-    pub lost: String,
+#[derive(Debug, Clone)]
+pub enum Motion {
+    /// None: the first frame that the odometry accepted.
+    First,
     /// The motion since the last accepted frame, `earlier_from_later`.
-    pub step: Option<RelativeMotion>,
+    Known(RelativeMotion),
+    /// The odometry skipped the frame for this reason. The next motion spans it.
+    Skipped(String),
+    /// The motion is unknown for this reason. A new segment of the trajectory begins at this frame.
+    Unknown(String),
 }
 
 impl std::fmt::Debug for NavigationSession<'_> {
@@ -185,7 +183,8 @@ impl<'a> NavigationSession<'a> {
         self.targets
     }
 
-    /// Processes the next frame: moves the pose by odometry and takes a fix if one is due.
+    /// Processes the next frame: moves the pose by odometry and takes a fix if one is due. At a frame that the odometry
+    /// skipped, no fix is attempted.
     ///
     /// Frames are stereo pairs of the session's rig, in order of time.
     ///
@@ -241,41 +240,41 @@ impl<'a> NavigationSession<'a> {
     ) -> Result<(FrameResult, NavigationState), String> {
         let pair = stereo_pair(sensor_frame)?;
         let mut events = Vec::new();
-        let odometry = self.carry(sensor_frame, moved, &mut events);
+        let odometry = self.move_pose(sensor_frame, moved, &mut events);
 
         // A fix at a frame that the odometry skipped would have no place in the sequence of motions: none is attempted.
-        let here = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sensor_frame.stamp_ns);
+        let accepted = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sensor_frame.stamp_ns);
         let prior_pose = sensor_frame.prior_pose(self.targets);
         let priors = self.priors(&prior_pose);
         let in_view =
             || self.targets.iter().zip(&priors).any(|(target, prior)| PipelineStages::shows(target, prior, self.rig));
-        let due = match here {
+        let due = match accepted {
             true => self.navigator.due(in_view()),
             false => {
                 let ago = self.last.map_or(0.0, |(stamp_ns, _)| (sensor_frame.stamp_ns - stamp_ns) as f64 * 1e-9);
-                self.navigator.blind(ago, in_view())
+                self.navigator.due_without_motion(ago, in_view())
             }
         };
-        let frame_result = match here && due {
+        let frame_result = match accepted && due {
             true => {
                 let regions = self.stages.regions(self.targets, &[&priors, &prior_pose], self.rig);
                 self.search_targets(sensor_frame, cloud(&regions), &priors, &prior_pose, rng)
             }
             false => FrameResult::default(),
         };
-        let taken = self.fix(&frame_result, &mut events);
-        if here && let Some(keyframe_mapper) = &mut self.keyframe_mapper {
-            keyframe_mapper.visit(sensor_frame, &pair, &mut self.navigator, &taken, &mut events);
+        let placing = self.fix(&frame_result, &mut events);
+        if accepted && let Some(keyframe_mapper) = &mut self.keyframe_mapper {
+            keyframe_mapper.visit(sensor_frame, &pair, &mut self.navigator, &placing, &mut events);
         }
         self.report_changes(&mut events);
-        let pose = self.navigator.pose().filter(|_| here).cloned();
-        let odometry_only = self.odometry_only.clone().filter(|_| here);
+        let pose = self.navigator.pose().filter(|_| accepted).cloned();
+        let odometry_only = self.odometry_only.clone().filter(|_| accepted);
         let state = self.navigator.state();
         Ok((frame_result, NavigationState { state, due, pose, odometry_only, odometry, events, odometry_ms: moved.ms }))
     }
 
     /// Moves the pose to this frame if the motion is known.
-    fn carry(
+    fn move_pose(
         &mut self,
         sensor_frame: &SensorFrame,
         moved: &OdometryResult,
@@ -283,31 +282,31 @@ impl<'a> NavigationSession<'a> {
     ) -> Motion {
         let began = *self.began.get_or_insert(sensor_frame.stamp_ns);
         let now = moved.latest.filter(|(_, waypoint)| waypoint.stamp_ns == sensor_frame.stamp_ns);
-        let (Some((segment, waypoint)), false) = (now, matches!(moved.followed, Followed::Skipped(_))) else {
-            let lost = match &moved.followed {
-                Followed::Skipped(lost) => lost.to_string(),
-                Followed::Began | Followed::Followed { .. } => String::new(),
+        let (Some((segment, waypoint)), false) = (now, matches!(moved.outcome, OdometryOutcome::Skipped(_))) else {
+            let why = match &moved.outcome {
+                OdometryOutcome::Skipped(why) => why.to_string(),
+                OdometryOutcome::Began | OdometryOutcome::Followed { .. } => String::new(),
             };
-            events.push(NavigationEvent::NoMotion { why: lost.clone() });
-            return Motion { lost, step: None };
+            events.push(NavigationEvent::NoMotion { why: why.clone() });
+            return Motion::Skipped(why);
         };
         let before = self.last.replace((sensor_frame.stamp_ns, segment));
-        let Some((stamp_ns, left)) = before else { return Motion::default() };
-        let seconds = (sensor_frame.stamp_ns - stamp_ns) as f64 * 1e-9;
-        let found = waypoint.local.filter(|_| left == segment);
+        let Some((earlier_ns, earlier_segment)) = before else { return Motion::First };
+        let seconds = (sensor_frame.stamp_ns - earlier_ns) as f64 * 1e-9;
+        let measured = waypoint.local.filter(|_| earlier_segment == segment);
         let time = (sensor_frame.stamp_ns - began) as f64 * 1e-9;
         let motion = match &mut self.filter {
-            Some(filter) => filter(time, found),
-            None => found,
+            Some(filter) => filter(time, measured),
+            None => measured,
         };
         self.navigator.advance(seconds, motion.as_ref());
         self.keyframe_mapper.iter_mut().for_each(|keyframe_mapper| keyframe_mapper.advance(seconds, motion.as_ref()));
         self.odometry_only = self.odometry_only.take().zip(motion).map(|(pose, motion)| pose.after(&motion));
-        let Some(motion) = motion else {
-            let why = if found.is_some() { "the odometry failed" } else { "a new segment begins" };
-            return Motion { lost: format!("{why}: {UNKNOWN_MOTION}"), step: None };
-        };
-        Motion { lost: String::new(), step: Some(motion) }
+        match motion {
+            Some(motion) => Motion::Known(motion),
+            None if measured.is_some() => Motion::Unknown("the odometry failed".to_owned()),
+            None => Motion::Unknown("a new segment begins".to_owned()),
+        }
     }
 
     /// The prior of each object: the navigated pose passed to it, otherwise the prior pose of the frame.
@@ -337,9 +336,9 @@ impl<'a> NavigationSession<'a> {
         frame_result
     }
 
-    /// Gives the fixes to the navigator and returns the accepted ones.
+    /// Gives the fixes to the navigator. Returns those that may place a key frame.
     fn fix(&mut self, frame_result: &FrameResult, events: &mut Vec<NavigationEvent>) -> Vec<Navigated> {
-        let mut taken = Vec::new();
+        let mut placing = Vec::new();
         for attempt in &frame_result.attempts {
             let Outcome::Fix(fix) = &attempt.answer.outcome else { continue };
             let target = &self.targets[attempt.target];
@@ -359,7 +358,7 @@ impl<'a> NavigationSession<'a> {
             // A key frame added at an object that may have been moved would be placed wrongly.
             let sure = !self.navigator.is_disputed(attempt.target);
             if sure && matches!(event, Event::Taken | Event::LessAccurate | Event::Relocated) {
-                taken.push(fix.clone());
+                placing.push(fix.clone());
             }
             match event {
                 Event::Taken => events.push(NavigationEvent::FixTaken { object }),
@@ -381,11 +380,11 @@ impl<'a> NavigationSession<'a> {
                 self.odometry_only = Some(fix);
             }
         }
-        taken
+        placing
     }
 
     /// The pose graph in its file format; `None` unless the settings ask for it.
-    pub fn pose_graph(self) -> Option<String> {
+    pub fn into_pose_graph_text(self) -> Option<String> {
         self.keyframe_mapper?.finish()
     }
 

@@ -284,7 +284,7 @@ impl PipelineStages {
     fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<Sought> {
         let target = &view.targets[index];
         match &view.sensor_frame.hints {
-            Hints::Names(_) => None,
+            Hints::Labels(_) => None,
             Hints::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
             Hints::Nothing => self.seek_near(target, view, prior, false, rng),
         }
@@ -360,7 +360,7 @@ impl PipelineStages {
         sought: Option<Option<Sought>>,
         rng: &mut dyn Rng,
     ) -> Option<TargetAttempt> {
-        if let Hints::Names(names) = &view.sensor_frame.hints {
+        if let Hints::Labels(names) = &view.sensor_frame.hints {
             return self.labelled(view, index, names, prior);
         }
         let sought = sought.unwrap_or_else(|| self.seek(view, index, prior, rng))?;

@@ -29,7 +29,7 @@ impl EpipolarCheck {
 
     /// The check of a pair of images, with the default detector and descriptor.
     pub fn of_images(left: &Image, right: &Image, rig: &StereoRig) -> Self {
-        let seen = repeated_patterns(left, right, rig);
+        let seen = matches_by_appearance(left, right, rig);
         let mut off: Vec<f64> = seen.iter().filter_map(|seen| rig.epipolar_distance(seen)).collect();
         off.sort_by(f64::total_cmp);
         let nearer = &off[..off.len() - off.len() / 4];
@@ -51,7 +51,7 @@ impl EpipolarCheck {
 /// The matches of two images by appearance alone, with the default detector and descriptor.
 ///
 /// The rig takes no part in the matching.
-pub fn repeated_patterns(left: &Image, right: &Image, rig: &StereoRig) -> Vec<StereoPixels> {
+pub fn matches_by_appearance(left: &Image, right: &Image, rig: &StereoRig) -> Vec<StereoPixels> {
     let corners = [left, right].map(|image| Harris::default().detect(image));
     let described = [(left, &corners[0]), (right, &corners[1])].map(|(image, at)| Surf::default().describe(image, at));
     let view = |image, side: usize| View { image, keypoints: &corners[side], descriptors: &described[side] };

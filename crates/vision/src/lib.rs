@@ -84,7 +84,7 @@ pub use detect::{
     DETECTORS, Detector, Dog, Fast, FastHessian, FittedCorners, GuidedCorners, Harris, Keypoint, LCorners, Selection,
     ShiTomasi, Window, XCorners,
 };
-pub use epipolar_check::{EpipolarCheck, repeated_patterns};
+pub use epipolar_check::{EpipolarCheck, matches_by_appearance};
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, FrontEndOutput, StageTimes};
 pub use image::{BadImage, Image};

@@ -47,7 +47,7 @@ impl RightCameraRotation {
     /// The distance (px) to the epipolar line below which a pair agrees.
     pub const NEAR: f64 = 1.5;
 
-    /// The correction of `rig` from matches by appearance ([`repeated_patterns`](crate::repeated_patterns)), best of
+    /// The correction of `rig` from matches by appearance ([`matches_by_appearance`](crate::matches_by_appearance)), best of
     /// several images.
     ///
     /// `None` if the given rig fits well enough, if no rotation brings a third of the pairs to their lines, or if the

@@ -518,10 +518,17 @@ fn the_state_is_the_configured_one() {
     let (scenario, policy, fusion) = (NavigationScenario::default(), Interval { seconds: 1.5 }, Fuse::default());
     let mut sailing = scenario.set_out(0);
     let mut navigator = Navigator::new(sailing.surveyed.clone(), &policy, &fusion);
-    assert!(!navigator.blind(0.0, false) || navigator.state() == State::Prior);
+    assert!(!navigator.due_without_motion(0.0, false) || navigator.state() == State::Prior);
     navigator.fix(&sailing.fix(0));
-    assert!(!navigator.blind(1.0, true) && navigator.state() == State::DeadReckoning, "a fix of another instant");
-    assert!(navigator.blind(2.0, true) && navigator.state() == State::DeadReckoning && navigator.pose().is_some());
+    assert!(
+        !navigator.due_without_motion(1.0, true) && navigator.state() == State::DeadReckoning,
+        "a fix of another instant"
+    );
+    assert!(
+        navigator.due_without_motion(2.0, true)
+            && navigator.state() == State::DeadReckoning
+            && navigator.pose().is_some()
+    );
     let mut states = Vec::new();
     for (in_view, fixed) in [(true, false), (true, false), (true, false), (false, false), (true, false), (true, true)] {
         navigator.advance(1.0, Some(&sailing.step()));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix_vision::repeated_patterns;
+use seafix_vision::matches_by_appearance;
 
 use super::{
     evidence::{MeasuredPair, confirmed},
@@ -27,8 +27,10 @@ fn margins() {
         let step = dataset.frames.len().div_ceil(8).max(1);
         let frames = || dataset.frames.iter().enumerate().step_by(step);
         let pairs: Vec<_> = frames().map(|(index, frame)| (index, dataset.pair(frame).unwrap())).collect();
-        let inspected: Vec<_> =
-            pairs.iter().map(|(index, (left, right))| (*index, repeated_patterns(left, right, &dataset.rig))).collect();
+        let inspected: Vec<_> = pairs
+            .iter()
+            .map(|(index, (left, right))| (*index, matches_by_appearance(left, right, &dataset.rig)))
+            .collect();
         let seen: Vec<_> = inspected.iter().flat_map(|(_, seen)| seen.clone()).collect();
         let cells = pairs.iter().map(|(_, (left, _))| cell_difference(left).0).fold(0.0, f64::max);
         let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use seafix::{PosePrior, Rig, StereoImages};
 use seafix_component::Fault;
 use seafix_geometry::{StereoPixels, StereoRig};
-use seafix_vision::{Image, RightCameraRotation, Sides, repeated_patterns};
+use seafix_vision::{Image, RightCameraRotation, Sides, matches_by_appearance};
 
 use seafix_io::{
     ImageLimits,
@@ -99,7 +99,7 @@ pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
     for (index, frame) in dataset.frames.iter().enumerate().step_by(step) {
         let Ok((left, right)) = dataset.pair(frame) else { continue };
         mosaics.extend(mosaic_fault(&left, &frame.left));
-        let matches = repeated_patterns(&left, &right, &dataset.rig);
+        let matches = matches_by_appearance(&left, &right, &dataset.rig);
         inspected.push((index, matches.clone()));
         seen.extend(matches);
     }
@@ -252,7 +252,7 @@ pub(crate) fn rotation_of_sample(
 ) -> Option<RightCameraRotation> {
     let apart = count.div_ceil(ASKED).max(1);
     let some = (0..count).step_by(apart).filter_map(pair);
-    let seen: Vec<StereoPixels> = some.flat_map(|(left, right)| repeated_patterns(&left, &right, rig)).collect();
+    let seen: Vec<StereoPixels> = some.flat_map(|(left, right)| matches_by_appearance(&left, &right, rig)).collect();
     RightCameraRotation::of(&seen, rig)
 }
 

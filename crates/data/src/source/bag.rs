@@ -11,7 +11,7 @@ use seafix_io::{
     unit_fault,
 };
 use seafix_log::Topic;
-use seafix_vision::{Image, Sides, repeated_patterns};
+use seafix_vision::{Image, Sides, matches_by_appearance};
 
 use super::{
     bag_messages::{Messages, Poses, Readings, message_fault},
@@ -195,7 +195,7 @@ impl Bag {
         let mut seen = Vec::new();
         for index in (0..self.pairs.len()).step_by(step) {
             let (left, right) = self.pair(index)?;
-            seen.extend(repeated_patterns(&left, &right, &raw));
+            seen.extend(matches_by_appearance(&left, &right, &raw));
         }
         let residuals = [&raw, &rectified].map(|rig| residual(&seen, rig));
         let said =
@@ -219,7 +219,7 @@ impl Bag {
         for index in (0..self.pairs.len()).step_by(step) {
             let (left, right) = self.pair(index)?;
             sides = sides + Sides::of_images(&left, &right, &self.rig);
-            let matches = repeated_patterns(&left, &right, &self.rig);
+            let matches = matches_by_appearance(&left, &right, &self.rig);
             seen.extend(matches.iter().copied());
             self.inspected.push((index, matches));
             if doubts.is_empty() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 use seafix_component::{Component, Fault, Settings, in_range, read_text};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_io::ImageLimits;
@@ -163,7 +163,7 @@ impl Sequence for Recorded {
     fn sensor_frame(&self, index: usize) -> Result<SensorFrame, Fault> {
         let frame = &self.dataset.frames[index];
         let (left, right) = self.dataset.pair(frame)?;
-        let prior = frame.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
+        let prior = frame.prior.map(|(world_from_camera, covariance)| PosePrior { world_from_camera, covariance });
         let before = index.checked_sub(1).map(|before| self.dataset.frames[before].stamp_ns);
         Ok(SensorFrame {
             stamp_ns: frame.stamp_ns,

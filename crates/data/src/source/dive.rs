@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 use seafix_component::{Component, Fault, Settings};
 use seafix_geometry::{Body, Camera, StereoRig, Transform};
 use seafix_referencing::Site;
@@ -117,7 +117,7 @@ impl Sequence for Dived {
         } else {
             FrameData::Points(instant.points())
         };
-        let prior = instant.prior.map(|(world_from_camera, covariance)| WorldPrior { world_from_camera, covariance });
+        let prior = instant.prior.map(|(world_from_camera, covariance)| PosePrior { world_from_camera, covariance });
         let before = index.checked_sub(1).map(|before| self.mission.instant(before).stamp_ns);
         let readings = self.sensor_buffer.between(before, instant.stamp_ns);
         Ok(SensorFrame { stamp_ns: instant.stamp_ns, frame_data, prior, hints: Hints::Nothing, readings })

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Matrix4;
-use seafix::{FrameData, SensorFrame, WorldPrior};
+use seafix::{FrameData, PosePrior, SensorFrame};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Covariance6, Pinhole, RightCamera, StereoRig, Transform, World};
 use seafix_log::{CameraRecord, ExactPose, FrameRecord, Frames, GreyImage, Inputs, LogError, RigRecord, unchanged};
@@ -278,10 +278,10 @@ impl Logged {
     }
 
     /// The prior pose of such a log, with the typical standard deviations in its header.
-    fn old_prior(&self, frame: &FrameRecord) -> Result<Option<WorldPrior>, String> {
+    fn old_prior(&self, frame: &FrameRecord) -> Result<Option<PosePrior>, String> {
         let (Some(prior), Some((position, attitude))) = (&frame.prior, self.prior_sigma()) else { return Ok(None) };
         let world_from_camera: Transform<World, Camera> =
             Transform::from_rows(&prior.world_from_camera).map_err(|error| format!("prior: {error}"))?;
-        Ok(Some(WorldPrior { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }))
+        Ok(Some(PosePrior { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }))
     }
 }

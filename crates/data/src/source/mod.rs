@@ -49,7 +49,7 @@ pub use crate::{
     sensor_buffer::SensorBuffer,
     sequence::{Sequence, Source, TrueAnswer, Truth},
 };
-pub use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+pub use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 
 /// The registry of all sources.
 pub static SOURCES: Registry<dyn Source> = Registry::new(

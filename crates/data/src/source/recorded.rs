@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 use seafix_component::{Fault, read_text};
 use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform, World};
 use seafix_io::ImageLimits;
@@ -144,7 +144,7 @@ impl Sequence for Recorded {
         let frame_data = FrameData::Stereo(left, right);
         let prior = between(&self.prior, *stamp_ns, self.gap_ns).map(|world_from_camera| {
             let nearest = self.prior.partition_point(|(time, _)| time < stamp_ns).min(self.covariances.len() - 1);
-            WorldPrior { world_from_camera, covariance: self.covariances[nearest] }
+            PosePrior { world_from_camera, covariance: self.covariances[nearest] }
         });
         Ok(SensorFrame { stamp_ns: *stamp_ns, frame_data, prior, hints: Hints::Nothing, readings: Vec::new() })
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix3, Vector3};
-use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 use seafix_component::Fault;
 use seafix_geometry::{Body, Camera, Covariance6, StereoRig, Transform};
 use seafix_referencing::Site;
@@ -72,7 +72,7 @@ impl Sequence for Virtual {
         } else {
             FrameData::Points(frame.points())
         };
-        let prior = WorldPrior {
+        let prior = PosePrior {
             world_from_camera: frame.prior.world_from_camera,
             covariance: Covariance6::isotropic(frame.prior.attitude_sigma, frame.prior.position_sigma),
         };

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Matrix4, UnitQuaternion, Vector3};
-use seafix::{FrameData, Hints, SensorFrame, WorldPrior};
+use seafix::{FrameData, Hints, PosePrior, SensorFrame};
 use seafix_component::{Component, Fault, Settings, in_range};
 use seafix_evaluation::{Seen, cramer_rao};
 use seafix_geometry::{Body, Camera, Covariance6, MeasuredPoint, Object, Point, StereoRig, Transform, World, triad};
@@ -255,7 +255,7 @@ impl Sequence for Layouts {
         let mut stream = Stream::new(self.seed, layout as u64, draw, Purpose::Prior);
         let (turn, step) = (stream.normal3(attitude), stream.normal3(position));
         let xi = [turn.x, turn.y, turn.z, step.x, step.y, step.z].into();
-        let prior = WorldPrior {
+        let prior = PosePrior {
             world_from_camera: self.world_from_camera(layout).perturbed(&xi),
             covariance: Covariance6::isotropic(attitude, position),
         };
@@ -267,7 +267,7 @@ impl Sequence for Layouts {
             cloud[wrong] = other;
         }
         let hints = match self.settings.labelled {
-            true => Hints::Names((0..cloud.len()).map(|point| self.name_of(layout, point)).collect()),
+            true => Hints::Labels((0..cloud.len()).map(|point| self.name_of(layout, point)).collect()),
             false => Hints::Nothing,
         };
         let frame_data = FrameData::Points(cloud);
@@ -365,7 +365,7 @@ mod tests {
         for index in 0..4 {
             let (sensor_frame, truth) = (sequence.sensor_frame(index).unwrap(), sequence.truth(index).unwrap());
             let FrameData::Points(cloud) = sensor_frame.frame_data else { panic!("points") };
-            let Hints::Names(names) = sensor_frame.hints else { panic!("named") };
+            let Hints::Labels(names) = sensor_frame.hints else { panic!("named") };
             for (seen, (object, point)) in cloud.iter().zip(names) {
                 let known = &sequence.site().objects[object];
                 let camera_from_object = truth.world_from_camera.inverse() * truth.world_from_object[object].unwrap();

@@ -8,7 +8,6 @@ use seafix_evaluation::trajectory::Pose;
 use seafix_log::{FrameRecord, Matrix4, Reader, TrialHeader, unchanged};
 
 use super::poses::Trajectory;
-use seafix::UNKNOWN_MOTION;
 
 /// The kind of a logged trajectory of the left camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,7 +80,7 @@ fn step(frame: &FrameRecord) -> Option<Step> {
     match &odometry.motion {
         Some((motion, _)) => Some(Step::Go(pose(motion))),
         None if odometry.lost.is_empty() => Some(Step::Begin),
-        None => odometry.lost.ends_with(UNKNOWN_MOTION).then_some(Step::Broken),
+        None => odometry.is_break().then_some(Step::Broken),
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 use seafix::{
     FrameData, FrameResult, Keyframes, NavigationSession, NavigationStack, NavigationState, OdometryResult,
-    SensorFrame, TrialOdometry, View,
+    OdometryRun, SensorFrame, View,
 };
 use seafix_component::{Fault, decoded, undecodable};
 use seafix_data::source::{Sequence, own_site};
@@ -47,7 +47,7 @@ pub(crate) struct Group<'a> {
 /// The odometries and navigation sessions of a group.
 pub(super) struct Sessions<'a> {
     /// The odometry of each trial that is the first with it.
-    odometries: Vec<Option<TrialOdometry<'a>>>,
+    odometries: Vec<Option<OdometryRun<'a>>>,
     /// The session of each trial that navigates.
     trials: Vec<Option<NavigationSession<'a>>>,
 }
@@ -58,8 +58,7 @@ impl Sessions<'_> {
     /// # Errors
     /// The cause as a sentence: a frame without images, or one that is not later than the previous frame.
     fn advance(&mut self, sensor_frame: &SensorFrame) -> Result<Vec<Option<OdometryResult>>, String> {
-        let advance =
-            |one: &mut Option<TrialOdometry<'_>>| one.as_mut().map(|one| one.advance(sensor_frame)).transpose();
+        let advance = |one: &mut Option<OdometryRun<'_>>| one.as_mut().map(|one| one.advance(sensor_frame)).transpose();
         match self.odometries.iter().flatten().count() {
             0 | 1 => self.odometries.iter_mut().map(advance).collect(),
             _ => self.odometries.par_iter_mut().map(advance).collect(),
@@ -68,7 +67,7 @@ impl Sessions<'_> {
 
     /// The pose graph of each trial that keeps one.
     pub(super) fn pose_graphs(self) -> impl Iterator<Item = Option<String>> {
-        self.trials.into_iter().map(|session| session.and_then(NavigationSession::pose_graph))
+        self.trials.into_iter().map(|session| session.and_then(NavigationSession::into_pose_graph_text))
     }
 }
 

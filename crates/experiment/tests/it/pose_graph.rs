@@ -35,7 +35,7 @@ fn events(frames: &[FrameRecord]) -> Vec<&str> {
 #[test]
 fn a_pose_graph_goes_from_run_to_run() {
     let folder = TempDir::new().unwrap();
-    let first = planned(folder.path(), "first.toml", "add-keyframes = true");
+    let first = planned(folder.path(), "first.toml", "write-file = true");
     // While this value lives, dives of its seed share surface textures, which take most of the time.
     let _kept = first.trials[0].source.open(first.experiment.seed, &first.folder).unwrap();
     let out = folder.path().join("runs/first");

@@ -38,11 +38,36 @@ pub struct NavigatedRecord {
 /// The step of the odometry to a pair.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OdometryStep {
-    /// The reason why the motion to this pair is unknown; empty if it is known, and at the first pair. It ends in `the motion
-    /// to this frame is unknown` where a new segment begins; otherwise the pair was skipped, and the next motion spans it.
+    /// The reason why there is no motion; empty if there is one, and at the first pair. Its end tells a skipped pair from a
+    /// break, see [`is_break`](Self::is_break).
     pub lost: String,
     /// The motion from the last pair that was followed, `earlier_from_later`, and its covariance.
     pub motion: Option<(Matrix4, Matrix6)>,
+}
+
+impl OdometryStep {
+    /// The end of the reason where a new segment begins.
+    const UNKNOWN: &str = ": the motion to this frame is unknown";
+
+    /// A known motion.
+    pub fn known(earlier_from_later: Matrix4, covariance: Matrix6) -> Self {
+        Self { lost: String::new(), motion: Some((earlier_from_later, covariance)) }
+    }
+
+    /// A skipped pair. The next motion spans it.
+    pub fn skipped(why: &str) -> Self {
+        Self { lost: why.to_owned(), motion: None }
+    }
+
+    /// An unknown motion: a new segment begins at this pair.
+    pub fn unknown(why: &str) -> Self {
+        Self { lost: format!("{why}{}", Self::UNKNOWN), motion: None }
+    }
+
+    /// Whether a new segment begins at this pair.
+    pub fn is_break(&self) -> bool {
+        self.lost.ends_with(Self::UNKNOWN)
+    }
 }
 
 mirror! {

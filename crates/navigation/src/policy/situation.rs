@@ -3,9 +3,9 @@
 /// The navigation quantities that a policy may use.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Situation {
-    /// Time since the last accepted fix (s); infinite before the first.
+    /// Time since the last accepted fix or recognised key frame (s); infinite before it and after a break.
     pub seconds: f64,
-    /// Path length since the last accepted fix (m); infinite before the first.
+    /// Path length since then (m); infinite likewise.
     pub metres: f64,
     /// Standard deviation of the camera position along its least accurate axis (m); infinite before the first fix.
     pub sigma: f64,

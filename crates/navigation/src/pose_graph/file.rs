@@ -238,7 +238,7 @@ impl PoseGraph {
                 let cut = if index + 1 == count { "; is the file cut off?" } else { "" };
                 at("invalid line of a pose graph")
                     .value(message)
-                    .remedy(format!("write the file again with `add-keyframes = true`{cut}"))
+                    .remedy(format!("write the file again with `write-file = true`{cut}"))
             })?;
             if (index == 0) != matches!(line, Line::Head(_)) {
                 return Err(at("the first line, and no other, must name the format")

@@ -79,11 +79,11 @@ impl Redundancy {
 /// The integrity of a fix beyond its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Integrity {
-    /// The grade of redundancy by the number of points.
+    /// The grade of redundancy by the number of points and edges.
     pub redundancy: Redundancy,
     /// χ² of the residuals at the maximum-likelihood pose.
     pub chi2: f64,
-    /// The degrees of freedom of χ², 3k − 6.
+    /// The degrees of freedom of χ², 3k + 4m − 6 for k points and m edges.
     pub dof: usize,
     /// The limit of χ², which a correct set exceeds with probability one minus the confidence.
     pub chi2_limit: f64,

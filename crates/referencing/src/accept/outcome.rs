@@ -29,8 +29,8 @@ pub struct Fix {
     pub residual_rms: f64,
     /// The score of the pose; larger is better.
     ///
-    /// For a counting search it is −χ²/2 of residuals and prior, minus χ²₃(confidence)/2 for each pair that the
-    /// largest tested set has in addition: a truncated χ², which makes sets of different sizes comparable. For a
+    /// For a counting search it is −χ²/2 of residuals and prior, minus χ²₃(confidence)/2 for each pair by which
+    /// the set is smaller than the largest tested one: a truncated χ², which makes sets of different sizes comparable. For a
     /// search that weighs evidence it is the log evidence (nats).
     pub score: f64,
     /// The integrity of the fix: redundancy, residual test, solution separation, protection levels.
@@ -174,7 +174,7 @@ pub struct Attempt {
     pub identified: Vec<Correspondence>,
     /// The edges of that set.
     pub identified_edges: Vec<Correspondence>,
-    /// The best pose beyond the alert limit from the answer; not accepted, for comparison only.
+    /// The best pose that differs from the answer by more than the alert limit; not accepted, for comparison only.
     pub runner_up: Option<Alternative>,
     /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
     /// probable.

@@ -44,7 +44,7 @@ pub enum RejectionReason {
     Residuals {
         /// The χ² of the residuals, Σ rᵀ S⁻¹ r, at the maximum-likelihood pose.
         chi2: f64,
-        /// The quantile of χ² with 3k − 6 degrees of freedom at
+        /// The quantile of χ² with 3k + 4m − 6 degrees of freedom, for k points and m edges, at
         /// [`Acceptance::confidence`](crate::Acceptance::confidence).
         limit: f64,
     },

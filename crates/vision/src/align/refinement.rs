@@ -78,7 +78,7 @@ pub trait Refinement: Send + Sync + std::fmt::Debug {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
 pub enum Unaligned {
-    /// The pair keeps the detectors' positions.
+    /// The pair keeps the positions of detector and locator.
     Keep,
     /// The pair is rejected.
     #[default]
