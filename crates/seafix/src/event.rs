@@ -5,7 +5,7 @@ use std::fmt;
 /// An event of one frame, printed as one sentence.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NavigationEvent {
-    /// A frame whose motion the odometry could not estimate.
+    /// A frame that the odometry skipped.
     NoMotion {
         /// The reason.
         why: String,
@@ -58,13 +58,13 @@ pub enum NavigationEvent {
         /// The index of the key frame.
         keyframe: usize,
         /// The number of matches that agree with the motion.
-        found: usize,
+        inliers: usize,
         /// The number of matches.
         matches: usize,
         /// The standard deviation of the position relative to the key frame (m).
         sigma: f64,
         /// Whether the pose graph rejected it.
-        given_up: bool,
+        loop_rejected: bool,
     },
     /// A frame in which no key frame was recognised although one may be in view.
     NoKeyframe {
@@ -105,9 +105,9 @@ impl fmt::Display for NavigationEvent {
                 write!(f, "a third object decides which")
             }
             Self::Displaced { object, metres } => write!(f, "{object} is {metres:.3} m from its place in the survey"),
-            Self::KeyframeFound { keyframe, found, matches, sigma, given_up } => {
-                write!(f, "key frame {keyframe} recognised with {found} of {matches} matches, ")?;
-                match given_up {
+            Self::KeyframeFound { keyframe, inliers, matches, sigma, loop_rejected } => {
+                write!(f, "key frame {keyframe} recognised with {inliers} of {matches} matches, ")?;
+                match loop_rejected {
                     true => write!(f, "rejected: inconsistent with the pose graph"),
                     false => write!(f, "position ± {:.1} mm", 1e3 * sigma),
                 }

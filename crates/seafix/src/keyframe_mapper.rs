@@ -143,7 +143,8 @@ impl<'a> KeyframeMapper<'a> {
         self.traverse.displaced(self.objects[found.object], found.place);
     }
 
-    /// Processes a frame: adds a key frame, recognises one, and corrects the navigator's pose by it.
+    /// Processes a frame: adds a key frame or recognises one, and corrects the navigator's pose if that makes it more
+    /// accurate.
     pub fn visit(
         &mut self,
         sensor_frame: &SensorFrame,
@@ -168,10 +169,10 @@ impl<'a> KeyframeMapper<'a> {
                 let (pose_node, seen) = (found.pose_node, &found.recognized);
                 events.push(NavigationEvent::KeyframeFound {
                     keyframe: pose_node,
-                    found: seen.found,
+                    inliers: seen.found,
                     matches: seen.matches,
                     sigma: seen.motion.covariance.position_sigma(),
-                    given_up: found.given_up,
+                    loop_rejected: found.given_up,
                 });
                 let theirs = |pose: Navigated| Some(Navigated { object: self.targets[pose.object]?, ..pose });
                 if let Some(pose) = found.navigated.and_then(theirs) {

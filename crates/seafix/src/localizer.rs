@@ -159,8 +159,7 @@ impl Localizer {
 
     /// Outcomes of a stereo pair, one for each target in view by the prior.
     ///
-    /// Without a prior every target is searched in the complete cloud; with one, so are objects without a pose in the
-    /// world.
+    /// A target is searched in the complete cloud if there is no prior, or if the target has no pose in the world.
     ///
     /// # Errors
     /// [`Error::ImageSize`]: an image of another size than its camera is calibrated for.
@@ -214,7 +213,7 @@ impl Localizer {
     /// The complete result for one frame: key points, cloud, candidates and outcomes.
     pub fn process(&self, frame: &SensorFrame) -> FrameResult {
         let rig = &self.rig.stereo;
-        let priors = frame.prior_pose(&self.targets);
+        let priors = frame.target_priors(&self.targets);
         let regions = self.stages.regions(&self.targets, &[&priors], rig);
         let cloud = self.stages.cloud(&frame.frame_data, rig, &self.targets, &regions);
         let view = View { sensor_frame: frame, cloud: &cloud, targets: &self.targets, rig };

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     keyframe_mapper::Keyframes,
-    odometry_session::OdometryRun,
+    odometry_session::FrameOdometry,
     pipeline::{PipelineError, build, faults, resolve},
 };
 
@@ -97,7 +97,7 @@ impl NavigationStack {
         &'a self,
         rig: &'a StereoRig,
         body_from_camera: Transform<Body, Camera>,
-    ) -> OdometryRun<'a> {
-        OdometryRun::begin(&*self.odometry, rig, body_from_camera)
+    ) -> FrameOdometry<'a> {
+        FrameOdometry::begin(&*self.odometry, rig, body_from_camera)
     }
 }

@@ -13,7 +13,7 @@ use crate::{
 
 /// An odometry at work on a sequence of frames. It is independent of fixes, so that trials with the same odometry share
 /// it.
-pub struct OdometryRun<'a>(Box<dyn OdometrySession + 'a>);
+pub struct FrameOdometry<'a>(Box<dyn OdometrySession + 'a>);
 
 /// The odometry's result for one frame.
 pub struct OdometryResult {
@@ -25,7 +25,7 @@ pub struct OdometryResult {
     pub ms: f64,
 }
 
-impl<'a> OdometryRun<'a> {
+impl<'a> FrameOdometry<'a> {
     /// The odometry before its first frame.
     pub fn begin(odometry: &'a dyn Odometry, rig: &'a StereoRig, body_from_camera: Transform<Body, Camera>) -> Self {
         Self(odometry.begin(rig, body_from_camera, Threads::One))

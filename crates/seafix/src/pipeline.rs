@@ -103,11 +103,11 @@ pub enum UseOfEdges {
     Off,
 }
 
-/// An invalid pipeline setting.
+/// An invalid setting of the pipeline or of navigation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{message}")]
 pub struct PipelineError {
-    /// The key below `pipeline`.
+    /// The key below `pipeline` or `navigation`.
     pub setting: &'static str,
     /// The key below `setting`, if known; `name` for an unknown component.
     pub key: Option<String>,

@@ -26,7 +26,7 @@ pub struct SensorFrame {
 
 impl SensorFrame {
     /// The prior pose relative to each target; `None` without a prior or without a pose of the target in the world.
-    pub fn prior_pose(&self, targets: &[Target]) -> Vec<Option<Prior>> {
+    pub fn target_priors(&self, targets: &[Target]) -> Vec<Option<Prior>> {
         let prior = |target: &Target| {
             let world = self.prior.as_ref()?;
             target.prior(&world.world_from_camera, &world.covariance)

@@ -18,14 +18,14 @@ use crate::{
     images::check_sizes,
     keyframe_mapper::KeyframeMapper,
     navigation_stack::NavigationStack,
-    odometry_session::{OdometryResult, OdometryRun, stereo_pair},
+    odometry_session::{FrameOdometry, OdometryResult, stereo_pair},
     random,
     sensor_frame::{FrameData, SensorFrame},
     stages::{Cloud, FrameResult, PipelineStages, View},
 };
 
 /// A function that replaces the motion of the odometry, given the time since the first frame (s).
-pub type MotionFilter<'a> = Box<dyn FnMut(f64, Option<RelativeMotion>) -> Option<RelativeMotion> + Send + 'a>;
+pub type MotionOverride<'a> = Box<dyn FnMut(f64, Option<RelativeMotion>) -> Option<RelativeMotion> + Send + 'a>;
 
 /// Navigation of a vehicle through successive frames, from fix to fix.
 ///
@@ -65,11 +65,11 @@ pub struct NavigationSession<'a> {
     rig: &'a StereoRig,
     navigator: Navigator<'a>,
     keyframe_mapper: Option<KeyframeMapper<'a>>,
-    /// The filter of the odometry's motions, for the study of its failures.
-    filter: Option<MotionFilter<'a>>,
+    /// Replaces the odometry's motions, for the study of its failures.
+    motion_override: Option<MotionOverride<'a>>,
     body_from_camera: Transform<Body, Camera>,
     /// The odometry of [`push`](Self::push); `None` before the first frame.
-    odometry: Option<OdometryRun<'a>>,
+    odometry: Option<FrameOdometry<'a>>,
     frames: u64,
     seed: u64,
     latest: FrameResult,
@@ -109,13 +109,14 @@ pub struct NavigationState {
 /// The motion of the odometry to a frame.
 #[derive(Debug, Clone)]
 pub enum Motion {
-    /// None: the first frame that the odometry accepted.
+    /// No motion: this is the first frame that the odometry accepted.
     First,
     /// The motion since the last accepted frame, `earlier_from_later`.
     Known(RelativeMotion),
-    /// The odometry skipped the frame for this reason. The next motion spans it.
+    /// The odometry skipped the frame for this reason. The next motion spans it, unless a segment ends here.
     Skipped(String),
-    /// The motion is unknown for this reason. A new segment of the trajectory begins at this frame.
+    /// The motion is unknown for this reason. A new segment of the trajectory begins, at this frame or at a skipped one
+    /// before it.
     Unknown(String),
 }
 
@@ -152,7 +153,7 @@ impl<'a> NavigationSession<'a> {
                 .pose_graph
                 .as_ref()
                 .map(|keyframes| KeyframeMapper::begin(keyframes, targets, rig, earlier)),
-            filter: None,
+            motion_override: None,
             body_from_camera,
             odometry: None,
             frames: 0,
@@ -172,10 +173,10 @@ impl<'a> NavigationSession<'a> {
         Self { seed, ..self }
     }
 
-    /// Sets a `filter` between the odometry and the navigator.
+    /// Sets a function between the odometry and the navigator.
     #[must_use]
-    pub fn with_motion_filter(self, filter: MotionFilter<'a>) -> Self {
-        Self { filter: Some(filter), ..self }
+    pub fn with_motion_override(self, motion_override: MotionOverride<'a>) -> Self {
+        Self { motion_override: Some(motion_override), ..self }
     }
 
     /// The targets; the field `object` of a [`Navigated`] pose is an index into them.
@@ -220,7 +221,7 @@ impl<'a> NavigationSession<'a> {
 
     /// The attempts of the last frame given to [`push`](Self::push), rejected ones with their reasons; empty if none was
     /// due, or if the odometry skipped the frame.
-    pub fn latest(&self) -> &FrameResult {
+    pub fn last_result(&self) -> &FrameResult {
         &self.latest
     }
 
@@ -244,7 +245,7 @@ impl<'a> NavigationSession<'a> {
 
         // A fix at a frame that the odometry skipped would have no place in the sequence of motions: none is attempted.
         let accepted = self.last.is_some_and(|(stamp_ns, _)| stamp_ns == sensor_frame.stamp_ns);
-        let prior_pose = sensor_frame.prior_pose(self.targets);
+        let prior_pose = sensor_frame.target_priors(self.targets);
         let priors = self.priors(&prior_pose);
         let in_view =
             || self.targets.iter().zip(&priors).any(|(target, prior)| PipelineStages::shows(target, prior, self.rig));
@@ -295,8 +296,8 @@ impl<'a> NavigationSession<'a> {
         let seconds = (sensor_frame.stamp_ns - earlier_ns) as f64 * 1e-9;
         let measured = waypoint.local.filter(|_| earlier_segment == segment);
         let time = (sensor_frame.stamp_ns - began) as f64 * 1e-9;
-        let motion = match &mut self.filter {
-            Some(filter) => filter(time, measured),
+        let motion = match &mut self.motion_override {
+            Some(replace) => replace(time, measured),
             None => measured,
         };
         self.navigator.advance(seconds, motion.as_ref());
@@ -331,7 +332,7 @@ impl<'a> NavigationSession<'a> {
         let view = View { sensor_frame, cloud, targets: self.targets, rig: self.rig };
         let mut frame_result = self.stages.fix_from(view, priors, None, rng);
         if self.navigator.pose().is_some() {
-            self.stages.again(&mut frame_result, view, prior_pose, rng);
+            self.stages.retry_without_fix(&mut frame_result, view, prior_pose, rng);
         }
         frame_result
     }
@@ -343,14 +344,18 @@ impl<'a> NavigationSession<'a> {
             let Outcome::Fix(fix) = &attempt.answer.outcome else { continue };
             let target = &self.targets[attempt.target];
             let object = target.name.clone();
-            let sensitivities =
-                match self.stages.model_errors(fix, target, (&frame_result.cloud, &frame_result.lines), self.rig) {
-                    Ok(sensitivities) => sensitivities,
-                    Err(why) => {
-                        events.push(NavigationEvent::FixUnused { object, why: why.to_string() });
-                        continue;
-                    }
-                };
+            let sensitivities = match self.stages.model_sensitivities(
+                fix,
+                target,
+                (&frame_result.cloud, &frame_result.lines),
+                self.rig,
+            ) {
+                Ok(sensitivities) => sensitivities,
+                Err(why) => {
+                    events.push(NavigationEvent::FixUnused { object, why: why.to_string() });
+                    continue;
+                }
+            };
             let object_pose = ObjectPose::new(fix.object_from_camera, fix.covariance)
                 .with_consider_states(ConsiderStates::of_model(attempt.target, sensitivities));
             let fix = Navigated { object: attempt.target, object_pose };

@@ -29,7 +29,7 @@ pub struct PipelineStages {
     settings: Pipeline,
 }
 
-/// The result of the pipeline for one sensor frame; empty if no fix was attempted.
+/// The result of the pipeline for one sensor frame.
 #[derive(Debug, Default)]
 pub struct FrameResult {
     /// The key points of the left image.
@@ -55,7 +55,7 @@ pub struct TargetAttempt {
     pub candidates: Candidates,
     /// The outcome with its pairs and integrity.
     pub answer: seafix_referencing::Attempt,
-    /// The result of the joint fix as a sentence; `None` if none was asked for.
+    /// The result of the joint fix as a sentence; `None` without one.
     pub joint: Option<String>,
     /// The durations of this target's stages.
     pub times: TargetTimes,
@@ -99,7 +99,7 @@ impl Cloud {
 /// The candidates of one target and the result of the search among them. Both are independent of the solver, so that
 /// trials with different solvers share them.
 #[derive(Debug, Clone)]
-pub struct Sought {
+pub struct SearchResult {
     candidates: Candidates,
     /// The candidates of each edge; empty without edges.
     edges: Vec<Vec<usize>>,
@@ -152,19 +152,19 @@ impl PipelineStages {
         rig: &StereoRig,
         rng: &mut dyn Rng,
     ) -> FrameResult {
-        let priors = sensor_frame.prior_pose(targets);
+        let priors = sensor_frame.target_priors(targets);
         let cloud = &self.cloud(&sensor_frame.frame_data, rig, targets, &self.regions(targets, &[&priors], rig));
         self.fix_from(View { sensor_frame, cloud, targets, rig }, &priors, None, rng)
     }
 
     /// Computes fixes from a cloud and from a prior pose relative to each target.
     ///
-    /// `sought` are results of [`PipelineStages::seek_all`] for the same view; `None` searches here.
+    /// `sought` are results of [`PipelineStages::search_all`] for the same view; `None` searches here.
     pub fn fix_from(
         &self,
         view: View<'_>,
         priors: &[Option<Prior>],
-        sought: Option<&[Option<Sought>]>,
+        sought: Option<&[Option<SearchResult>]>,
         rng: &mut dyn Rng,
     ) -> FrameResult {
         let attempts = (0..view.targets.len())
@@ -181,7 +181,13 @@ impl PipelineStages {
     }
 
     /// Repeats the search, with other priors, for the targets without a fix.
-    pub fn again(&self, frame_result: &mut FrameResult, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) {
+    pub fn retry_without_fix(
+        &self,
+        frame_result: &mut FrameResult,
+        view: View<'_>,
+        priors: &[Option<Prior>],
+        rng: &mut dyn Rng,
+    ) {
         for attempt in &mut frame_result.attempts {
             let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
             if matches!(attempt.answer.outcome, Outcome::Fix(_)) || prior.is_none() {
@@ -196,7 +202,7 @@ impl PipelineStages {
     }
 
     /// The sensitivity of a fix to its model errors, for each model point by its index.
-    pub fn model_errors(
+    pub fn model_sensitivities(
         &self,
         fix: &Fix,
         target: &Target,
@@ -219,7 +225,9 @@ impl PipelineStages {
         self.front_end.detector.is_guided()
     }
 
-    /// The regions of both images where the points of the targets are expected, for lists of the targets' priors.
+    /// The regions of both images where the points of the targets are expected.
+    ///
+    /// `priors` holds lists with one prior of each target; the regions of all lists are joined.
     ///
     /// They are empty for a front end that does not use them, and for targets without a prior.
     pub fn regions(&self, targets: &[Target], priors: &[&[Option<Prior>]], rig: &StereoRig) -> [Regions; 2] {
@@ -234,7 +242,7 @@ impl PipelineStages {
     ///
     /// The `regions` are those where the targets are expected ([`PipelineStages::regions`]).
     ///
-    /// Straight edges are measured if a target has some.
+    /// Straight edges are measured if a target has some, or if corners are made of them (`edge-corners`).
     pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig, targets: &[Target], regions: &[Regions; 2]) -> Cloud {
         let (left, right) = match frame_data {
             FrameData::Points(cloud) => return Cloud::given(cloud, &[]),
@@ -276,12 +284,12 @@ impl PipelineStages {
     }
 
     /// Stages 1 and 2 for every target in view, in order.
-    pub fn seek_all(&self, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) -> Vec<Option<Sought>> {
+    pub fn search_all(&self, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) -> Vec<Option<SearchResult>> {
         (0..view.targets.len()).map(|index| self.seek(view, index, priors[index].as_ref(), rng)).collect()
     }
 
     /// Stages 1 and 2 for one target; `None` if it is out of view or if its points are labelled.
-    fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<Sought> {
+    fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<SearchResult> {
         let target = &view.targets[index];
         match &view.sensor_frame.hints {
             Hints::Labels(_) => None,
@@ -300,7 +308,7 @@ impl PipelineStages {
         prior: Option<&Prior>,
         forced: bool,
         rng: &mut dyn Rng,
-    ) -> Option<Sought> {
+    ) -> Option<SearchResult> {
         let Pipeline { gate, tolerance, .. } = &self.settings;
         let Cloud { points: cloud, lines, .. } = view.cloud;
         let (points, started) = (&target.points, Instant::now());
@@ -332,11 +340,11 @@ impl PipelineStages {
             edges: edges_of(target, lines, &edges),
         };
         let (found, stage2) = timed(|| self.search.search(&problem, rng));
-        Some(Sought { candidates, edges, found, spent: [stage1, stage2] })
+        Some(SearchResult { candidates, edges, found, spent: [stage1, stage2] })
     }
 
     /// Stages 1 and 2 of a problem with candidates, tolerance and prior pose of its own.
-    fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> Sought {
+    fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> SearchResult {
         let (listed, stage1) = timed(|| problem.candidates());
         let (candidates, refused) = match listed {
             Ok(candidates) => (candidates, None),
@@ -348,7 +356,7 @@ impl PipelineStages {
         };
         let posed = posed(target, problem, &candidates, &edges);
         let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
-        Sought { candidates, edges, found, spent: [stage1, stage2] }
+        SearchResult { candidates, edges, found, spent: [stage1, stage2] }
     }
 
     /// The attempt on one target; `None` if it is out of view. `sought` is an earlier result of Stages 1 and 2.
@@ -357,7 +365,7 @@ impl PipelineStages {
         view: View<'_>,
         index: usize,
         prior: Option<&Prior>,
-        sought: Option<Option<Sought>>,
+        sought: Option<Option<SearchResult>>,
         rng: &mut dyn Rng,
     ) -> Option<TargetAttempt> {
         if let Hints::Labels(names) = &view.sensor_frame.hints {
@@ -370,14 +378,14 @@ impl PipelineStages {
         }
     }
 
-    /// Solves and tests the result of a search. If it is no fix and `expand-gates` is set, the search is repeated with
+    /// Solves and tests the result of a search. If it found no pose and `expand-gates` is set, the search is repeated with
     /// larger gates.
     fn solve(
         &self,
         view: View<'_>,
         index: usize,
         prior: Option<&Prior>,
-        sought: Sought,
+        sought: SearchResult,
         rng: &mut dyn Rng,
     ) -> TargetAttempt {
         let started = Instant::now();
@@ -387,8 +395,8 @@ impl PipelineStages {
         let points = &target.points;
         let before: f64 = sought.spent.iter().sum();
         let mut times = [0.0; 3];
-        let mut judged = |sought: Sought, prior: Option<&Prior>| {
-            let Sought { candidates, edges, found, spent: [stage1, stage2] } = sought;
+        let mut judged = |sought: SearchResult, prior: Option<&Prior>| {
+            let SearchResult { candidates, edges, found, spent: [stage1, stage2] } = sought;
             let edges = edges_of(target, lines, &edges);
             let problem =
                 Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior, edges };
@@ -443,8 +451,8 @@ impl PipelineStages {
     }
 
     /// The answer to a problem with candidates, tolerance and prior pose of its own.
-    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: Sought) -> TargetAttempt {
-        let Sought { candidates, edges, found, spent: [stage1, stage2] } = sought;
+    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: SearchResult) -> TargetAttempt {
+        let SearchResult { candidates, edges, found, spent: [stage1, stage2] } = sought;
         let posed = posed(target, problem, &candidates, &edges);
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
         let times = [stage1, stage2, solution];

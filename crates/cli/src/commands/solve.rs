@@ -37,7 +37,7 @@ pub(crate) struct Solve {
     /// Number of problems that are solved at the same time.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: u16,
-    /// Repeat a search without a fix with larger gates, then without gates, for a displaced object.
+    /// Repeat a search that found no pose with larger gates, then without gates, for a displaced object.
     #[arg(long)]
     expand_gates: bool,
     /// Print one JSON object a line.

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use seafix::{
-    FrameData, FrameResult, Keyframes, NavigationSession, NavigationStack, NavigationState, OdometryResult,
-    OdometryRun, SensorFrame, View,
+    FrameData, FrameOdometry, FrameResult, Keyframes, NavigationSession, NavigationStack, NavigationState,
+    OdometryResult, SensorFrame, View,
 };
 use seafix_component::{Fault, decoded, undecodable};
 use seafix_data::source::{Sequence, own_site};
@@ -47,7 +47,7 @@ pub(crate) struct Group<'a> {
 /// The odometries and navigation sessions of a group.
 pub(super) struct Sessions<'a> {
     /// The odometry of each trial that is the first with it.
-    odometries: Vec<Option<OdometryRun<'a>>>,
+    odometries: Vec<Option<FrameOdometry<'a>>>,
     /// The session of each trial that navigates.
     trials: Vec<Option<NavigationSession<'a>>>,
 }
@@ -58,7 +58,8 @@ impl Sessions<'_> {
     /// # Errors
     /// The cause as a sentence: a frame without images, or one that is not later than the previous frame.
     fn advance(&mut self, sensor_frame: &SensorFrame) -> Result<Vec<Option<OdometryResult>>, String> {
-        let advance = |one: &mut Option<OdometryRun<'_>>| one.as_mut().map(|one| one.advance(sensor_frame)).transpose();
+        let advance =
+            |one: &mut Option<FrameOdometry<'_>>| one.as_mut().map(|one| one.advance(sensor_frame)).transpose();
         match self.odometries.iter().flatten().count() {
             0 | 1 => self.odometries.iter_mut().map(advance).collect(),
             _ => self.odometries.par_iter_mut().map(advance).collect(),
@@ -188,7 +189,7 @@ impl Group<'_> {
                 NavigationSession::begin(navigation_stack, &trial.stages, targets, rig, mounting, pose_graph.as_ref());
             let faults = trial.resolved.navigation.as_ref().map_or(&[][..], |navigation| &navigation.faults);
             let mut motions = Motions::default();
-            Some(session.with_motion_filter(Box::new(move |time, motion| motions.passed(faults, time, motion))))
+            Some(session.with_motion_override(Box::new(move |time, motion| motions.passed(faults, time, motion))))
         });
         let odometries = self.trials.iter().enumerate().map(|(which, trial)| {
             let navigation_stack =
@@ -224,7 +225,7 @@ impl Group<'_> {
                     session.advance(&sensor_frame, moved, cloud, stream.rng()).map(|(seen, known)| (seen, Some(known)))
                 }
                 _ => {
-                    let priors = sensor_frame.prior_pose(targets);
+                    let priors = sensor_frame.target_priors(targets);
                     let regions = trial.stages.regions(targets, &[&priors], sequence.rig());
                     let cloud = cloud(&regions);
                     let view = View { sensor_frame: &sensor_frame, cloud, targets, rig: sequence.rig() };

@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use seafix::{Cloud, FrameResult, Pipeline, Sought};
+use seafix::{Cloud, FrameResult, Pipeline, SearchResult};
 use seafix_log::SharedStages;
 
 use crate::experiment::Trial;
@@ -91,7 +91,7 @@ fn same_odometry(a: &Trial, b: &Trial) -> bool {
 #[derive(Debug)]
 pub(super) struct SharedFrame {
     clouds: Vec<Shared<Cloud>>,
-    sought: Vec<Shared<Vec<Option<Sought>>>>,
+    sought: Vec<Shared<Vec<Option<SearchResult>>>>,
 }
 
 impl SharedFrame {
@@ -113,8 +113,8 @@ impl SharedFrame {
         &self,
         sharing: &Sharing,
         trial: usize,
-        make: impl FnOnce() -> Vec<Option<Sought>>,
-    ) -> Option<&[Option<Sought>]> {
+        make: impl FnOnce() -> Vec<Option<SearchResult>>,
+    ) -> Option<&[Option<SearchResult>]> {
         let first = sharing.search[trial];
         let others = sharing.search.iter().filter(|other| **other == first).count() > 1;
         others.then(|| &**self.sought[first].get(make))

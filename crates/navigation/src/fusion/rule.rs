@@ -37,9 +37,9 @@ pub trait Fusion: Send + Sync + std::fmt::Debug {
 
     /// Whether a fix of another object makes the navigated pose relative to that object.
     ///
-    /// `there` is the fused pose relative to the new object, `here` the pose relative to the current one. The default
-    /// requires that the position of `there` has at most twice the standard deviation of `here`: the new object is the
-    /// relevant one, but at the edge of the image its fix is far less accurate than the propagated pose.
+    /// `there` is the fused pose relative to the new object, `here` the pose relative to the current one. By
+    /// default it does unless that would more than double the standard deviation of the position, as for an object at
+    /// the edge of the image.
     fn passes(&self, here: &ObjectPose, there: &ObjectPose) -> bool {
         /// Maximum ratio of the standard deviations of `there` and `here`.
         const POOR: f64 = 2.0;

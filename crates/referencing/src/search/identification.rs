@@ -10,12 +10,13 @@ use crate::{
 
 /// A search for correspondences between model points and cloud points (data association).
 ///
-/// Every search has a budget: pair tests beyond the tests that build its graph (default 10⁷), or the words of the
-/// graph that `rigid-consensus` reads. A search that spends it returns the best set so far, with `optimal` false and
+/// Most searches have a setting `budget`: the maximum number of pair tests, without those that build the graph.
+/// `rigid-consensus` counts the words that it reads of its graph. A search that spends its budget returns the best set so far, with `optimal` false and
 /// `undecided` set to [`Rejected::Budget`]. It returns [`Rejected::Budget`] as the error if no three pairs were found
 /// to agree.
 ///
-/// A minimal search takes the first coherent candidate of each model point:
+/// A minimal search takes the first coherent candidate of each model point. It shows the interface; it does not meet
+/// the laws of a search:
 ///
 /// ```
 /// use rand::{Rng, SeedableRng};
@@ -90,8 +91,8 @@ pub struct Identification {
     pub consensus_bound: usize,
     /// Number of pair tests, including the tests that build the graph.
     pub pair_tests: u64,
-    /// Reason not to accept the set by itself. Either a larger set is a mirror image, or the search ended before it had
-    /// examined or excluded every different set of the same size. `None` also for a search without alternatives.
+    /// If set, this set must not become a fix by itself: a larger set is a mirror image, or the search ended before it
+    /// had excluded other sets of the same size. A search that looks for no alternatives leaves it `None`.
     pub undecided: Option<Rejected>,
     /// Posterior probabilities of this pose and of its alternatives; `None` for a search that counts pairs.
     pub posterior: Option<Posterior>,

@@ -119,8 +119,8 @@ pub trait Solver: Send + Sync + std::fmt::Debug {
     /// relative to their distance. A solver with a single minimum returns none.
     ///
     /// Let `max` be the quantile of χ²₁ at the confidence c, and let there be two minima at a distance d. The
-    /// probability that the wrong one is the answer, without the right one among the alternatives, is at most (1 − c)/2
-    /// for every d: the difference of their χ² is normal with mean d² and variance 4d², and Q((d² + max) / 2d) is
+    /// solver then answers with the wrong one and omits the right one with a probability of at most (1 − c)/2, whatever
+    /// d is: the difference of their χ² is normal with mean d² and variance 4d², and Q((d² + max) / 2d) is
     /// largest at d² = `max`.
     fn alternatives(&self, data: &Observations<'_>, at: &Transform<Object, Camera>, max: f64) -> Vec<AlternativePose> {
         let _ = (data, at, max);

@@ -21,7 +21,7 @@ pub(super) struct DiveArguments {
     /// Relative standard deviation of the baseline: that of the scale of a model from a dive.
     #[arg(long, default_value_t = CalibrationSigma::default().baseline, value_name = "FRACTION")]
     pub(super) baseline_sigma: f64,
-    /// Standard deviation of the place that the locator calls a corner (px), in common to all pairs of a dive.
+    /// Systematic error of a located corner against the physical one (px, one standard deviation), equal in all pairs of a dive.
     #[arg(long, default_value_t = ModelFromDive::CORNER_SIGMA, value_name = "PX")]
     pub(super) corner_sigma: f64,
     /// List the straight edges near the points that three or more pairs show.
