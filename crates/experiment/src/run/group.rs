@@ -229,7 +229,7 @@ impl Group<'_> {
                     let regions = trial.stages.regions(targets, &[&priors], sequence.rig());
                     let cloud = cloud(&regions);
                     let view = View { sensor_frame: &sensor_frame, cloud, targets, rig: sequence.rig() };
-                    let seek = || trial.stages.seek_all(view, &priors, stream.rng());
+                    let seek = || trial.stages.search_all(view, &priors, stream.rng());
                     let sought = shared.sought(&self.sharing, which, seek);
                     Ok((trial.stages.fix_from(view, &priors, sought, stream.rng()), None))
                 }

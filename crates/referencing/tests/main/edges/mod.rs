@@ -1,5 +1,6 @@
 //! Laws of edges: the bound of the solvers, and the search with acceptance.
 
+mod absent;
 mod bound;
 mod brute_force;
 mod laws;

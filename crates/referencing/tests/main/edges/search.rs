@@ -67,7 +67,7 @@ fn places() -> [(Vector3<f64>, f64); 3] {
     [(Vector3::zeros(), 0.0), (Vector3::new(0.9, 0.1, 0.0), 0.5), (Vector3::new(0.2, 0.8, -0.1), 1.2)]
 }
 
-fn model() -> Model {
+pub(super) fn model() -> Model {
     let mut all: Vec<Vector3<f64>> = Vec::new();
     for (at, turn) in places() {
         let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), turn);
