@@ -4,12 +4,12 @@ use std::{collections::BTreeMap, time::Instant};
 
 use seafix_geometry::StereoRig;
 use seafix_referencing::{
-    Candidates, Correspondence, Gathered, JointFixes, Member, ObjectObservations, Observations, Outcome, Target,
-    TargetKind, gather, joint_fixes,
+    Candidates, Gathered, JointFixes, Member, ObjectObservations, Observations, Outcome, Target, TargetKind, gather,
+    joint_fixes,
 };
 
 use crate::{
-    stages::{FrameResult, PipelineStages, TargetAttempt},
+    stages::{FrameResult, PipelineStages},
     times::milliseconds,
 };
 
@@ -22,8 +22,8 @@ impl PipelineStages {
         }
     }
 
-    /// The observations that a frame contributes to a joint fix: the identified points of every object with a fix of
-    /// its own, and the points of other objects at their predicted places.
+    /// The observations that a frame contributes to a joint fix: the identified points and edges of every object with a
+    /// fix of its own, and the points of other objects at their predicted places.
     pub fn object_observations(
         &self,
         frame_result: &mut FrameResult,
@@ -34,18 +34,29 @@ impl PipelineStages {
         if self.settings().target != TargetKind::Joint {
             return object_observations;
         }
-        let fixed: Vec<(usize, Vec<Correspondence>)> = frame_result
-            .attempts
-            .iter()
-            .filter_map(|attempt| Some((attempt.target, pairs(attempt)?.to_vec())))
-            .collect();
-        if fixed.is_empty() {
+        let mut used = Vec::new();
+        for attempt in &frame_result.attempts {
+            let Outcome::Fix(fix) = &attempt.answer.outcome else { continue };
+            let Target { points, edges, .. } = &targets[attempt.target];
+            let data = Observations::of(&fix.pairs, points, &frame_result.cloud, Some(rig));
+            object_observations.see(attempt.target, &data.with_edges(&fix.edges, edges, points, &frame_result.lines));
+            object_observations.poses.push((attempt.target, fix.object_from_camera));
+            used.extend(fix.pairs.iter().map(|pair| pair.cloud));
+        }
+        if object_observations.poses.is_empty() {
             return object_observations;
         }
         let mut listed: Vec<Option<&Candidates>> = vec![None; targets.len()];
         frame_result.attempts.iter().for_each(|attempt| listed[attempt.target] = Some(&attempt.candidates));
-        let others = gather(rig, targets, &frame_result.cloud, &listed, &fixed, &self.settings().acceptance);
-        for (object, pairs) in fixed.iter().chain(&others.added) {
+        let others = gather(
+            rig,
+            targets,
+            &frame_result.cloud,
+            &listed,
+            (&object_observations, &used),
+            &self.settings().acceptance,
+        );
+        for (object, pairs) in &others.added {
             object_observations
                 .see(*object, &Observations::of(pairs, &targets[*object].points, &frame_result.cloud, Some(rig)));
         }
@@ -64,13 +75,13 @@ impl PipelineStages {
         targets: &[Target],
         rig: &StereoRig,
     ) {
-        if own.points.is_empty() {
+        if own.poses.is_empty() {
             return;
         }
         let start = Instant::now();
         // A frame that shares no object with this one adds no information about it.
         let related = |object_observations: &&&ObjectObservations| {
-            object_observations.points.iter().any(|(object, _)| own.points.iter().any(|(same, _)| same == object))
+            (0..targets.len()).any(|object| own.shows(object) && object_observations.shows(object))
         };
         let all: Vec<ObjectObservations> = before.iter().filter(related).copied().chain([own]).cloned().collect();
         let members: Vec<Member> = targets.iter().map(Target::member).collect();
@@ -100,14 +111,6 @@ impl PipelineStages {
     }
 }
 
-/// The pairs of an accepted attempt.
-fn pairs(attempt: &TargetAttempt) -> Option<&[Correspondence]> {
-    match &attempt.answer.outcome {
-        Outcome::Fix(fix) => Some(&fix.pairs),
-        _ => None,
-    }
-}
-
 /// The sentences about a joint fix.
 #[derive(Default)]
 struct JointReport {
@@ -124,10 +127,15 @@ fn describe(
     fixes: &JointFixes,
     targets: &[Target],
 ) -> JointReport {
-    let points = |n: usize| if n == 1 { "1 point".to_owned() } else { format!("{n} points") };
+    let counted = |n: usize, one: &str| if n == 1 { format!("1 {one}") } else { format!("{n} {one}s") };
+    let features = |[points, edges]: [usize; 2]| match (points, edges) {
+        (_, 0) => counted(points, "point"),
+        (0, _) => counted(edges, "edge"),
+        _ => format!("{}, {}", counted(points, "point"), counted(edges, "edge")),
+    };
     let (mut part, mut out, mut reported) = (Vec::new(), Vec::new(), BTreeMap::new());
-    for (object, target) in targets.iter().enumerate().filter(|(object, _)| own.count(*object) > 0) {
-        let (name, seen) = (&target.name, points(own.count(object)));
+    for (object, target) in targets.iter().enumerate().filter(|(object, _)| own.shows(*object)) {
+        let (name, seen) = (&target.name, features(own.count(object)));
         let gathered = others.added.iter().any(|(added, _)| *added == object);
         if fixes.left_out.contains(&object) {
             let why = format!("{seen}, inconsistent with the other objects");

@@ -15,7 +15,7 @@ pub struct JointFixes {
     pub object_from_camera: Vec<Option<RelativePose>>,
     /// The indices of displaced objects, whose surveys were rejected.
     pub displaced: Vec<usize>,
-    /// The indices of objects with one or two points that contradict the rest; their points were excluded.
+    /// The indices of objects with too few features for a pose that contradict the rest; these were excluded.
     pub left_out: Vec<usize>,
     /// χ² of pixels and surveys together.
     pub chi2: f64,
@@ -47,8 +47,8 @@ pub enum Unjoined {
 /// One fix over all `observations_by_frame`; the result describes the last instant.
 ///
 /// Surveys that contradict the images at this `confidence` are rejected one after the other: always the survey whose
-/// rejection minimises χ². An object with fewer than three points in every instant cannot determine its own pose, so
-/// its points are excluded instead of its survey.
+/// rejection minimises χ². An object whose features cannot determine its pose in any instant, such as two points, loses
+/// these instead of its survey.
 ///
 /// # Errors
 ///
@@ -63,31 +63,27 @@ pub fn joint_fixes(
     observations_by_frame: &[ObjectObservations],
     confidence: f64,
 ) -> Result<JointFixes, Unjoined> {
-    /// Number of points that determine an object's pose.
-    const ENOUGH: usize = 3;
     let (mut members, mut observations_by_frame) = (members.to_vec(), observations_by_frame.to_vec());
     let (mut displaced, mut left_out) = (Vec::new(), Vec::new());
     let mut fix = joint_fix(rig, &members, &observations_by_frame)?;
-    let max = |object: usize, observations_by_frame: &[ObjectObservations]| {
-        observations_by_frame.iter().map(|g| g.count(object)).max().unwrap_or(0)
+    let suffices = |object: usize, observations_by_frame: &[ObjectObservations]| {
+        observations_by_frame.iter().any(|observations| observations.suffices(object))
     };
     let limit = |fix: &JointFix| chi_square(fix.dof.max(1), confidence);
     // A NaN is rejected as well.
     while !(fix.chi2 <= limit(&fix)) {
         let seen = (0..members.len()).filter(|&o| members[o].placement != Placement::Displaced);
         let (held, weak): (Vec<usize>, Vec<usize>) = seen
-            .filter(|&o| max(o, &observations_by_frame) > 0)
-            .partition(|&o| max(o, &observations_by_frame) >= ENOUGH);
+            .filter(|&o| observations_by_frame.iter().any(|observations| observations.shows(o)))
+            .partition(|&o| suffices(o, &observations_by_frame));
         // One object must keep its stated pose, as nothing else relates the camera to the site.
         let given_up = if held.len() < 2 { Vec::new() } else { held };
         let without = |&object: &usize| {
             let (mut members, mut observations_by_frame) = (members.clone(), observations_by_frame.clone());
-            if max(object, &observations_by_frame) < ENOUGH {
-                observations_by_frame
-                    .iter_mut()
-                    .for_each(|object_observations| object_observations.points.retain(|(o, _)| *o != object));
-            } else {
+            if suffices(object, &observations_by_frame) {
                 members[object].placement = Placement::Displaced;
+            } else {
+                observations_by_frame.iter_mut().for_each(|observations| observations.remove(object));
             }
             let fix = joint_fix(rig, &members, &observations_by_frame).ok()?;
             Some((object, members, observations_by_frame, fix))
@@ -105,7 +101,7 @@ pub fn joint_fixes(
     left_out.sort_unstable();
     Ok(JointFixes {
         object_from_camera: (0..members.len())
-            .map(|object| (last.count(object) > 0).then(|| fix.object_from_camera(instant, object)))
+            .map(|object| last.shows(object).then(|| fix.object_from_camera(instant, object)))
             .collect(),
         displaced,
         left_out,

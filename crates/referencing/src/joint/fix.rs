@@ -8,7 +8,7 @@ use crate::{
     joint::{
         member::{Member, ObjectObservations},
         relative_pose::RelativePose,
-        system::{JointState, System},
+        system::{JointState, System, with_edges},
     },
     observations::{Observation, Observations},
     solve::{
@@ -55,15 +55,32 @@ impl JointFix {
     }
 }
 
+/// The pose of the camera in the site from the fix of one object, of several the one under which all features fit best.
+fn nearest_start(
+    rig: &StereoRig,
+    members: &[Member],
+    observations: &ObjectObservations,
+) -> Option<Transform<Object, Camera>> {
+    let groups = with_edges(rig, std::slice::from_ref(observations));
+    let system = System::new(rig, members, std::slice::from_ref(observations), &groups).ok()?;
+    let places: Vec<_> = members.iter().map(|member| member.site_from_object).collect();
+    let starts = observations.poses.iter().map(|(object, pose)| places[*object] * *pose);
+    let costs = starts
+        .filter_map(|pose| Some((system.cost(&JointState { poses: vec![pose], places: places.clone() }).ok()?, pose)));
+    costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, pose)| pose)
+}
+
 /// The maximum-likelihood poses of all instants and objects, from pixels and surveys.
 ///
-/// It minimises Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η by the Levenberg–Marquardt method on the dense normal equations. Each
-/// instant starts from the unweighted fit of its points, with the objects at their stated poses; a far displaced object
+/// It minimises Σ rᵀ S⁻¹ r + Σ ηᵀ Σ_survey⁻¹ η by the Levenberg–Marquardt method on the dense normal equations, r being
+/// the pixel residuals of points and the offsets of edges. Features of one object that share model places at one instant
+/// share their errors. Each instant starts from the unweighted fit of its points, or from the pose of an object if the
+/// points determine none, with the objects at their stated poses; a far displaced object
 /// is found from there as long as other objects, or most points, are at their stated poses.
 ///
 /// # Errors
 ///
-/// [`Degenerate`], for an instant with fewer than three points or with collinear points, points without pixels, a point
+/// [`Degenerate`], for an instant without a start, with points or edges without pixels, a point
 /// behind the camera, or an undetermined motion (a displaced object that no other object relates to the site).
 ///
 /// # Panics
@@ -79,6 +96,9 @@ pub fn joint_fix(
         if object_observations.points.iter().any(|(_, point)| point.pixels.is_none()) {
             return Err(Degenerate::NoPixels);
         }
+        if object_observations.edges.iter().any(|(_, edge)| edge.measured.segments.is_none()) {
+            return Err(Degenerate::NoPixels);
+        }
         let in_site = |(object, point): &(usize, Observation)| Observation {
             model: members[*object].site_from_object * point.model,
             ..*point
@@ -88,14 +108,17 @@ pub fn joint_fix(
             edges: Vec::new(),
             rig: Some(rig),
         };
-        wide_enough(&data)?;
-        poses.push(least_squares(&data.points));
+        poses.push(match wide_enough(&data) {
+            Ok(()) => least_squares(&data.points),
+            Err(why) => nearest_start(rig, members, object_observations).ok_or(why)?,
+        });
     }
     if poses.is_empty() {
         return Err(Degenerate::TooFew { found: 0, needed: 3 });
     }
     let start = JointState { poses, places: members.iter().map(|member| member.site_from_object).collect() };
-    let system = System::new(rig, members, observations_by_frame)?;
+    let groups = with_edges(rig, observations_by_frame);
+    let system = System::new(rig, members, observations_by_frame, &groups)?;
     let (state, chi2) = system.minimize(start)?;
     let covariance = system.covariance(&state)?;
     let block = |at: Option<usize>| {

@@ -64,7 +64,8 @@ pub enum Unadded {
     Degenerate(#[from] Degenerate),
 }
 
-/// The points of objects outside `fixed` that contribute to their joint fix.
+/// The points of objects without a fix that contribute to the joint fix of the `fixed` ones, whose features use the cloud
+/// points `used`.
 ///
 /// One or two points of an object determine no pose, but with a survey each of them adds four pixel coordinates. The
 /// joint fix of `fixed` determines the camera's pose. From it and the survey the points of every other object are
@@ -85,21 +86,18 @@ pub fn gather(
     targets: &[Target],
     cloud: &[MeasuredPoint],
     listed: &[Option<&Candidates>],
-    fixed: &[(usize, Vec<Correspondence>)],
+    (fixed, used): (&ObjectObservations, &[usize]),
     acceptance: &Acceptance,
 ) -> Gathered {
     let mut gathered = Gathered::default();
     let members: Vec<Member> = targets.iter().map(Target::member).collect();
-    let mut object_observations = ObjectObservations::default();
+    let mut object_observations = fixed.clone();
     let mut free: Vec<bool> = cloud.iter().map(|point| point.pixels.is_some()).collect();
-    for (object, pairs) in fixed {
-        object_observations.see(*object, &Observations::of(pairs, &targets[*object].points, cloud, Some(rig)));
-        pairs.iter().for_each(|pair| free[pair.cloud] = false);
-    }
+    used.iter().for_each(|&point| free[point] = false);
     let Some(mut fix) = agreeing(rig, &members, &object_observations, acceptance.confidence) else { return gathered };
     let (site_from_camera, covariance) = &fix.site_from_camera[0];
     let mut others: Vec<Gates> = Vec::new();
-    for (object, target) in targets.iter().enumerate().filter(|(object, _)| fixed.iter().all(|(o, _)| o != object)) {
+    for (object, target) in targets.iter().enumerate().filter(|(object, _)| !fixed.shows(*object)) {
         match members[object].placement {
             Placement::Displaced if listed[object].is_some() => gathered.left_out.push((object, Unadded::Unsurveyed)),
             Placement::Displaced => {}
@@ -330,7 +328,18 @@ mod tests {
         }
 
         fn gathered(&self) -> Gathered {
-            gather(&self.rig, &self.targets, &self.cloud, &[None; 3], &self.fixed(), &Acceptance::default())
+            self.gather(&self.targets, &[None; 3])
+        }
+
+        fn gather(&self, targets: &[Target], listed: &[Option<&Candidates>]) -> Gathered {
+            let mut fixed = ObjectObservations::default();
+            let mut used = Vec::new();
+            for (object, pairs) in self.fixed() {
+                let points = &targets[object].points;
+                fixed.see(object, &Observations::of(&pairs, points, &self.cloud, Some(&self.rig)));
+                used.extend(pairs.iter().map(|pair| pair.cloud));
+            }
+            gather(&self.rig, targets, &self.cloud, listed, (&fixed, &used), &Acceptance::default())
         }
 
         /// The pose relative to the first object from these pairs.
@@ -421,13 +430,13 @@ mod tests {
         targets[1].world_from_object = None;
         let listed = Candidates::all(5, unknown.cloud.len());
         let lists = [Some(&listed), Some(&listed), None];
-        let message = gather(&unknown.rig, &targets, &unknown.cloud, &lists, &unknown.fixed(), &Acceptance::default());
+        let message = unknown.gather(&targets, &lists);
         assert_eq!(message, Gathered { added: Vec::new(), left_out: vec![(1, Unadded::Unsurveyed)] });
         // Stage 1 ran and listed nothing.
         let none = Candidates { lists: vec![Vec::new(); 5] };
         let lists = [Some(&listed), Some(&none), None];
         let scene = scene([5, 2, 0], 5e-4, 0, &mut rng);
-        let message = gather(&scene.rig, &scene.targets, &scene.cloud, &lists, &scene.fixed(), &Acceptance::default());
+        let message = scene.gather(&scene.targets, &lists);
         assert_eq!(message, Gathered::default());
     }
 }

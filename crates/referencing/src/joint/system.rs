@@ -1,16 +1,19 @@
 //! The normal equations of a joint fix.
 
+use std::collections::BTreeSet;
+
 use faer::{Mat, Side, linalg::solvers::Solve};
 use nalgebra::{Matrix3x6, Matrix6, Vector3, Vector6};
 use seafix_geometry::{Camera, Object, StereoRig, Transform, so3::skew};
 
 use super::member::{Member, ObjectObservations, Placement};
 use crate::{
-    observations::Observation,
+    observations::{Observation, Observations},
     solve::{
         degeneracy::{Degenerate, converged},
         likelihood::{
-            descent::Term,
+            descent::{Linearized as ObjectTerms, Term},
+            mixed::Mixed,
             normal::{inverse, rounding},
             pixel_terms::{PixelTerms, TermTarget as PixelTarget},
         },
@@ -28,12 +31,41 @@ pub(super) struct JointState {
 pub(super) struct System<'a> {
     members: &'a [Member],
     observations_by_frame: &'a [ObjectObservations],
+    /// The points of each frame, without those of objects with edges.
+    points: Vec<Vec<(usize, Observation)>>,
     pixel_terms: Vec<PixelTerms<'a>>,
+    /// Objects with edges: the frame, the object, and its features together.
+    mixed: Vec<(usize, usize, Mixed<'a>)>,
     /// The index of each object's block of six unknowns; `None` for an exact pose.
     unknowns: Vec<Option<usize>>,
     /// The inverse of each survey's covariance.
     surveys: Vec<Option<Matrix6<f64>>>,
     blocks: usize,
+}
+
+/// The points and edges of an object with edges in one frame.
+pub(super) struct WithEdges<'a> {
+    frame: usize,
+    object: usize,
+    data: Observations<'a>,
+}
+
+/// The objects with edges of every frame. Their features share model places, so that they are solved together.
+pub(super) fn with_edges<'a>(rig: &'a StereoRig, observations_by_frame: &[ObjectObservations]) -> Vec<WithEdges<'a>> {
+    let of_frame = |(frame, all): (usize, &ObjectObservations)| {
+        let objects: BTreeSet<usize> = all.edges.iter().map(|(object, _)| *object).collect();
+        let group = |object: usize| WithEdges {
+            frame,
+            object,
+            data: Observations {
+                points: all.points.iter().filter(|(o, _)| *o == object).map(|(_, point)| *point).collect(),
+                edges: all.edges.iter().filter(|(o, _)| *o == object).map(|(_, edge)| *edge).collect(),
+                rig: Some(rig),
+            },
+        };
+        objects.into_iter().map(group).collect::<Vec<_>>()
+    };
+    observations_by_frame.iter().enumerate().flat_map(of_frame).collect()
 }
 
 struct Linearized {
@@ -54,19 +86,27 @@ impl<'a> System<'a> {
         rig: &'a StereoRig,
         members: &'a [Member],
         observations_by_frame: &'a [ObjectObservations],
+        groups: &'a [WithEdges<'a>],
     ) -> Result<Self, Degenerate> {
+        let mixed: Vec<(usize, usize, Mixed<'a>)> = groups
+            .iter()
+            .map(|group| Ok((group.frame, group.object, Mixed::of(&group.data, Some(rig), Some(rig))?)))
+            .collect::<Result<_, Degenerate>>()?;
+        let mut points = Vec::with_capacity(observations_by_frame.len());
         let mut pixel_terms = Vec::with_capacity(observations_by_frame.len());
         for object_observations in observations_by_frame {
-            let points: Vec<Observation> = object_observations.points.iter().map(|(_, point)| *point).collect();
+            let own: Vec<(usize, Observation)> = object_observations
+                .points
+                .iter()
+                .filter(|(object, _)| object_observations.edges.iter().all(|(o, _)| o != object))
+                .copied()
+                .collect();
             let mut seen = PixelTerms::new(rig);
-            seen.see(&points, PixelTarget::Pixels)?;
+            seen.see(&own.iter().map(|(_, point)| *point).collect::<Vec<_>>(), PixelTarget::Pixels)?;
+            points.push(own);
             pixel_terms.push(seen);
         }
-        let seen = |object: usize| {
-            observations_by_frame
-                .iter()
-                .any(|object_observations| object_observations.points.iter().any(|(o, _)| *o == object))
-        };
+        let seen = |object: usize| observations_by_frame.iter().any(|observations| observations.shows(object));
         let mut blocks = observations_by_frame.len();
         let mut unknowns = Vec::with_capacity(members.len());
         let mut surveys = Vec::with_capacity(members.len());
@@ -80,7 +120,7 @@ impl<'a> System<'a> {
                 _ => None,
             });
         }
-        Ok(Self { members, observations_by_frame, pixel_terms, unknowns, surveys, blocks })
+        Ok(Self { members, observations_by_frame, points, pixel_terms, mixed, unknowns, surveys, blocks })
     }
 
     /// The index of an object's block of six unknowns.
@@ -88,10 +128,9 @@ impl<'a> System<'a> {
         self.unknowns[object]
     }
 
-    /// The number of pixel coordinates and survey numbers minus that of the unknowns.
+    /// The number of pixel coordinates, offsets and survey numbers minus that of the unknowns.
     pub(super) fn dof(&self) -> usize {
-        let pixels: usize =
-            self.observations_by_frame.iter().map(|object_observations| 4 * object_observations.points.len()).sum();
+        let pixels: usize = self.observations_by_frame.iter().map(|all| 4 * (all.points.len() + all.edges.len())).sum();
         (pixels + 6 * self.surveys.iter().flatten().count()).saturating_sub(6 * self.blocks)
     }
 
@@ -101,11 +140,9 @@ impl<'a> System<'a> {
     fn linearize(&self, state: &JointState, live: bool) -> Result<Linearized, Degenerate> {
         let size = 6 * self.blocks;
         let mut all = Linearized { normal: Mat::zeros(size, size), gradient: Mat::zeros(size, 1), cost: 0.0 };
-        for (f, (object_observations, pixel_terms)) in
-            self.observations_by_frame.iter().zip(&self.pixel_terms).enumerate()
-        {
+        for (f, (points, pixel_terms)) in self.points.iter().zip(&self.pixel_terms).enumerate() {
             let (r, t) = (state.poses[f].rotation_matrix(), state.poses[f].translation());
-            for (k, (object, point)) in object_observations.points.iter().enumerate() {
+            for (k, (object, point)) in points.iter().enumerate() {
                 let place = &state.places[*object];
                 let at: Vector3<f64> = r.tr_mul(&((*place * point.model).coords - t));
                 let term = if live { pixel_terms.live(k, &at) } else { pixel_terms.frozen(k, &at) };
@@ -129,6 +166,11 @@ impl<'a> System<'a> {
                 }
             }
         }
+        for (f, object, mixed) in &self.mixed {
+            let pose = state.places[*object].inverse() * state.poses[*f];
+            let terms = if live { mixed.shared(&pose)? } else { mixed.independent(&pose)? };
+            all.add_object(*f, self.unknowns[*object], &pose, &terms);
+        }
         for (object, survey) in self.surveys.iter().enumerate() {
             let (Some(information), Some(o)) = (survey, self.unknowns[object]) else { continue };
             let eta = self.members[object].site_from_object.error_to(&state.places[object]);
@@ -144,6 +186,11 @@ impl<'a> System<'a> {
             }
         }
         if all.cost.is_finite() { Ok(all) } else { Err(Degenerate::NotFinite) }
+    }
+
+    /// The cost at a state, with weights that are comparable between states.
+    pub(super) fn cost(&self, state: &JointState) -> Result<f64, Degenerate> {
+        self.linearize(state, false).map(|all| all.cost)
     }
 
     fn moved(&self, state: &JointState, step: &Mat<f64>) -> JointState {
@@ -213,7 +260,30 @@ fn right_jacobian_inverse(eta: &Vector6<f64>) -> Matrix6<f64> {
 impl Linearized {
     /// Adds JₐᵀW J_b to the block (a, b), a ≥ b; only the lower half is factorised.
     fn add(&mut self, a: usize, b: usize, by_a: &Matrix3x6<f64>, by_b: &Matrix3x6<f64>, term: &Term) {
-        let block = by_a.transpose() * term.information * by_b;
+        self.add_block(a, b, &(by_a.transpose() * term.information * by_b));
+    }
+
+    fn pull(&mut self, a: usize, by_a: &Matrix3x6<f64>, term: &Term) {
+        self.add_gradient(a, &(by_a.transpose() * term.pull));
+    }
+
+    /// Adds the normal equations of the pose of frame `f` relative to an object, `pose`.
+    ///
+    /// Under T_sc Exp(ξ) and T_so Exp(η) it moves by T_oc Exp(ξ − Ad(T_oc⁻¹) η).
+    fn add_object(&mut self, f: usize, unknown: Option<usize>, pose: &Transform<Object, Camera>, terms: &ObjectTerms) {
+        let normal = terms.normal();
+        self.cost += terms.cost;
+        self.add_block(f, f, &normal);
+        self.add_gradient(f, &terms.gradient);
+        if let Some(o) = unknown {
+            let by_place = -pose.inverse().adjoint();
+            self.add_block(o, o, &(by_place.transpose() * normal * by_place));
+            self.add_block(o, f, &(by_place.transpose() * normal));
+            self.add_gradient(o, &(by_place.transpose() * terms.gradient));
+        }
+    }
+
+    fn add_block(&mut self, a: usize, b: usize, block: &Matrix6<f64>) {
         for i in 0..6 {
             for j in 0..6 {
                 self.normal[(6 * a + i, 6 * b + j)] += block[(i, j)];
@@ -221,8 +291,7 @@ impl Linearized {
         }
     }
 
-    fn pull(&mut self, a: usize, by_a: &Matrix3x6<f64>, term: &Term) {
-        let pull = by_a.transpose() * term.pull;
+    fn add_gradient(&mut self, a: usize, pull: &Vector6<f64>) {
         for i in 0..6 {
             self.gradient[(6 * a + i, 0)] += pull[i];
         }
@@ -254,7 +323,7 @@ impl Linearized {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::joint::tests::{instant, normal, object_observations, pose_of, rig};
+    use crate::joint::tests::{instant, normal, object_observations, observed_edges, pose_of, rig};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use seafix_geometry::Covariance6;
@@ -277,8 +346,14 @@ mod tests {
                 .zip([Placement::Exact, Placement::Surveyed(survey), Placement::Displaced])
                 .map(|(&site_from_object, placement)| Member { site_from_object, placement })
                 .collect();
-            let seen = [0, 1].map(|k| object_observations(&rig, &message, k, 1.0, &mut rng));
-            let system = System::new(&rig, &members, &seen).unwrap();
+            let mut seen = [0, 1].map(|k| object_observations(&rig, &message, k, 1.0, &mut rng));
+            // Two objects of the second instant show edges as well.
+            for object in [0, 1] {
+                let edges = observed_edges(&rig, &message[object], 1, 1.0, &mut rng);
+                seen[1].edges.extend(edges.into_iter().map(|edge| (object, edge)));
+            }
+            let groups = with_edges(&rig, &seen);
+            let system = System::new(&rig, &members, &seen, &groups).unwrap();
             let mut off = |size: f64| Vector6::from_fn(|_, _| normal(&mut rng) * size);
             let state = JointState {
                 poses: (0..2).map(|k| instant(k).perturbed(&off(0.02))).collect(),

@@ -102,6 +102,11 @@ impl Linearized {
         Self { normal: Normal::of_matrix(normal), gradient, cost }
     }
 
+    /// The information on ξ as a matrix.
+    pub(crate) fn normal(&self) -> Matrix6<f64> {
+        self.normal.matrix()
+    }
+
     /// The sum with the terms of `other`.
     pub(crate) fn plus(mut self, other: &Self) -> Self {
         self.normal.join(&other.normal);
