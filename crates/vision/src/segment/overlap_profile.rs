@@ -19,7 +19,7 @@ use crate::workspace::Workspace;
 /// depths are possible. The levels beside them are compared on either flank apart, since behind an outline lies another
 /// background in each image: the more alike flank counts twice. A pair's weight grows with every neighbour that may lie
 /// at the same depth. A match is the best pair of both its segments, by a margin over every other one. Pieces of one
-/// straight edge are no rivals: an edge that is whole in one image and interrupted in the other has one match.
+/// straight edge do not compete: an edge that is whole in one image and interrupted in the other has one match.
 ///
 /// Limits: an edge that repeats along the epipolar lines, in a uniform place, has no unique match.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
@@ -198,11 +198,11 @@ impl OverlapProfile {
         by_right.sort_unstable_by_key(|candidate| (candidate.right, candidate.left));
         let within = PIECES_PX / focal;
         let clear = |own: &[Candidate], best: &Candidate| {
-            let rival = |other: &&Candidate| match other.left == best.left {
+            let competes = |other: &&Candidate| match other.left == best.left {
                 true => other.right != best.right && !are_pieces(&right[other.right], &right[best.right], within),
                 false => !are_pieces(&left[other.left], &left[best.left], within),
             };
-            own.iter().filter(rival).all(|other| other.weight <= self.ratio * best.weight)
+            own.iter().filter(competes).all(|other| other.weight <= self.ratio * best.weight)
         };
         for own in candidates.chunk_by(|a, b| a.left == b.left) {
             let Some(best) = heaviest(own) else { continue };

@@ -106,9 +106,9 @@ fn lines_lie_on_the_edges_for_any_baseline() {
     }
 }
 
-/// An edge that is whole in one image and interrupted in the other has a match: its pieces are no rivals of each other.
+/// An edge that is whole in one image and interrupted in the other has a match: its pieces do not compete with each other.
 #[test]
-fn pieces_of_an_edge_are_no_rivals() {
+fn pieces_of_an_edge_do_not_compete() {
     let rig = rig([0.25, 0.0, 0.0], &[]);
     let ([x0, y0], [_, y1], _) = RECTANGLES[0];
     // The middle of a long side of the first rectangle, in the frame of the wall and of the left camera.

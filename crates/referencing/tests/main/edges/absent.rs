@@ -38,7 +38,8 @@ fn centre() -> Vector3<f64> {
 impl Scene {
     fn edges(self, rng: &mut ChaCha8Rng) -> Vec<Segment> {
         let model = model();
-        let own: Vec<Segment> = model.edges.iter().map(|edge| edge.places(&model.points)).collect();
+        let own: Vec<Segment> =
+            model.edges.iter().map(|edge| edge.places(&model.points).map(|end| end.coords)).collect();
         let direction = |rng: &mut ChaCha8Rng| {
             let [from, to] = own[rng.random_range(0..own.len())];
             (to - from).normalize()
