@@ -1,6 +1,5 @@
 //! The matcher of segments by epipolar overlap and the levels beside them.
 
-use nalgebra::Vector2;
 use seafix_component::{Component, Settings, in_range};
 use seafix_geometry::StereoRig;
 use serde::{Deserialize, Serialize};
@@ -18,8 +17,7 @@ use crate::workspace::Workspace;
 /// Two segments may match if the epipolar lines of their ends overlap them, the brighter side is the same, and the
 /// depths are possible. The levels beside them are compared on either flank apart, since behind an outline lies another
 /// background in each image: the more alike flank counts twice. A pair's weight grows with every neighbour that may lie
-/// at the same depth. A match is the best pair of both its segments, by a margin over every other one. Pieces of one
-/// straight edge do not compete: an edge that is whole in one image and interrupted in the other has one match.
+/// at the same depth. A match is the best pair of both its segments, by a margin.
 ///
 /// Limits: an edge that repeats along the epipolar lines, in a uniform place, has no unique match.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
@@ -57,7 +55,7 @@ impl Default for OverlapProfile {
 
 impl Component for OverlapProfile {
     const NAME: &'static str = "overlap-profile";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "epipolar overlap, polarity, the levels of both flanks and neighbours at equal depth";
     const SOURCE: &'static str =
         "Schmid and Zisserman, Automatic line matching across views, CVPR 1997; epipolar beam and flanks";
@@ -77,7 +75,6 @@ impl Component for OverlapProfile {
 /// A possible match of a left segment.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    left: usize,
     right: usize,
     likeness: f64,
     weight: f64,
@@ -90,14 +87,12 @@ struct Kept {
     strips: [Strips; 2],
     candidates: Vec<Candidate>,
     starts: Vec<usize>,
-    by_right: Vec<Candidate>,
+    best: Vec<[f64; 2]>,
     neighbours: Vec<(f64, usize)>,
 }
 
 /// The number of neighbours that support a pair.
 const NEIGHBOURS: usize = 8;
-/// The distance (px) from the line of the longer of two pieces within which the shorter one lies.
-const PIECES_PX: f64 = 1.0;
 /// The relative difference of inverse depths that halves a neighbour's support.
 const SAME_DEPTH: f64 = 0.08;
 
@@ -116,7 +111,7 @@ impl SegmentMatcher for OverlapProfile {
         kept.strips[1].fill(right.image, rig.right(), right.segments);
         self.candidates(left.segments, right.segments, rig, kept);
         self.support(left.segments, kept);
-        self.select([left.segments, right.segments], rig.mean_focal(), kept, found);
+        self.select(left.segments.len(), right.segments.len(), kept, found);
     }
 }
 
@@ -140,7 +135,7 @@ impl OverlapProfile {
                 let likeness = alike(&flanks, a, b);
                 if likeness >= self.min_likeness {
                     let inverse_depth = overlap.inverse_depth();
-                    candidates.push(Candidate { left: i, right: j, likeness, weight: likeness, inverse_depth });
+                    candidates.push(Candidate { right: j, likeness, weight: likeness, inverse_depth });
                 }
             }
         }
@@ -192,43 +187,34 @@ impl OverlapProfile {
     }
 
     /// The pairs that are the best of both segments by a margin.
-    fn select(&self, [left, right]: [&[FittedSegment]; 2], focal: f64, kept: &mut Kept, found: &mut Vec<SegmentMatch>) {
-        let Kept { candidates, by_right, .. } = kept;
-        by_right.clone_from(candidates);
-        by_right.sort_unstable_by_key(|candidate| (candidate.right, candidate.left));
-        let within = PIECES_PX / focal;
-        let clear = |own: &[Candidate], best: &Candidate| {
-            let competes = |other: &&Candidate| match other.left == best.left {
-                true => other.right != best.right && !are_pieces(&right[other.right], &right[best.right], within),
-                false => !are_pieces(&left[other.left], &left[best.left], within),
-            };
-            own.iter().filter(competes).all(|other| other.weight <= self.ratio * best.weight)
-        };
-        for own in candidates.chunk_by(|a, b| a.left == b.left) {
-            let Some(best) = heaviest(own) else { continue };
-            let first = by_right.partition_point(|other| other.right < best.right);
-            let theirs = &by_right[first..];
-            let theirs = &theirs[..theirs.partition_point(|other| other.right == best.right)];
-            let mutual = heaviest(theirs).is_some_and(|other| other.left == best.left);
-            if mutual && clear(own, best) && clear(theirs, best) {
-                found.push(SegmentMatch { left: best.left, right: best.right });
+    fn select(&self, left: usize, right: usize, kept: &mut Kept, found: &mut Vec<SegmentMatch>) {
+        let Kept { candidates, starts, best, .. } = kept;
+        // The best and the second best weight of each right segment.
+        best.clear();
+        best.resize(right, [0.0; 2]);
+        for candidate in candidates.iter() {
+            offer(&mut best[candidate.right], candidate.weight);
+        }
+        for i in 0..left {
+            let own = &candidates[starts[i]..starts[i + 1]];
+            let mut two = [0.0; 2];
+            own.iter().for_each(|candidate| offer(&mut two, candidate.weight));
+            let Some(first) = own.iter().find(|candidate| candidate.weight == two[0]) else { continue };
+            let clear = |[first, second]: [f64; 2]| second <= self.ratio * first;
+            if best[first.right][0] == two[0] && clear(two) && clear(best[first.right]) {
+                found.push(SegmentMatch { left: i, right: first.right });
             }
         }
     }
 }
 
-/// The first candidate of the largest weight.
-fn heaviest(candidates: &[Candidate]) -> Option<&Candidate> {
-    candidates.iter().reduce(|best, next| if next.weight > best.weight { next } else { best })
-}
-
-/// Whether two segments may be pieces of one straight edge: the shorter lies on the line of the longer, with the brighter
-/// side on the same hand.
-fn are_pieces(a: &FittedSegment, b: &FittedSegment, within: f64) -> bool {
-    let (long, short) = if a.length >= b.length { (a, b) } else { (b, a) };
-    let along = (long.ends[1] - long.ends[0]).normalize();
-    let on_line = |end: &Vector2<f64>| along.perp(&(end - long.ends[0])).abs() <= within;
-    short.ends.iter().all(on_line) && along.dot(&(short.ends[1] - short.ends[0])) > 0.0
+/// Enters a weight into the best two.
+fn offer(best: &mut [f64; 2], weight: f64) {
+    if weight > best[0] {
+        *best = [weight, best[0]];
+    } else if weight > best[1] {
+        best[1] = weight;
+    }
 }
 
 /// The likeness of two segments by both flanks, 0 to 1.

@@ -106,32 +106,6 @@ fn lines_lie_on_the_edges_for_any_baseline() {
     }
 }
 
-/// An edge that is whole in one image and interrupted in the other has a match: its pieces do not compete with each other.
-#[test]
-fn pieces_of_an_edge_do_not_compete() {
-    let rig = rig([0.25, 0.0, 0.0], &[]);
-    let ([x0, y0], [_, y1], _) = RECTANGLES[0];
-    // The middle of a long side of the first rectangle, in the frame of the wall and of the left camera.
-    let middle = 0.5 * (y0 + y1);
-    let [x, y] = [turned(x0, -middle), turned(middle, x0)];
-    let at = rig.project(&Point::new(x, y, DEPTH)).expect("in view");
-    for (side, pixel) in [(0, at.left), (1, at.right)] {
-        let mut images = images(&rig);
-        for (i, level) in images[side].pixels_mut().iter_mut().enumerate() {
-            let [u, v] = [(i % SIZE[0]) as f64 - pixel.u, (i / SIZE[0]) as f64 - pixel.v];
-            if u.abs().max(v.abs()) < 12.0 {
-                *level = 110.0;
-            }
-        }
-        let on_the_side = |line: &&MeasuredLine| {
-            let ends = line.ends.map(|end| turned(end.coords.x, end.coords.y));
-            line.depth && ends.iter().all(|end| (end - x0).abs() < 0.02)
-        };
-        let found = measured(&images, &rig, "overlap-profile", 0.0).lines;
-        assert_eq!(found.iter().filter(on_the_side).count(), 1, "image {side}");
-    }
-}
-
 /// The camera model's own error is added to the variance of each offset, and to nothing else.
 #[test]
 fn the_error_of_the_camera_model_widens_lines_alone() {
