@@ -108,6 +108,7 @@ pub struct NavigationState {
 
 /// The motion of the odometry to a frame.
 #[derive(Debug, Clone)]
+#[expect(clippy::large_enum_variant, reason = "one a frame, nearly always a known motion")]
 pub enum Motion {
     /// No motion: this is the first frame that the odometry accepted.
     First,
