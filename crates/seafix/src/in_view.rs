@@ -16,7 +16,7 @@ const MARGIN: f64 = 8.0;
 /// The points of a target that may be in view, and are not seen from behind: [`SIGMAS`] standard deviations of the
 /// prediction reach the viewing cones of both cameras.
 ///
-/// `None` if there are fewer than three, so that no fix is attempted. Without a prior, every point may be in view.
+/// `None` if there are fewer than three. Without a prior, every point may be in view.
 pub(crate) fn in_view(points: &[ModelPoint], prior: Option<&Prior>, rig: &StereoRig) -> Option<Vec<bool>> {
     let Some(prior) = prior else { return Some(vec![true; points.len()]) };
     let mask = visible(points, prior, rig);

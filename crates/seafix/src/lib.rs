@@ -32,8 +32,8 @@
 //! A fix holds the pose, its covariance and its integrity. An image pair without a fix is no error: its [`Outcome`]
 //! states the reason and the remedy.
 //!
-//! Every stage is a component chosen by name ([`Localizer::from_toml`]) or given as a trait object
-//! ([`Localizer::with_solver`]). This crate reads images, rigs and sites. It does not depend on logs, simulation or
+//! Every stage is a component chosen by name ([`Localizer::from_toml`]); search, solver, detector, descriptor and matcher
+//! may be trait objects ([`Localizer::with_solver`]). This crate reads images, rigs and sites. It does not depend on logs, simulation or
 //! ground truth.
 //!
 //! Units are metres, radians, nanoseconds and pixels. `a_from_b` maps column vectors: `p_a = a_from_b · p_b`.

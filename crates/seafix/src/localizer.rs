@@ -61,7 +61,7 @@ impl Localizer {
     /// A localizer with the default pipeline.
     ///
     /// # Errors
-    /// [`Error::NoWorld`]: an object without a pose in the world, if the pipeline's target needs one.
+    /// Those of [`Localizer::with_pipeline`], which the default settings do not cause.
     pub fn new(site: &Site, rig: &Rig) -> Result<Self, Error> {
         Self::with_pipeline(site, rig, &Pipeline::default())
     }

@@ -43,7 +43,7 @@ pub enum Hints {
     Nothing,
     /// The label of each cloud point as (object, point) indices, each at most once. No search runs.
     Labels(Vec<(usize, usize)>),
-    /// A coherence problem with model, tolerance, candidates and prior of its own. The settings `gate` and `tolerance` of
+    /// A coherence problem with tolerance, candidates and prior of its own. The settings `gate` and `tolerance` of
     /// the pipeline do not apply.
     Problem(Arc<CoherenceProblem>),
 }

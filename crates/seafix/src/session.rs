@@ -24,7 +24,8 @@ use crate::{
     stages::{Cloud, FrameResult, PipelineStages, View},
 };
 
-/// A function that replaces the motion of the odometry, given the time since the first frame (s).
+/// A function that replaces the motion of the odometry. It is called with the time since the first frame (s) and the
+/// measured motion, and returns the motion to use; `None` is a break.
 pub type MotionOverride<'a> = Box<dyn FnMut(f64, Option<RelativeMotion>) -> Option<RelativeMotion> + Send + 'a>;
 
 /// Navigation of a vehicle through successive frames, from fix to fix.
@@ -92,11 +93,12 @@ pub struct NavigationState {
     pub state: State,
     /// Whether a fix was due.
     pub due: bool,
-    /// The pose relative to the object of the last fix.
+    /// The pose relative to the object of the last fix or, after a recognised key frame, to the most accurate object of the pose
+    /// graph.
     ///
-    /// `None` for a skipped frame, and from the start or a break on until the next fix or recognised key frame.
+    /// `None` at a skipped frame, before the first fix, and after a break until a fix or a recognised key frame.
     pub pose: Option<Navigated>,
-    /// The first fix moved to this frame by odometry alone; `None` before it and after a gap of the odometry.
+    /// The first fix moved to this frame by odometry alone; `None` before it, at a skipped frame, and after a break.
     pub odometry_only: Option<Navigated>,
     /// The motion of the odometry to this frame.
     pub odometry: Motion,
@@ -186,7 +188,8 @@ impl<'a> NavigationSession<'a> {
     }
 
     /// Processes the next frame: moves the pose by odometry and takes a fix if one is due. At a frame that the odometry
-    /// skipped, no fix is attempted.
+    /// skipped, no fix is attempted. Objects are searched at the navigated pose, those without a fix there again at the
+    /// frame's own prior; [`last_result`](Self::last_result) has the attempts.
     ///
     /// Frames are stereo pairs of the session's rig, in order of time.
     ///
@@ -212,7 +215,7 @@ impl<'a> NavigationSession<'a> {
         Ok(state)
     }
 
-    /// The error of the rig's disparities that the motion has revealed; `None` if it has revealed none.
+    /// The constant error of the rig's disparities (px), estimated from motion; `None` until it is determined.
     ///
     /// The odometry corrects it in its own rig, unless its setting `correct-range-offset` is false. Fixes use the rig as
     /// given: build the localizer with [`StereoRig::with_range_offset`] to correct them too.

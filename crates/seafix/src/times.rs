@@ -26,7 +26,7 @@ pub struct TargetTimes {
     pub candidates_ms: Option<f64>,
     /// Search.
     pub search_ms: Option<f64>,
-    /// Solver and acceptance tests.
+    /// Solver and acceptance tests, and a joint fix.
     pub solve_ms: Option<f64>,
     /// All stages, the common ones included.
     pub total_ms: Option<f64>,

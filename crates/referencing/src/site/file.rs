@@ -63,7 +63,7 @@ pub(super) struct ObjectFile {
 pub(super) struct PointFile {
     /// Name of the point, unique in its object.
     pub(super) id: String,
-    /// Coordinates in any frame that all points of the object share (m).
+    /// Coordinates in the object frame (m).
     pub(super) at: [f64; 3],
     /// Standard deviation of a coordinate (m); 0, the default, is an exact model.
     #[serde(default, skip_serializing_if = "is_zero")]
