@@ -4,8 +4,10 @@ import signal
 import subprocess
 import sys
 
-#: A search with a budget of hours, in a program of its own, so that nothing of it is left.
+#: A search with a budget of hours, in a program of its own, so that nothing of it is left. A shell starts programs in the
+#: background with Ctrl-C ignored; the first line undoes that.
 PROGRAM = """
+import signal; signal.signal(signal.SIGINT, signal.default_int_handler)
 import numpy as np, seafix as sf
 rng = np.random.default_rng(0)
 problem = sf.Problem(rng.uniform(-1, 1, (30, 3)), rng.uniform(-1, 1, (150, 3)) + [0, 0, 3], sigma=0.05)
