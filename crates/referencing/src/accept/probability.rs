@@ -45,7 +45,8 @@ impl Probability {
             // As for a search with a posterior: the most probable kind of absence holds.
             Some(of) => {
                 let by_number = by_nfa(libm::exp(of.ln_nfa).min(expected_sets(problem, pairs)));
-                Self::of(larger(by_number, by_nfa(libm::exp(-of.ln_evidence))), 0.0)
+                let without = libm::log(1.0 + libm::exp(of.ln_resembling));
+                Self::of(larger(by_number, by_nfa(libm::exp(without - of.ln_evidence))), 0.0)
             }
         }
     }

@@ -70,6 +70,10 @@ pub struct Posterior {
     pub evidence_gap: Option<f64>,
     /// ln of the number of false alarms of the best pose by points and edges together; `None` without edges or prior.
     pub ln_nfa: Option<f64>,
+    /// ln evidence (nats) of another structure of the object's kind in its place; `None` without edges or prior.
+    ///
+    /// Such a structure has edges in the same directions, which meet as the object's do, but dimensions of its own.
+    pub resembling: Option<f64>,
     /// The support of independent pairs, in place of all evidence of clutter; `None` but for a large putative set.
     pub support: Option<Support>,
 }
@@ -96,7 +100,7 @@ pub struct PosteriorProbabilities {
     pub elsewhere: f64,
     /// Probability that the object is absent.
     pub absent: f64,
-    /// Part of `absent` due to a repeated pattern that looks like the object.
+    /// Part of `absent` due to a repeated pattern or another structure that looks like the object.
     pub alike: f64,
     /// Part of `absent` due to clutter that is denser or more structured than uniform clutter.
     pub clutter: f64,
@@ -153,6 +157,7 @@ impl Posterior {
     /// (m, RMS over the model points) of the best count as one with it. Further hypotheses:
     ///
     /// - A pattern like the object's is in its place, without the object.
+    /// - Another structure of the object's kind is in its place.
     /// - The object's own pattern is in its place, and the object at another shift of it: the object is elsewhere.
     /// - A pose beside the best, in points that the best does not use, shows how much evidence clutter of this cloud
     ///   produces. Without the object, clutter would have produced the best pose with the same probability.
@@ -166,6 +171,7 @@ impl Posterior {
             return self.by_support(support, model, limit);
         }
         let pattern = self.pattern_alone.unwrap_or(f64::NEG_INFINITY);
+        let resembling = self.resembling.unwrap_or(f64::NEG_INFINITY);
         let shifted = self.pattern_shifted.unwrap_or(f64::NEG_INFINITY);
         let beside = self.apart(&self.beside, model, limit).first().map_or(0.0, |other| other.ln_evidence);
         let clutter = if beside > ACCIDENT { beside } else { 0.0 };
@@ -173,7 +179,7 @@ impl Posterior {
         let among =
             self.structured_clutter.map_or(f64::NEG_INFINITY, |of| best.ln_evidence + of.ln_evidence + LN_RESEMBLES);
         let imitated = self.structured_clutter.map_or(f64::NEG_INFINITY, |of| among + of.ln_alone);
-        let max = [clutter, pattern, shifted, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
+        let max = [clutter, pattern, resembling, shifted, among, imitated].into_iter().fold(best.ln_evidence, f64::max);
         let (mut map_estimate, mut elsewhere) = (0.0, libm::exp(shifted - max));
         for other in &self.explanations {
             // Structured clutter may be beside the object wherever the object is.
@@ -185,7 +191,7 @@ impl Posterior {
                 elsewhere += fraction;
             }
         }
-        let alike = libm::exp(pattern - max);
+        let alike = libm::exp(pattern - max) + libm::exp(resembling - max);
         let of_clutter = libm::exp(clutter - max) + libm::exp(imitated - max);
         let absent = of_clutter + alike;
         let all = map_estimate + elsewhere + absent;

@@ -20,6 +20,7 @@ use super::{
         prior_terms::PriorTerms,
         proof::{Proved, prove},
         repeated_pattern::Pattern,
+        resembling,
         seeds::{Seeds, Swept, guided::LARGE},
         structured_clutter::{Occupied, StructuredClutter},
         support::IndependentPairs,
@@ -66,6 +67,8 @@ use crate::{a_contrario::coordinates::shuffled, problem::Problem, solve::likelih
 ///   there without the object.
 /// - Poses elsewhere explain more than uniform clutter would: clutter resembles the object, which may be present
 ///   or absent ([`StructuredClutter`]).
+/// - Another structure of the object's kind is there: its edges have the directions of the object's and meet as they do,
+///   with other dimensions ([`Posterior::resembling`]).
 /// - Putative pairs confuse points of similar appearance: the model also fits the same places in another order, and
 ///   each of these orders is supported by several pairs.
 ///
@@ -122,7 +125,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 7;
+    const VERSION: u32 = 8;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -327,17 +330,19 @@ impl Search for RigidConsensus {
             ln_clutter_density: mode.ln_clutter_density,
         };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
-        let ln_nfa = edge_terms.as_ref().filter(|_| !best.edges.is_empty()).and_then(|edges| {
-            let climb = Climb {
-                model: problem.model,
-                terms: &terms,
-                prior_terms: &prior_terms,
-                graph: &graph,
-                taken: &none,
-                compared: Cell::new(0),
-            };
-            ln_nfa(&Joined { climb: &climb, edges, taken: &none }, best)
-        });
+        let compared = Cell::new(0);
+        let climb = Climb {
+            model: problem.model,
+            terms: &terms,
+            prior_terms: &prior_terms,
+            graph: &graph,
+            taken: &none,
+            compared,
+        };
+        let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());
+        let joined = joined.map(|edges| Joined { climb: &climb, edges, taken: &none });
+        let ln_nfa = joined.as_ref().and_then(|joined| ln_nfa(joined, best));
+        let resembling = joined.as_ref().and_then(|joined| resembling::ln_evidence(joined, best));
         Ok(Identification {
             edges: identified,
             alternatives: Vec::new(),
@@ -358,6 +363,7 @@ impl Search for RigidConsensus {
                 unlikely: unlikely.as_ref().map(explanation),
                 evidence_gap,
                 ln_nfa,
+                resembling,
                 support,
             }),
             pairs,

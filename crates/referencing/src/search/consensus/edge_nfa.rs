@@ -12,6 +12,7 @@ use super::{
     local_maxima::Climb,
     motion::Motion,
     prior_terms::PriorTerms,
+    resembling,
 };
 use crate::{problem::Problem, search::features::FeatureSet};
 
@@ -22,6 +23,8 @@ pub(crate) struct Counted {
     pub(crate) ln_nfa: f64,
     /// ln of the evidence of the pose against clutter alone.
     pub(crate) ln_evidence: f64,
+    /// ln of the evidence of another structure of the object's kind, likewise.
+    pub(crate) ln_resembling: f64,
 }
 
 /// Number of steps from the pose of a set to that with its prior.
@@ -77,7 +80,8 @@ pub(crate) fn of_counted(
     let of_edges: Vec<usize> = of_edges.collect();
     let (motion, factor) = joined.fit(&members, &of_edges, &Motion::of(camera_from_object), STEPS)?;
     let mode = joined.mode(members, of_edges, motion, &factor)?;
-    Some(Counted { ln_nfa: ln_nfa(&joined, &mode)?, ln_evidence: mode.ln_evidence })
+    let ln_resembling = resembling::ln_evidence(&joined, &mode).unwrap_or(f64::NEG_INFINITY);
+    Some(Counted { ln_nfa: ln_nfa(&joined, &mode)?, ln_evidence: mode.ln_evidence, ln_resembling })
 }
 
 /// The number of members of a mode within a gate.

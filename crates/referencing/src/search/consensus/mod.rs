@@ -28,11 +28,13 @@ mod posterior_volume;
 pub(crate) mod prior_terms;
 pub(crate) mod proof;
 pub(crate) mod repeated_pattern;
+pub(crate) mod resembling;
 pub(crate) mod seeds;
 mod solve6;
 pub(crate) mod structured_clutter;
 pub(crate) mod support;
 mod visible;
+mod wireframe;
 
 pub use structured_clutter::StructuredClutter;
 pub use support::Support;

@@ -124,7 +124,9 @@ const PRIORS: [(f64, f64); 2] = [(0.0087, 0.1), (0.035, 0.5)];
 #[test]
 fn structured_lines_without_the_object_get_no_fix() {
     for (k, scene) in SCENES.into_iter().enumerate() {
-        assert_eq!(answers(scene, PRIORS[0], 6, k as u64), [0, 0], "{scene:?}");
+        for (prior, frames) in PRIORS.into_iter().zip([6, 40]) {
+            assert_eq!(answers(scene, prior, frames, k as u64), [0, 0], "{scene:?}");
+        }
     }
 }
 

@@ -6,5 +6,6 @@ mod brute_force;
 mod laws;
 mod near;
 mod planted;
+mod resembling;
 mod scene;
 mod search;
