@@ -54,7 +54,7 @@ pub(crate) enum Command {
     Sweep(sweep::Sweep),
     /// Merge the shards of a run.
     Merge(merge::Merge),
-    /// Solve coherence problems (coherence-problem/1), one answer each.
+    /// Solve coherence problems (coherence-problem/1 and 1.1), one answer each.
     Solve(solve::Solve),
     /// Triangulate the cloud of one stereo pair.
     Cloud(cloud::Cloud),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use rayon::prelude::*;
-use seafix_component::{Choice, decoded, undecodable};
+use seafix_component::{Choice, counted, decoded, undecodable};
 use seafix_experiment::changed;
 use seafix_referencing::{
     Acceptance, SEARCHES, SOLVERS, Search, Solver,
@@ -21,7 +21,7 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct Solve {
-    /// Problem files in the format coherence-problem/1.
+    /// Problem files in the format coherence-problem/1, or coherence-problem/1.1 with edges.
     #[arg(required = true)]
     problems: Vec<PathBuf>,
     /// The search component.
@@ -142,6 +142,12 @@ fn apart(pose: Option<&[[f64; 4]; 4]>, other: &[[f64; 4]; 4]) -> String {
     format!("whose origin is {:.2} m off, turned by {turn:.0}°", square.sqrt())
 }
 
+/// The numbers of points and of edges, as text; of the points alone without edges.
+fn features(points: usize, edges: usize, name: &str) -> String {
+    let points = counted(points, name);
+    if edges == 0 { points } else { format!("{points} and {}", counted(edges, "edge")) }
+}
+
 /// The output for people: outcome, then pose.
 fn people(answer: &Answer) -> String {
     let mut text = format!("{}: {}", answer.file, answer.outcome);
@@ -151,7 +157,7 @@ fn people(answer: &Answer) -> String {
             (true, Some(_)) => ", proved best",
             (false, _) => "",
         };
-        text += &format!(", {} points{proved}", pairs.len());
+        text += &format!(", {}{proved}", features(pairs.len(), answer.edges.len(), "point"));
     }
     if !answer.behind.is_empty() {
         text += &format!(", cloud points behind the camera (z ≤ 0): {:?}", answer.behind);
@@ -187,7 +193,7 @@ fn people(answer: &Answer) -> String {
         text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);
     }
     if let Some(best) = answer.best.as_ref().filter(|_| answer.t_cam_obj.is_none()) {
-        text += &format!("  best pose, not accepted, of {} pairs:\n", best.pairs.len());
+        text += &format!("  best pose, not accepted, of {}:\n", features(best.pairs.len(), best.edges.len(), "pair"));
         for row in best.t_cam_obj.iter().take(3) {
             text += &format!("  {:10.6} {:10.6} {:10.6} {:10.4}\n", row[0], row[1], row[2], row[3]);
         }

@@ -163,7 +163,8 @@ impl Judge<'_> {
     /// The comparison of a fix with the best contradicting pose elsewhere.
     ///
     /// It applies if the search returned no alternative. The other pose consists of pairs that contradict the fix. If
-    /// it passes every test with a score no lower than the fix's, the outcome is ambiguous.
+    /// it passes every test with a score no lower than the fix's, up to rounding, the outcome is ambiguous: a symmetric
+    /// object has two poses of one score.
     pub(super) fn against_elsewhere(&self, fix: Box<Fix>) -> (Outcome, Option<Alternative>) {
         let sets = match fix.edges.is_empty() {
             true => elsewhere(self.problem, &fix.object_from_camera)
@@ -175,7 +176,7 @@ impl Judge<'_> {
         let others = sets.iter().filter_map(|set| self.hypothesis_of(&set.points, &set.edges).ok());
         let apart = others.filter(|other| self.apart(&fix.object_from_camera, &other.pose));
         let Some(mut other) = apart.min_by(by_score) else { return (Outcome::Fix(fix), None) };
-        let stands = other.score >= fix.score
+        let stands = other.score >= fix.score - ROUNDING * (1.0 + fix.score.abs())
             && self.residuals(&other).is_ok()
             && self.precise_and_near(&mut other).is_ok()
             && self.faces(&other);
@@ -406,6 +407,9 @@ fn information_of_edges(data: &Observations<'_>, pose: &Transform<Object, Camera
     let all = Mixed::of(data, None, data.rig)?.each(pose)?;
     Ok(all[data.points.len()..].iter().map(Linearized::information).sum())
 }
+
+/// Rounding error of a score, relative to it: two poses of a symmetric object have equal residuals.
+const ROUNDING: f64 = 1e-6;
 
 /// Largest ratio of the variance of residuals to that of the stated noise in a large putative set.
 ///

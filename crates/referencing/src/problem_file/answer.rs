@@ -42,6 +42,9 @@ pub struct Best {
     pub t_cam_obj: [[f64; 4]; 4],
     /// The pairs (model, cloud).
     pub pairs: Vec<[usize; 2]>,
+    /// The edges (edge, line), if there are any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub edges: Vec<[usize; 2]>,
     /// The covariance, of object_from_camera; null if the pairs determine none.
     pub covariance: Option<[[f64; 6]; 6]>,
 }
@@ -51,6 +54,7 @@ impl From<&BestPose> for Best {
         Self {
             t_cam_obj: rows(&best.object_from_camera),
             pairs: indices(&best.pairs),
+            edges: indices(&best.edges),
             covariance: best.covariance.as_ref().map(rows6),
         }
     }

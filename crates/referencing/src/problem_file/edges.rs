@@ -87,7 +87,7 @@ impl EdgeParts {
     ///
     /// # Errors
     ///
-    /// The first invalid value: too many edges or lines, an edge that is too short, an index out of range, a number that
+    /// The first invalid value: too many edges or lines, an edge that is too short or given twice, an index out of range, a number that
     /// is not finite, or a covariance that is not symmetric and positive definite.
     pub(super) fn checked(self, model: &[ModelPoint]) -> Result<ProblemEdges, InvalidPart> {
         for (name, count, max) in [("edges", self.edges.len(), MAX_EDGES), ("lines", self.lines.len(), MAX_LINES)] {
@@ -98,7 +98,16 @@ impl EdgeParts {
         }
         let edges = self.edges.iter().enumerate().map(|(index, ends)| edge(index, ends, model));
         let lines = self.lines.iter().enumerate().map(|(index, raw)| line(index, raw));
-        let (edges, lines): (Vec<_>, Vec<_>) = (edges.collect::<Result<_, _>>()?, lines.collect::<Result<_, _>>()?);
+        let (edges, lines): (Vec<ModelEdge>, Vec<_>) =
+            (edges.collect::<Result<_, _>>()?, lines.collect::<Result<_, _>>()?);
+        for (index, edge) in edges.iter().enumerate() {
+            let [from, to] = edge.places(model);
+            let same = |other: &&ModelEdge| [[from, to], [to, from]].contains(&other.places(model));
+            if let Some(other) = edges[..index].iter().find(same) {
+                let what = format!("edge {index} is edge {} again", other.id);
+                return Err(invalid(what, "edges", Some(index), "give each edge once".to_owned()));
+            }
+        }
         if let Some(pairs) = &self.putative
             && let Some(index) = pairs.iter().position(|&[i, j]| i >= edges.len() || j >= lines.len())
         {
@@ -191,6 +200,10 @@ mod tests {
             "edge 0 is too short: 0.01 m; give edges of 0.02 m and more"
         );
         assert!(fault(|it| it.edges[0][1] = RawEnd::At([f64::NAN; 3])).starts_with("edge 0 is out of range"));
+        assert_eq!(
+            fault(|it| it.edges.push([it.edges[0][1], it.edges[0][0]])),
+            "edge 1 is edge 0 again; give each edge once"
+        );
         assert!(fault(|it| it.lines[0].ends[1] = it.lines[0].ends[0]).starts_with("line 0 has one place twice"));
         assert!(fault(|it| it.lines[0].covariance[3][3] = 0.0).contains("positive definite"));
         assert!(fault(|it| it.lines[0].covariance[0][1] = 1e-7).contains("symmetric"));

@@ -9,7 +9,7 @@ use seafix_geometry::{Camera, MeasuredPoint, Object, Transform};
 
 use super::{
     edges::{EdgeParts, ProblemEdges},
-    json::{FORMAT, RawPrior, Source},
+    json::{FORMAT, InBraces, RawPrior, Source},
     method::Method,
     parts::{Noise, Parts},
 };
@@ -74,7 +74,11 @@ impl CoherenceProblem {
             delta: Some(raw.delta),
             prior: None,
             putative: raw.putative,
-            edges: EdgeParts { edges: raw.edges, lines: raw.lines, putative: raw.putative_edges },
+            edges: EdgeParts {
+                edges: raw.edges,
+                lines: raw.lines.into_iter().map(|InBraces(line)| line).collect(),
+                putative: raw.putative_edges,
+            },
         };
         let problem = parts.checked().map_err(|invalid| {
             let path: Vec<&str> = invalid.path.iter().map(String::as_str).collect();

@@ -43,7 +43,7 @@ pub(super) struct Raw {
     #[serde(default)]
     pub(super) edges: Vec<[RawEnd; 2]>,
     #[serde(default)]
-    pub(super) lines: Vec<RawLine>,
+    pub(super) lines: Vec<InBraces<RawLine>>,
     #[serde(default)]
     pub(super) putative_edges: Option<Vec<[usize; 2]>>,
 }
@@ -189,7 +189,8 @@ impl<'a> Source<'a> {
             let what = format!("`{}` has {}", name(path), counted(length(value), "value"));
             return self.fault(what, path).remedy(form(path).1);
         }
-        let typed = ["invalid type", "invalid value", "invalid length", "number out of range"];
+        // serde's message for an end of an edge, a place or an index, that is neither.
+        let typed = ["invalid type", "invalid value", "invalid length", "number out of range", "data did not match"];
         if typed.iter().any(|start| about(start)) {
             let (noun, remedy) = form(path);
             let what = match path {
@@ -345,7 +346,7 @@ fn name(path: &[&str]) -> String {
 /// The type of the value at `path`, and the remedy for another.
 fn form(path: &[&str]) -> (&'static str, &'static str) {
     match path {
-        ["format"] => ("a string", "give \"coherence-problem/1\""),
+        ["format"] => ("a string", "give \"coherence-problem/1\", or \"coherence-problem/1.1\" with edges"),
         ["id"] => ("a string", "give a name in double quotes, or null"),
         ["model"] => {
             ("a list of points", "give the feature points in the object frame, three numbers x y z each, in metres")
@@ -367,6 +368,23 @@ fn form(path: &[&str]) -> (&'static str, &'static str) {
         ["putative"] => ("a list of pairs", "give null, or a list of pairs [model, cloud]"),
         ["putative", _] => ("a pair", "give two indices [model, cloud], counted from 0"),
         ["putative", ..] => ("an index", "give a whole number, counted from 0"),
+        ["edges"] => ("a list of edges", "give the straight edges of the object, two ends each"),
+        ["edges", _] => ("an edge", "give two ends in brackets"),
+        ["edges", _, _] => {
+            ("an end of an edge", "give three numbers x y z in metres, or the index of a model point, counted from 0")
+        }
+        ["lines"] => ("a list of lines", "give the measured lines, `ends` and `covariance` in braces each"),
+        ["lines", _] => ("a line", "give `ends` and `covariance` in braces"),
+        ["lines", _, "ends"] => ("two places", "give two places on the line, three numbers x y z each, in metres"),
+        ["lines", _, "ends", _] => ("a place", "give three numbers x y z, in metres"),
+        ["lines", _, "covariance"] => {
+            ("a matrix", "give the covariance of the four offsets in square metres: four rows of four numbers")
+        }
+        ["lines", _, "covariance", _] => ("a row of four numbers", "give four numbers; the matrix is 4×4"),
+        ["lines", _, _, ..] => ("a number", "give a number"),
+        ["putative_edges"] => ("a list of pairs", "give null, or a list of pairs [edge, line]"),
+        ["putative_edges", _] => ("a pair", "give two indices [edge, line], counted from 0"),
+        ["putative_edges", ..] => ("an index", "give a whole number, counted from 0"),
         _ => ("a problem", "give one `coherence-problem/1` as JSON, in braces"),
     }
 }

@@ -4,6 +4,7 @@ use seafix_geometry::{Camera, Object, Transform};
 
 use super::{
     clique::decisive_members,
+    consensus::seeds::guided::stride,
     features::{FeatureSet, Features, enough},
     identification::{Identification, Rejected},
     limits::NEEDED,
@@ -13,9 +14,13 @@ use super::{
 };
 use crate::problem::Problem;
 
-/// Maximum number of vertices examined for sets elsewhere, and number of sets begun with them.
+/// Maximum number of vertices examined for sets elsewhere, and maximum number of tests of two of them.
 const MAX_GROWN: usize = 2048;
-const BEGINNINGS: usize = 16;
+const MAX_TESTS: usize = 1_000_000;
+/// Maximum number of sets, the largest.
+const MAX_SETS: usize = 16;
+/// Maximum number of vertices by which the support of another is counted.
+const COUNTED: usize = 128;
 
 /// The admissible set that grows from ranked vertices: each in turn joins if it is coherent with all and forms no
 /// rejected triple or quadruple with them.
@@ -106,12 +111,25 @@ pub(crate) fn elsewhere(problem: &Problem<'_>, pose: &Transform<Object, Camera>)
         all.iter().copied().step_by(step).collect()
     };
     let some = evenly(&against, MAX_GROWN);
-    let begun = |first: usize| {
-        let ranked: Vec<usize> = std::iter::once(first).chain(some.iter().copied().filter(|&v| v != first)).collect();
-        features.set(&grow(&features, &ranked, Sense::Proper, &mut 0))
+    // The vertices coherent with most of those that are coherent with the first come before the others.
+    let mut tests = 0;
+    let mut begun = |first: usize| {
+        let agrees = |v: &usize| *v != first && features.coherent(first, *v, Sense::Proper);
+        let near: Vec<usize> = some.iter().copied().filter(agrees).collect();
+        let sample = evenly(&near, COUNTED);
+        tests += some.len() + near.len() * (sample.len() + 1);
+        let support = |v: usize| sample.iter().filter(|&&w| w != v && features.coherent(v, w, Sense::Proper)).count();
+        let mut ranked: Vec<(usize, usize)> = near.iter().map(|&v| (support(v), v)).collect();
+        ranked.sort_by_key(|&(support, v)| (std::cmp::Reverse(support), v));
+        let ranked: Vec<usize> = std::iter::once(first).chain(ranked.into_iter().map(|(_, v)| v)).collect();
+        let set = features.set(&grow(&features, &ranked, Sense::Proper, &mut 0));
+        (tests <= MAX_TESTS).then_some(set)
     };
-    let mut sets: Vec<FeatureSet> = evenly(&some, BEGINNINGS).into_iter().map(begun).collect();
+    let step = stride(some.len());
+    let mut sets: Vec<FeatureSet> = (0..some.len()).map_while(|k| begun(some[k * step % some.len()])).collect();
     sets.retain(|set| set.len() >= NEEDED && enough(set.points.len(), set.edges.len()));
-    sets.sort_by_key(|set| std::cmp::Reverse(set.len()));
+    sets.sort_by(|a, b| b.len().cmp(&a.len()).then_with(|| (&a.points, &a.edges).cmp(&(&b.points, &b.edges))));
+    sets.dedup();
+    sets.truncate(MAX_SETS);
     sets
 }

@@ -70,7 +70,8 @@ pub struct Posterior {
     pub evidence_gap: Option<f64>,
     /// ln of the number of false alarms of the best pose by points and edges together; `None` without edges or prior.
     pub ln_nfa: Option<f64>,
-    /// ln evidence (nats) of another structure of the object's kind in its place; `None` without edges or prior.
+    /// ln evidence (nats) of another structure of the object's kind in its place; `None` without edges, without a prior,
+    /// and if no pose has enough evidence to be accepted.
     ///
     /// Such a structure has edges in the same directions, which meet as the object's do, but dimensions of its own.
     pub resembling: Option<f64>,

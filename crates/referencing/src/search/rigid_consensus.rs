@@ -342,7 +342,8 @@ impl Search for RigidConsensus {
         let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());
         let joined = joined.map(|edges| Joined { climb: &climb, edges, taken: &none });
         let ln_nfa = joined.as_ref().and_then(|joined| ln_nfa(joined, best));
-        let resembling = joined.as_ref().and_then(|joined| resembling::ln_evidence(joined, best));
+        let acceptable = joined.as_ref().filter(|_| best.ln_evidence >= STRONG);
+        let resembling = acceptable.and_then(|joined| resembling::ln_evidence(joined, best));
         Ok(Identification {
             edges: identified,
             alternatives: Vec::new(),

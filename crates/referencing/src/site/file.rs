@@ -82,7 +82,7 @@ pub(super) struct EdgeFile {
     pub(super) from: EndFile,
     /// Second end: the id of a point, or coordinates (m).
     pub(super) to: EndFile,
-    /// Standard deviation of the edge's position (m); 0, the default, is an exact model.
+    /// Standard deviation (m) of an end that is a place, along each axis; 0, the default, is an exact model.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub(super) sigma: f64,
     /// Outward unit normals of the adjacent faces, two at most; an edge without them counts as visible from every side.

@@ -58,3 +58,22 @@ fn edges_need_the_format_that_has_them() {
     let fault = parse(&wireframe(FORMAT_WITH_EDGES).replace("[0, [1.2", "[9, [1.2")).unwrap_err().to_string();
     assert!(fault.contains("edge 0 ends at no model point"), "{fault}");
 }
+
+/// Each value of another type is named with its place and with what is expected there.
+#[test]
+fn wrong_types_of_edges_and_lines_are_named() {
+    let good = wireframe(FORMAT_WITH_EDGES);
+    for (from, to, fault) in [
+        ("[0, [1.2", "[-1, [1.2", "`edges[0][0]` is not an end of an edge"),
+        ("[0, [1.2, 0.0, 0.0]]", "[0, [1.2, 0.0]]", "`edges[0][1]` is not an end of an edge"),
+        ("[0, [1.2, 0.0, 0.0]]", "{\"from\": 0}", "`edges[0]` is not an edge"),
+        ("\"ends\": [[", "\"ends\": [[\"x\", ", "`lines[0].ends[0][0]` is not a number"),
+        ("[[1e-6,0,0,0],[0,1e-6,0,0],[0,0,1e-6,0],[0,0,0,1e-6]]", "null", "`lines[0].covariance` is not a matrix"),
+        ("\"lines\": [", "\"lines\": [[1], ", "`lines[0]` is not a line"),
+        ("\"edges\":", "\"putative_edges\": [[0, -1]], \"edges\":", "`putative_edges[0][1]` is not an index"),
+    ] {
+        assert!(good.contains(from), "{from}");
+        let text = parse(&good.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(text.starts_with(fault) && text.lines().count() == 1, "{text}");
+    }
+}

@@ -37,9 +37,12 @@ pub(in crate::search) fn edge_modes(joined: &Joined<'_>, known: &[Mode], work: &
     let pairs = free(joined);
     let mut found = Vec::new();
     let prior = joined.climb.prior_terms.known.as_ref().filter(|_| pairs.iter().any(|kind| kind.len() > MAX_VERTICES));
-    if let Some((prior, votes)) = prior.and_then(|prior| Some((prior, Votes::of(joined, prior, &pairs, work)?))) {
+    let votes = prior.and_then(|prior| Some((prior, Votes::of(joined, prior, &pairs, work)?)));
+    // A grid about as coarse as the prior is wide has no peak: every feature votes for all of its cells.
+    let peaks = votes.as_ref().map_or_else(Vec::new, |(prior, votes)| votes.peaks(prior));
+    if let Some((prior, votes)) = votes.filter(|_| !peaks.is_empty()) {
         let centroid = prior.motion.apply(&joined.climb.prior_terms.centroid);
-        for displacement in votes.peaks(prior) {
+        for displacement in peaks {
             let voters = votes.voters(joined, prior, &pairs, &displacement);
             let start = prior.motion.moved(&Vector3::zeros(), &displacement, &centroid);
             grow(joined, voters, Some(start), (known, &mut found), work);

@@ -3,9 +3,11 @@
 mod absent;
 mod bound;
 mod brute_force;
+mod far;
 mod laws;
 mod near;
 mod planted;
 mod resembling;
 mod scene;
 mod search;
+mod symmetric;

@@ -210,7 +210,7 @@ pub(in crate::search::consensus) fn symmetric(graph: &ConsistencyGraph) -> BitMa
 }
 
 /// A step without a common divisor with `count`, near the golden section of it: its multiples are spread evenly.
-pub(in crate::search::consensus) fn stride(count: usize) -> usize {
+pub(in crate::search) fn stride(count: usize) -> usize {
     let coprime = |a: &usize| {
         let (mut a, mut b) = (*a, count);
         while b > 0 {

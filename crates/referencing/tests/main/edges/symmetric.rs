@@ -1,0 +1,48 @@
+//! A symmetric object has several poses, and no search chooses one of them.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use seafix_geometry::Point;
+use seafix_referencing::{
+    Acceptance, Edges, End, Gate, ModelEdge, ModelPoint, Outcome, Problem, StereoReprojection, Tolerance, candidates,
+    compute_fix, edge_candidates,
+};
+
+use super::{
+    planted::searches,
+    scene::{SIDES, corner, line, point, pose, rig},
+};
+
+/// A box turned by half a turn about an axis is the same box: without a prior its pose is ambiguous.
+#[test]
+fn a_plain_box_without_a_prior_gets_no_fix() {
+    let rig = rig();
+    let points: Vec<ModelPoint> =
+        (0..8).map(|k| ModelPoint { sigma: 1e-3, ..ModelPoint::exact(format!("P{k}"), corner(k).into()) }).collect();
+    let edges: Vec<ModelEdge> = SIDES
+        .iter()
+        .map(|ends| ModelEdge { id: format!("{ends:?}"), ends: ends.map(End::Point), sigma: 1e-3, faces: Vec::new() })
+        .collect();
+    for seed in 0..6 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let truth = pose(2.0, 0.4 + seed as f64);
+        let seen = |k: usize| truth.inverse() * Point::from(corner(k));
+        let cloud: Vec<_> = (0..8).map(|k| point(&rig, &seen(k), 0.1, &mut rng)).collect();
+        let lines: Vec<_> = SIDES.iter().map(|ends| line(&rig, ends.map(seen), 0.08, &mut rng)).collect();
+        let lists = candidates(&points, &cloud, None, &Gate::default(), None);
+        let of_edges = edge_candidates(&edges, &points, &lines, None, &Gate::default(), None);
+        let problem = Problem {
+            model: &points,
+            cloud: &cloud,
+            candidates: &lists,
+            tolerance: Tolerance::Sigmas(3.0),
+            prior: None,
+            edges: Edges { model: &edges, lines: &lines, candidates: &of_edges },
+        };
+        for (name, search) in searches() {
+            let (solver, acceptance) = (StereoReprojection::default(), Acceptance::default());
+            let attempt = compute_fix(&problem, &*search, &solver, &acceptance, Some(&rig), &mut rng);
+            assert!(!matches!(attempt.outcome, Outcome::Fix(_)), "{name}, seed {seed}: {}", attempt.outcome);
+        }
+    }
+}
