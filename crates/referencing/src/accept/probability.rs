@@ -40,13 +40,16 @@ impl Probability {
 
     /// The probabilities of points and edges that a search counted; as [`counted`](Self::counted) without edges.
     pub(super) fn counted_features(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspondence]) -> Self {
-        match counted_of(problem, pairs, edges) {
+        Self::by_count(problem, pairs, counted_of(problem, pairs, edges))
+    }
+
+    fn by_count(problem: &Problem<'_>, pairs: &[Correspondence], with_edges: Option<Counted>) -> Self {
+        match with_edges {
             None => Self::counted(problem, pairs),
             // As for a search with a posterior: the most probable kind of absence holds.
             Some(of) => {
                 let by_number = by_nfa(libm::exp(of.ln_nfa).min(expected_sets(problem, pairs)));
-                let without = libm::log(1.0 + libm::exp(of.ln_resembling));
-                Self::of(larger(by_number, by_nfa(libm::exp(without - of.ln_evidence))), 0.0)
+                Self::of(larger(by_number, by_evidence(&of)), 0.0)
             }
         }
     }
@@ -79,12 +82,19 @@ fn counted_of(problem: &Problem<'_>, pairs: &[Correspondence], edges: &[Correspo
     of_counted(problem, &set, &pose.inverse())
 }
 
+/// The probability of absence by the evidence: of clutter alone, and of another structure of the object's kind.
+fn by_evidence(of: &Counted) -> f64 {
+    by_nfa(libm::exp(-of.ln_evidence) + libm::exp(of.ln_resembling - of.ln_evidence))
+}
+
 /// What is known of a set of pairs: the parts of which its probabilities are made.
 pub(super) struct Evidence<'a> {
     problem: &'a Problem<'a>,
     pairs: &'a [Correspondence],
     /// The identified edges.
     edges: &'a [Correspondence],
+    /// What speaks for points and edges that a search without a posterior counted.
+    counted: Option<Counted>,
     /// The number of false alarms of points and edges together.
     nfa_with_edges: Option<f64>,
     /// The number of false alarms by independent pairs of a large putative set.
@@ -105,17 +115,19 @@ impl<'a> Evidence<'a> {
     ) -> Self {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(problem.model, limit));
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
-        let nfa_with_edges = match &found.posterior {
-            Some(_) => ln_nfa.filter(|_| !found.edges.is_empty()).map(libm::exp),
-            None => counted_of(problem, &found.pairs, &found.edges).map(|of| libm::exp(of.ln_nfa)),
+        let counted = match &found.posterior {
+            Some(_) => None,
+            None => counted_of(problem, &found.pairs, &found.edges),
         };
+        let ln_nfa = counted.map(|of| of.ln_nfa).or(ln_nfa.filter(|_| !found.edges.is_empty()));
         let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
         let nfa_independent = support.map(|support| libm::exp(support.ln_nfa));
         Self {
             problem,
             pairs: &found.pairs,
             edges: &found.edges,
-            nfa_with_edges,
+            counted,
+            nfa_with_edges: ln_nfa.map(libm::exp),
             nfa_independent,
             posterior,
             a_contrario,
@@ -130,7 +142,7 @@ impl<'a> Evidence<'a> {
     /// The probabilities of the answer.
     pub(super) fn probability(&self) -> Probability {
         match self.posterior {
-            None => Probability::counted_features(self.problem, self.pairs, self.edges),
+            None => Probability::by_count(self.problem, self.pairs, self.counted),
             Some(posterior) => self.weighted(&posterior),
         }
     }
@@ -195,6 +207,15 @@ fn larger(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Evidence of many edges exceeds the range of its exponential.
+    #[test]
+    fn much_evidence_does_not_overflow() {
+        let absent = |ln_evidence, ln_resembling| by_evidence(&Counted { ln_nfa: 0.0, ln_evidence, ln_resembling });
+        assert_eq!(absent(2000.0, 1000.0), 0.0);
+        assert!((absent(2000.0, 2000.0) - 0.5).abs() < 1e-12);
+        assert!((absent(9.0, f64::NEG_INFINITY) / (-9.0_f64).exp() - 1.0).abs() < 1e-3);
+    }
 
     #[test]
     fn other_poses_and_absence_exclude_each_other() {

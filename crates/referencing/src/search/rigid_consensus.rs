@@ -1,6 +1,6 @@
 //! Rigid consensus: a maximum-a-posteriori search that compares each pose with its alternatives and with absence.
 
-use std::{cell::Cell, collections::BTreeSet};
+use std::collections::BTreeSet;
 
 use rand::Rng;
 use seafix_component::{Component, Settings};
@@ -224,10 +224,7 @@ impl Search for RigidConsensus {
         let pattern =
             if strong(&swept) && by_points && !large { Pattern::of(problem.model, problem.edges.model) } else { None };
         if let (Some(pattern), Some(best)) = (&pattern, swept.modes.first()) {
-            let compared = Cell::new(0);
-            let (model, taken) = (problem.model, &none);
-            let (terms, prior_terms, graph) = (&terms, &prior_terms, &graph);
-            let climb = Climb { model, terms, prior_terms, graph, taken, compared };
+            let climb = Climb::new(problem.model, parts, &none);
             let shifts = pattern.shifts(problem, &climb, edge_terms.as_ref(), best);
             swept.insert(shifts);
         }
@@ -330,15 +327,7 @@ impl Search for RigidConsensus {
             ln_clutter_density: mode.ln_clutter_density,
         };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
-        let compared = Cell::new(0);
-        let climb = Climb {
-            model: problem.model,
-            terms: &terms,
-            prior_terms: &prior_terms,
-            graph: &graph,
-            taken: &none,
-            compared,
-        };
+        let climb = Climb::new(problem.model, parts, &none);
         let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());
         let joined = joined.map(|edges| Joined { climb: &climb, edges, taken: &none });
         let ln_nfa = joined.as_ref().and_then(|joined| ln_nfa(joined, best));
@@ -380,7 +369,7 @@ fn with_edges(
     [taken, lines]: [&BTreeSet<usize>; 2],
     swept: &mut Swept,
 ) {
-    let climb = Climb { model: problem.model, terms, prior_terms, graph, taken, compared: Cell::new(0) };
+    let climb = Climb::new(problem.model, (terms, prior_terms, graph), taken);
     let joined = Joined { climb: &climb, edges, taken: lines };
     // A mode of points alone sees none of the edges.
     swept.modes.iter_mut().for_each(|mode| {

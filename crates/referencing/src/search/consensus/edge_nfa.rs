@@ -1,6 +1,6 @@
 //! The number of false alarms of a mode with edges.
 
-use std::{cell::Cell, collections::BTreeSet};
+use std::collections::BTreeSet;
 
 use seafix_geometry::{Camera, Object, Transform};
 
@@ -65,14 +65,7 @@ pub(crate) fn of_counted(
     let terms = Terms::of(problem, &prior_terms, &graph);
     let edges = EdgeTerms::of(problem, &prior_terms)?;
     let none = BTreeSet::new();
-    let climb = Climb {
-        model: problem.model,
-        terms: &terms,
-        prior_terms: &prior_terms,
-        graph: &graph,
-        taken: &none,
-        compared: Cell::new(0),
-    };
+    let climb = Climb::new(problem.model, (&terms, &prior_terms, &graph), &none);
     let joined = Joined { climb: &climb, edges: &edges, taken: &none };
     let points = (0..graph.vertices.len()).filter(|&v| set.points.binary_search(&graph.vertices[v]).is_ok());
     let members: Vec<usize> = points.collect();

@@ -38,7 +38,16 @@ pub(in crate::search) struct Climb<'a> {
     pub(in crate::search) compared: Cell<u64>,
 }
 
-impl Climb<'_> {
+impl<'a> Climb<'a> {
+    /// The ascent among these pairs without the cloud points in `taken`.
+    pub(in crate::search) fn new(
+        model: &'a [ModelPoint],
+        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
+        taken: &'a BTreeSet<usize>,
+    ) -> Self {
+        Self { model, terms, prior_terms, graph, taken, compared: Cell::new(0) }
+    }
+
     /// Alternates the choice of pairs and the fit until the choice is stable.
     ///
     /// `None` as soon as the evidence `min` (nats) is out of reach, or if an ascent from the first choice was made
@@ -236,9 +245,8 @@ mod tests {
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
         let terms = Terms::of(&problem, &prior_terms, &graph);
-        let (taken, compared) = (BTreeSet::new(), Cell::new(0));
-        let climb =
-            Climb { model: &model, terms: &terms, prior_terms: &prior_terms, graph: &graph, taken: &taken, compared };
+        let taken = BTreeSet::new();
+        let climb = Climb::new(&model, (&terms, &prior_terms, &graph), &taken);
         let chosen = climb.choose(&Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() });
         let mut pairs: Vec<(usize, usize)> =
             chosen.iter().map(|&v| (graph.vertices[v].model, graph.vertices[v].cloud)).collect();

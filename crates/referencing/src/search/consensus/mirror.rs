@@ -1,6 +1,6 @@
 //! The mirror image of the object as an alternative to a pose.
 
-use std::{cell::Cell, collections::BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -37,7 +37,7 @@ pub(in crate::search) fn mirror_image(
     let prior_terms =
         PriorTerms { known: None, centroid: prior_terms.centroid, ln_peak: prior_terms.ln_peak, parts: None };
     let taken = BTreeSet::new();
-    let climb = Climb { model, terms, prior_terms: &prior_terms, graph, taken: &taken, compared: Cell::new(0) };
+    let climb = Climb::new(model, (terms, &prior_terms, graph), &taken);
     let count = mode.members.len() as f64;
     let centre = mode.members.iter().map(|&v| terms.pairs[v].model).sum::<Vector3<f64>>() / count;
     let step = |v: &usize| terms.pairs[*v].model - centre;

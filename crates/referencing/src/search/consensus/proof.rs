@@ -1,6 +1,6 @@
 //! The proof that no admissible set has more evidence than the best pose.
 
-use std::{cell::Cell, collections::BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
@@ -122,7 +122,7 @@ impl<'a> Prover<'a> {
         budget: u64,
     ) -> Self {
         Self {
-            climb: Climb { model, terms, prior_terms, graph, taken, compared: Cell::new(0) },
+            climb: Climb::new(model, (terms, prior_terms, graph), taken),
             bounds: Bounds::proved((terms, graph), &ln_posterior_volume(model, (terms, prior_terms, graph))),
             best: best.clone(),
             better: Vec::new(),

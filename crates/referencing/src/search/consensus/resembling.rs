@@ -14,13 +14,13 @@ use crate::space_line::LineOffset;
 ///
 /// Man-made structures have parallel edges that meet in corners. In such a structure, parallel directions and common
 /// corners are no coincidence. Only its dimensions are: a structure of other dimensions is a parallel redrawing of the
-/// object's wireframe, with displacements u = N c of its vertices, c ~ N(0, s² n I) for a part of n vertices. Its
-/// evidence
+/// object's wireframe, with displacements u = N c of its vertices ([`Wireframe::information`]). Its evidence
 ///
 /// Λ = ∫∫ p(T) p(c) B(k) Π N(r(T, c); 0, S)/ρ dc dT
 ///
-/// lacks the coincidence of each dimension that the features measure, about s/σ. Points apart from the wireframe are
-/// clutter. `None` without edges, and without a prior.
+/// lacks the factor s/σ of each dimension that the features measure. Points apart from the wireframe are clutter. If
+/// rounding hides the dimensions, it is the evidence of the mode itself. `None` for a mode without edges, or without a
+/// prior.
 pub(in crate::search) fn ln_evidence(joined: &Joined<'_>, mode: &Mode) -> Option<f64> {
     let (terms, prior_terms, graph) = (joined.climb.terms, joined.climb.prior_terms, joined.climb.graph);
     let known = prior_terms.known.as_ref().filter(|_| !mode.edges.is_empty())?;
@@ -89,9 +89,11 @@ pub(in crate::search) fn ln_evidence(joined: &Joined<'_>, mode: &Mode) -> Option
         g[(row, 0)] -= pull[row];
         (0..6).for_each(|column| h[(row, column)] += known.information[(row, column)]);
     }
-    let factor = h.llt(Side::Lower).ok()?;
+    let (Ok(factor), Ok(of_shape)) = (h.llt(Side::Lower), shape.llt(Side::Lower)) else {
+        return Some(mode.ln_evidence);
+    };
     let gain = 0.5 * (g.transpose() * factor.solve(&g))[(0, 0)];
-    Some(ln_fit + gain + half_ln_det(&shape.llt(Side::Lower).ok()?) - half_ln_det(&factor) + 6.0 * HALF_LN_2PI)
+    Some(ln_fit + gain + half_ln_det(&of_shape) - half_ln_det(&factor) + 6.0 * HALF_LN_2PI)
 }
 
 /// The derivatives of some residuals, each by its parameters.

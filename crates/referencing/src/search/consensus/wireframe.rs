@@ -9,9 +9,11 @@ use crate::site::{edge::ModelEdge, model::ModelPoint};
 const TOGETHER: f64 = 4.5;
 /// The same, as a fraction of the shorter edge: chamfers, and ends that were measured one by one.
 const CHAMFER: f64 = 0.05;
-/// Standard deviation of a vertex of another structure along each axis, relative to the mean length of its edges.
+/// Standard deviation of the displacement (RMS over the vertices) by one redrawing, relative to the mean length of the
+/// edges at a vertex.
 ///
-/// Neighbours of the object, and its shadow, are about as large as the object.
+/// A side of a box then varies by twice that, 28 % of its length: neighbours of the object, and its shadow, are about as
+/// large as the object.
 const SPREAD: f64 = 0.141;
 /// Standard deviation of a vertex across an edge on which it stays, relative to that of the vertex alone.
 const TIGHT: f64 = 1e-4;
@@ -32,7 +34,7 @@ pub(super) struct Wireframe {
     pub(super) edges: Vec<[usize; 2]>,
     /// The vertex of each model point; `None` for a point on no edge.
     pub(super) points: Vec<Option<usize>>,
-    /// The standard deviation (m) of each vertex of another structure.
+    /// The standard deviation (m) of the displacement of each vertex by one redrawing.
     sigmas: Vec<f64>,
     /// The connected part of each vertex, as its first vertex.
     parts: Vec<usize>,
@@ -130,7 +132,8 @@ impl Wireframe {
 
     /// The information on the displacements of the vertices of some whole parts, three rows a vertex.
     ///
-    /// In a part of n vertices each redrawing moves the vertices by their standard deviation (RMS).
+    /// The redrawings of a part of n vertices are u = N c, with orthonormal columns N and c ~ N(0, n s² I), s the standard
+    /// deviation of `sigmas`: each moves the vertices by s (RMS).
     pub(super) fn information(&self, vertices: &[usize]) -> Mat<f64> {
         let mut information = Mat::zeros(3 * vertices.len(), 3 * vertices.len());
         for (k, v) in vertices.iter().enumerate() {
@@ -253,6 +256,28 @@ mod tests {
             edge.ends = [End::At(Point::from(from + gap)), End::At(Point::from(to - gap))];
         }
         assert_eq!(redrawings(&all, &[]), 6);
+    }
+
+    /// A lattice of 6 × 6 × 5 vertices has the spacings between its fourteen pairs of planes, and three translations.
+    #[test]
+    fn a_large_lattice_has_its_spacings() {
+        let count = [6, 6, 5];
+        let places = || (0..count.iter().product()).map(|k: usize| [k / 30, k / 5 % 6, k % 5]);
+        let at = |k: [usize; 3]| End::At(Point::from(Vector3::from(k.map(|k| 0.3 * k as f64))));
+        let beside = |k: [usize; 3], axis: usize| {
+            let mut next = k;
+            next[axis] += 1;
+            (next[axis] < count[axis]).then(|| ModelEdge {
+                id: String::new(),
+                ends: [at(k), at(next)],
+                sigma: 0.0,
+                faces: Vec::new(),
+            })
+        };
+        let edges: Vec<ModelEdge> = places().flat_map(|k| (0..3).filter_map(move |axis| beside(k, axis))).collect();
+        assert_eq!(redrawings(&edges, &[]), 17);
+        let wireframe = Wireframe::of(&[], &edges);
+        assert!(wireframe.information(&(0..180).collect::<Vec<_>>()).llt(Side::Lower).is_ok());
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod queue;
 #[cfg(test)]
 mod tests;
 
-use std::{cell::Cell, collections::BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
@@ -164,7 +164,7 @@ impl<'a> Seeds<'a> {
         let untaken = |v: &usize| !taken.contains(&graph.vertices[*v].cloud);
         (0..graph.vertices.len()).filter(untaken).for_each(|v| free[v / 64] |= 1 << (v % 64));
         Self {
-            climb: Climb { model, terms, prior_terms, graph, taken, compared: Cell::new(0) },
+            climb: Climb::new(model, (terms, prior_terms, graph), taken),
             bounds: Bounds::of((terms, prior_terms, graph), min),
             budget,
             parts: Parts::none(min),
