@@ -56,7 +56,7 @@ impl Default for MaximumClique {
 
 impl Component for MaximumClique {
     const NAME: &'static str = "maximum-clique";
-    const VERSION: u32 = 3;
+    const VERSION: u32 = 4;
     const SUMMARY: &'static str = "the largest coherent, one-to-one, unmirrored set, by branch and bound";
     const SOURCE: &'static str = "San Segundo, Rodríguez-Losada, Jiménez, An exact bit-parallel algorithm for the \
                                   maximum clique problem, 2011; the graph: Bailey et al., 2000";

@@ -47,7 +47,7 @@ impl Default for Ransac {
 
 impl Component for Ransac {
     const NAME: &'static str = "ransac";
-    const VERSION: u32 = 4;
+    const VERSION: u32 = 5;
     const SUMMARY: &'static str = "the best of the poses of random coherent triples";
     const SOURCE: &'static str = "Fischler, Bolles, Random sample consensus, 1981; the score: Torr, Zisserman, MLESAC, \
                                   2000; the edge-length check: Zhou, Park, Koltun, Open3D, 2018";

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{Matrix2, Matrix4, Matrix6, SMatrix, Vector2, Vector3, Vector4};
+use seafix_geometry::MeasuredLine;
 
 use super::{
     fractions::fractions,
@@ -47,13 +48,7 @@ pub(in crate::search) struct Placed {
 impl EdgeVertex {
     /// The residuals under a motion; `None` without overlap.
     pub(in crate::search) fn placed(&self, motion: &Motion) -> Option<Placed> {
-        let [from, to] = self.model.each_ref().map(|end| motion.apply(end));
-        let rows = self.line.rows(&from, &to)?;
-        if !(self.line.overlap(&rows, 0.0) >= OVERLAP) {
-            return None;
-        }
-        let residual = Vector4::from_fn(|k, _| rows[k].residual);
-        Some(Placed { rows, residual })
+        Placed::of(&self.line, &self.model.each_ref().map(|end| motion.apply(end)))
     }
 
     /// The log-likelihood ratio of a residual, without a gate.
@@ -63,6 +58,16 @@ impl EdgeVertex {
 }
 
 impl Placed {
+    /// The residuals of a line from an edge with these ends, camera frame; `None` without overlap.
+    pub(in crate::search) fn of(line: &SpaceLine, [from, to]: &[Vector3<f64>; 2]) -> Option<Self> {
+        let rows = line.rows(from, to)?;
+        if !(line.overlap(&rows, 0.0) >= OVERLAP) {
+            return None;
+        }
+        let residual = Vector4::from_fn(|k, _| rows[k].residual);
+        Some(Self { rows, residual })
+    }
+
     /// The derivative of the predicted offsets by (φ, τ): a rotation about a place and a translation.
     pub(in crate::search) fn derivative(&self, about: &Vector3<f64>) -> Rows6 {
         let mut j = Rows6::zeros();
@@ -93,6 +98,15 @@ pub(in crate::search) struct EdgeTerms<'a> {
     pub(in crate::search) vertices: Vec<EdgeVertex>,
     /// ln B(k), k = 0…n.
     pub(in crate::search) ln_fraction: Vec<f64>,
+    /// The measured lines.
+    pub(in crate::search) lines: Vec<Option<SpaceLine>>,
+    /// The lines in the gate of each model edge.
+    pub(in crate::search) candidates: &'a [Vec<usize>],
+    /// The pose by the prior.
+    expected: Option<Motion>,
+    /// The area (m²) in which the prior places each edge.
+    areas: Vec<f64>,
+    measured: &'a [MeasuredLine],
 }
 
 impl<'a> EdgeTerms<'a> {
@@ -102,48 +116,68 @@ impl<'a> EdgeTerms<'a> {
         if candidates.iter().all(Vec::is_empty) {
             return None;
         }
-        let prepared: Vec<Option<SpaceLine>> = lines.iter().map(SpaceLine::of).collect();
         let known = prior_terms.known.as_ref();
         let covariance = known.and_then(|known| Some(known.information.cholesky()?.inverse()));
+        let area = |edge: &ModelEdge| {
+            let ends = edge.places(problem.model).map(|end| end.coords);
+            let (known, covariance) = known.zip(covariance.as_ref())?;
+            Some(area(&ends, edge.sigmas(problem.model), &known.motion, prior_terms, covariance))
+        };
         let anywhere = cross_section(problem);
-        let mut terms = Self { edges: model, points: problem.model, vertices: Vec::new(), ln_fraction: Vec::new() };
-        for (i, list) in candidates.iter().enumerate().filter(|(_, list)| !list.is_empty()) {
-            let ends = model[i].places(problem.model).map(|end| end.coords);
-            let sigmas = model[i].sigmas(problem.model);
-            let area = match (known, &covariance) {
-                (Some(known), Some(covariance)) => area(&ends, sigmas, &known.motion, prior_terms, covariance),
-                _ => anywhere,
-            };
-            for &j in list {
-                let Some(line) = prepared[j] else { continue };
-                let rows = known.and_then(|known| {
-                    let [from, to] = ends.each_ref().map(|end| known.motion.apply(end));
-                    line.rows(&from, &to)
-                });
-                let by_model = match &rows {
-                    Some(rows) => SpaceLine::model_noise(rows, sigmas),
-                    None => Matrix4::identity() * (sigmas[0] * sigmas[0] + sigmas[1] * sigmas[1]),
-                };
-                let noise = line.noise + by_model;
-                let Some(root) = noise.cholesky() else { continue };
-                // From offsets at both ends to offset and direction.
-                let ln_peak = -half_ln_det(&root) - 4.0 * HALF_LN_2PI + 2.0 * libm::log(line.length());
-                let own = turn_spread(&noise, line.length());
-                let others = list.iter().filter_map(|&other| prepared[other].as_ref());
-                let alike: f64 = others.map(|other| direction_density(&line, &own, other)).sum();
-                let ln_clutter = libm::log(alike / area);
-                terms.vertices.push(EdgeVertex {
-                    pair: Correspondence { model: i, cloud: j },
-                    model: ends,
-                    line,
-                    weight: root.inverse(),
-                    gain: ln_peak - ln_clutter,
-                    depth: lines[j].depth,
-                });
-            }
-        }
-        terms.ln_fraction = fractions(candidates.iter().filter(|list| !list.is_empty()).count());
+        let mut terms = Self {
+            edges: model,
+            points: problem.model,
+            vertices: Vec::new(),
+            ln_fraction: fractions(candidates.iter().filter(|list| !list.is_empty()).count()),
+            lines: lines.iter().map(SpaceLine::of).collect(),
+            candidates,
+            expected: known.map(|known| known.motion),
+            areas: model.iter().map(|edge| area(edge).unwrap_or(anywhere)).collect(),
+            measured: lines,
+        };
+        let pairs = candidates.iter().enumerate().flat_map(|(i, list)| list.iter().map(move |&j| (i, j)));
+        terms.vertices = pairs.filter_map(|(i, j)| terms.vertex(i, j)).collect();
         Some(terms)
+    }
+
+    /// The terms of a model edge and a line, a candidate or not; `None` for a line or noise that is not defined.
+    pub(in crate::search) fn vertex(&self, edge: usize, line: usize) -> Option<EdgeVertex> {
+        let noise = self.noise(edge, line)?;
+        let root = noise.cholesky()?;
+        let (list, of) = (&self.candidates[edge], self.lines[line]?);
+        // From offsets at both ends to offset and direction.
+        let ln_peak = -half_ln_det(&root) - 4.0 * HALF_LN_2PI + 2.0 * libm::log(of.length());
+        let own = turn_spread(&noise, of.length());
+        let beyond = Some(line).filter(|line| list.binary_search(line).is_err());
+        let others = list.iter().copied().chain(beyond).filter_map(|other| self.lines[other].as_ref());
+        let alike: f64 = others.map(|other| direction_density(&of, &own, other)).sum();
+        Some(EdgeVertex {
+            pair: Correspondence { model: edge, cloud: line },
+            model: self.ends(edge),
+            line: of,
+            weight: root.inverse(),
+            gain: ln_peak - libm::log(alike / self.areas[edge]),
+            depth: self.measured[line].depth,
+        })
+    }
+
+    /// The covariance (m²) of the offsets of a line from a model edge; `None` for a line that is not defined.
+    pub(in crate::search) fn noise(&self, edge: usize, line: usize) -> Option<Matrix4<f64>> {
+        let (line, sigmas) = (self.lines[line]?, self.edges[edge].sigmas(self.points));
+        let rows = self.expected.and_then(|motion| {
+            let [from, to] = self.ends(edge).map(|end| motion.apply(&end));
+            line.rows(&from, &to)
+        });
+        let by_model = match &rows {
+            Some(rows) => SpaceLine::model_noise(rows, sigmas),
+            None => Matrix4::identity() * (sigmas[0] * sigmas[0] + sigmas[1] * sigmas[1]),
+        };
+        Some(line.noise + by_model)
+    }
+
+    /// The ends of a model edge, object frame.
+    pub(in crate::search) fn ends(&self, edge: usize) -> [Vector3<f64>; 2] {
+        self.edges[edge].places(self.points).map(|end| end.coords)
     }
 
     /// The maximum-likelihood one-to-one set under a motion, ascending.

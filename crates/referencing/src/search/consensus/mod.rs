@@ -27,6 +27,7 @@ mod places;
 mod posterior_volume;
 pub(crate) mod prior_terms;
 pub(crate) mod proof;
+mod redrawn;
 pub(crate) mod repeated_pattern;
 pub(crate) mod resembling;
 pub(crate) mod seeds;
