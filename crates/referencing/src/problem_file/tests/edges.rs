@@ -122,14 +122,15 @@ fn identified_lines_behind_the_camera_are_named() {
 /// Valid but implausible edges and lines are warned of in one line.
 #[test]
 fn implausible_edges_and_lines_are_warned_of() {
-    let warned = |change: fn(&mut CoherenceProblem)| -> Vec<String> {
+    type Change = fn(&mut CoherenceProblem);
+    let warned = |change: Change| -> Vec<String> {
         let mut problem = parse(&wireframe(FORMAT_WITH_EDGES)).unwrap();
         change(&mut problem);
         let warnings = problem.warnings(Path::new("p.json"));
         warnings.iter().map(ToString::to_string).filter(|text| !text.starts_with("the cloud has no points")).collect()
     };
     assert!(warned(|_| {}).is_empty(), "{:?}", warned(|_| {}));
-    let table: [(fn(&mut CoherenceProblem), &str); 6] = [
+    let table: [(Change, &str); 6] = [
         (|it| it.edges.lines.clear(), "edges without lines in p.json: 12 edges; "),
         (|it| it.edges.model.clear(), "lines without edges in p.json: 12 lines; "),
         (
