@@ -192,6 +192,9 @@ fn no_admissible_set_is_larger() {
                 Err(Rejected::NotFound { bound, needed }) => {
                     prop_assert!(!search.claims.exact && needed == 3 && best.size <= bound, "{name}: {}", best.size);
                 }
+                Err(Rejected::TooFewFeatures { .. } | Rejected::NoFeaturesFound { .. }) => {
+                    prop_assert!(false, "{name} has no edges");
+                }
                 Err(Rejected::NoPrior) => prop_assert!(false, "{name} has a prior"),
                 Err(Rejected::Mirrored { best: size, proved }) if !search.claims.exact => {
                     prop_assert!(

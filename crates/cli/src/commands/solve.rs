@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::set::built;
 use crate::{
     exit::{DONE, Ended, Failure, INPUT, OUTPUT, USAGE},
-    terminal::print,
+    terminal::{notify, print},
 };
 
 #[derive(Debug, Args)]
@@ -106,26 +106,24 @@ impl Solve {
             for group in self.problems.chunks(usize::from(self.threads)) {
                 let lines: Vec<Line> = group.par_iter().map(solve).collect();
                 for line in &lines {
-                    if matches!(line, Line::Failed { .. }) {
-                        ended = INPUT;
+                    match line {
+                        Line::Failed { error, .. } => {
+                            ended = INPUT;
+                            if self.json { print(&json(line))? } else { notify(&format!("error: {error}")) }
+                        }
+                        Line::Answer(_) if self.json => print(&json(line))?,
+                        Line::Answer(answer) => print(&people(answer))?,
                     }
-                    print(&self.text(line))?;
                 }
             }
             Ok(ended)
         };
         pool.install(groups)
     }
+}
 
-    fn text(&self, line: &Line) -> String {
-        if self.json {
-            return serde_json::to_string(line).expect("an answer is plain data") + "\n";
-        }
-        match line {
-            Line::Failed { error, .. } => format!("error: {error}\n"),
-            Line::Answer(answer) => people(answer),
-        }
-    }
+fn json(line: &Line) -> String {
+    serde_json::to_string(line).expect("an answer is plain data") + "\n"
 }
 
 /// Minimum scale error (standard deviations) that is printed; with exact rigs and models one fix in fifteen thousand
@@ -161,6 +159,9 @@ fn people(answer: &Answer) -> String {
     }
     if !answer.behind.is_empty() {
         text += &format!(", cloud points behind the camera (z ≤ 0): {:?}", answer.behind);
+    }
+    if !answer.lines_behind.is_empty() {
+        text += &format!(", lines behind the camera (z ≤ 0): {:?}", answer.lines_behind);
     }
     if let Some(scale) = answer.scale {
         text += &format!(", scale {scale:.6}");

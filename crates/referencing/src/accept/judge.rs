@@ -54,7 +54,7 @@ impl Judge<'_> {
         let edges = if self.solver.takes_edges() { edges.len() } else { 0 };
         match pairs.len() + edges {
             enough if enough >= needed => Ok(()),
-            few => Err(RejectionReason::TooFew { found: few, needed }),
+            few => Err(RejectionReason::TooFew { found: few, edges, needed }),
         }
     }
 
@@ -69,7 +69,7 @@ impl Judge<'_> {
         if !self.searched || (!edges.is_empty() && self.near.is_some()) {
             return Ok(());
         }
-        self.present(Probability::counted_features(self.problem, pairs, edges).wrong, pairs.len())
+        self.present(Probability::counted_features(self.problem, pairs, edges).wrong, [pairs, edges])
     }
 
     /// The outcome of the set and its alternatives: one pose, several, or none.

@@ -99,7 +99,7 @@ pub fn judge(
             probability = of_outcome;
             (outcome, runner_up)
         }
-        (Ok(()), None) => match judge.present(probability.wrong, found.pairs.len()) {
+        (Ok(()), None) => match judge.present(probability.wrong, [&found.pairs, &found.edges]) {
             Ok(()) => judge.poses(&found, None),
             Err(rejection) => (Outcome::Rejected(rejection), None),
         },

@@ -179,7 +179,8 @@ pub struct Attempt {
     /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
     /// probable.
     pub optimal: bool,
-    /// The proved upper bound of the number of pairs of an admissible set; `None` if the search states none.
+    /// The proved upper bound of the number of pairs of an admissible set, of points and edges together; `None` if the
+    /// search states none.
     pub consensus_bound: Option<usize>,
     /// The number of false alarms (NFA) of the set; `None` if it was not computed.
     pub nfa: Option<f64>,
@@ -214,12 +215,14 @@ impl Attempt {
             _ => None,
         };
         let consensus_bound = match why {
-            Rejected::Budget { bound, .. } | Rejected::TooLarge { bound, .. } | Rejected::NotFound { bound, .. } => {
-                Some(bound)
-            }
+            Rejected::Budget { bound, .. }
+            | Rejected::TooLarge { bound, .. }
+            | Rejected::NotFound { bound, .. }
+            | Rejected::NoFeaturesFound { bound } => Some(bound),
             Rejected::NoPrior | Rejected::Mirrored { proved: false, .. } => None,
             Rejected::NoConsensus { best, .. } | Rejected::Mirrored { best, .. } => Some(best),
             Rejected::TooFew { with_candidates, .. } => Some(with_candidates),
+            Rejected::TooFewFeatures { points, edges } => Some(points + edges),
         };
         Self {
             optimal: why.is_proved(),

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     alternative::Alternative,
+    problem::Correspondence,
     search::{
         identification::Identification,
         posterior::{Explanation, Posterior},
@@ -36,13 +37,13 @@ impl Judge<'_> {
             let copies = Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]);
             return (copies, None, with_copies.among(2));
         }
-        if let Err(rejection) = self.present(probability.absent, found.pairs.len()) {
+        if let Err(rejection) = self.present(probability.absent, [&found.pairs, &found.edges]) {
             return (Outcome::Rejected(rejection), runner_up, probability);
         }
         if !max.allows(probability.wrong) {
             let elsewhere = posterior.elsewhere(self.problem.model, self.alert_limit);
             if elsewhere.is_empty() {
-                let rejection = self.improbable(probability.wrong, found.pairs.len());
+                let rejection = self.improbable(probability.wrong, [&found.pairs, &found.edges]);
                 return (Outcome::Rejected(rejection), runner_up, probability);
             }
             let all = posterior.explanations.first().into_iter().chain(elsewhere);
@@ -69,16 +70,17 @@ impl Judge<'_> {
         (outcome, runner_up, probability)
     }
 
-    /// Whether the object's absence, or a pose in general, is improbable enough for a pose of `identified` points.
-    pub(super) fn present(&self, probability: f64, identified: usize) -> Result<(), RejectionReason> {
+    /// Whether the object's absence, or a pose in general, is improbable enough for a pose of these points and edges.
+    pub(super) fn present(&self, probability: f64, identified: [&[Correspondence]; 2]) -> Result<(), RejectionReason> {
         match self.acceptance.max_p_wrong.allows(probability) {
             true => Ok(()),
             false => Err(self.improbable(probability, identified)),
         }
     }
 
-    fn improbable(&self, p_wrong: f64, identified: usize) -> RejectionReason {
+    fn improbable(&self, p_wrong: f64, [pairs, edges]: [&[Correspondence]; 2]) -> RejectionReason {
         let (model, max) = (self.problem.model.len(), self.acceptance.max_p_wrong);
-        RejectionReason::Absent { p_wrong, max, identified, model }
+        let edges = [edges.len(), self.problem.edges.model.len()];
+        RejectionReason::Absent { p_wrong, max, identified: pairs.len(), model, edges }
     }
 }

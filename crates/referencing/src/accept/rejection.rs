@@ -16,17 +16,19 @@ pub enum RejectionReason {
     /// The search returned no set.
     #[error(transparent)]
     Search(#[from] Rejected),
-    /// The set has fewer points than required.
-    #[error("too few identified points: {found} found, {needed} required")]
+    /// The set has fewer features than required.
+    #[error("too few identified points{}: {found} found, {needed} required", if *.edges > 0 { " and edges" } else { "" })]
     TooFew {
-        /// The number of identified points.
+        /// The number of identified points and edges.
         found: usize,
+        /// The number of edges among them.
+        edges: usize,
         /// The required number: the larger of [`Acceptance::min_points`](crate::Acceptance::min_points) and the
         /// solver's minimum.
         needed: usize,
     },
     /// The probability that the pose is not the object's is too large.
-    #[error("{}", absent(.p_wrong, .max, .identified, .model))]
+    #[error("{}", absent(.p_wrong, .max, [*.identified, *.model], .edges))]
     Absent {
         /// The probability of absence, or that of absence and other poses together.
         ///
@@ -38,6 +40,8 @@ pub enum RejectionReason {
         identified: usize,
         /// The number of model points.
         model: usize,
+        /// The number of identified edges, and of model edges.
+        edges: [usize; 2],
     },
     /// The residuals are larger than the noise of the points explains (χ² test).
     #[error("residuals too large: χ² = {chi2:.1}, the limit is {limit:.1}")]
@@ -197,14 +201,18 @@ fn larger_limit(p_wrong: f64) -> Option<String> {
 }
 
 /// The message of [`RejectionReason::Absent`].
-fn absent(p_wrong: &f64, max: &MaxPWrong, identified: &usize, model: &usize) -> String {
+fn absent(p_wrong: &f64, max: &MaxPWrong, [identified, model]: [usize; 2], edges: &[usize; 2]) -> String {
     if p_wrong.is_nan() {
         return format!("P(wrong) of {identified} points is undefined: the noise of a point is not a number");
     }
+    let and_edges = match edges {
+        [_, 0] => String::new(),
+        [identified, model] => format!(" and {identified} of {model} edges"),
+    };
     let p = if *p_wrong < 0.1 { format!("{p_wrong:.1e}") } else { format!("{p_wrong:.2}") };
     let preset = max.preset().map_or_else(String::new, |preset| format!(" (preset {preset})"));
     format!(
-        "P(wrong) is {p}, at most {:.1e} is allowed{preset}; {identified} of {model} points identified",
+        "P(wrong) is {p}, at most {:.1e} is allowed{preset}; {identified} of {model} points{and_edges} identified",
         max.value()
     )
 }
@@ -225,7 +233,7 @@ mod tests {
     use super::*;
 
     fn absent(p_wrong: f64) -> RejectionReason {
-        RejectionReason::Absent { p_wrong, max: MaxPWrong::Balanced, identified: 4, model: 8 }
+        RejectionReason::Absent { p_wrong, max: MaxPWrong::Balanced, identified: 4, model: 8, edges: [0, 0] }
     }
 
     /// Fails if the sentence lacks its number, its limit, or a setting that would have helped.

@@ -7,6 +7,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 use serde::Serialize;
 
 use super::{
+    edges::is_behind,
     input::{CoherenceProblem, read},
     method::Method,
 };
@@ -163,6 +164,9 @@ pub struct Answer {
     /// The identified cloud points behind the camera (z ≤ 0), if a fix has any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub behind: Vec<usize>,
+    /// The identified lines with an end behind the camera (z ≤ 0), if a fix has any.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lines_behind: Vec<usize>,
     /// The rejected pairs (model, cloud), if there is no fix; after an exhausted budget, the best so far.
     pub unbelieved: Option<Vec<[usize; 2]>>,
     /// The best pose of an answer that is no fix; null if its pairs determine none.
@@ -178,7 +182,7 @@ pub struct Answer {
     /// Whether the search proved that no admissible set is larger; a likelihood search proves that none is more
     /// probable.
     pub optimal: bool,
-    /// The proved upper bound of the number of pairs of an admissible set.
+    /// The proved upper bound of the number of pairs of an admissible set, of points and edges together.
     pub consensus_bound: Option<usize>,
     /// The probability that the object is absent.
     pub p_absent: Option<f64>,
@@ -258,6 +262,10 @@ pub fn printed(
         behind: fix.map_or_else(Vec::new, |fix| {
             let clouds = fix.pairs.iter().map(|pair| pair.cloud);
             clouds.filter(|&cloud| !(problem.cloud[cloud].position.at.coords.z > 0.0)).collect()
+        }),
+        lines_behind: fix.map_or_else(Vec::new, |fix| {
+            let lines = fix.edges.iter().map(|edge| edge.cloud);
+            lines.filter(|&line| is_behind(&problem.edges.lines[line])).collect()
         }),
         unbelieved: (fix.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
         best: attempt.best.as_ref().map(Best::from),

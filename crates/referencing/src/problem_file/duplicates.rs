@@ -1,17 +1,31 @@
-//! Points that a file lists more than once.
+//! Points and lines that a file lists more than once.
 
 use std::collections::HashMap;
 
-use seafix_geometry::Point;
+use seafix_geometry::{MeasuredLine, Point};
 
 use crate::site::check::COINCIDENT;
 
 /// For each point the index of the first point at the same place, to a micrometre.
 pub(super) fn firsts<F>(points: impl Iterator<Item = Point<F>>) -> Vec<usize> {
     let mut known = HashMap::new();
-    // A conversion of a float that is too large gives the greatest integer: such points are out of range anyway.
-    let place = |at: Point<F>| [at.coords.x, at.coords.y, at.coords.z].map(|x| (x / COINCIDENT).round() as i64);
     points.enumerate().map(|(index, at)| *known.entry(place(at)).or_insert(index)).collect()
+}
+
+/// For each line the index of the first line with the same ends, to a micrometre and in either order.
+pub(super) fn first_lines(lines: &[MeasuredLine]) -> Vec<usize> {
+    let mut known = HashMap::new();
+    let ends = |line: &MeasuredLine| {
+        let mut ends = line.ends.map(place);
+        ends.sort_unstable();
+        ends
+    };
+    lines.iter().enumerate().map(|(index, line)| *known.entry(ends(line)).or_insert(index)).collect()
+}
+
+fn place<F>(at: Point<F>) -> [i64; 3] {
+    // A conversion of a float that is too large gives the greatest integer: such points are out of range anyway.
+    [at.coords.x, at.coords.y, at.coords.z].map(|x| (x / COINCIDENT).round() as i64)
 }
 
 /// The pairs with every repeated point replaced by its first, each once.

@@ -5,12 +5,16 @@ use seafix_component::{counted, number};
 use seafix_geometry::{MeasuredLine, Point};
 use serde::Deserialize;
 
-use super::invalid_part::{FARTHEST, InvalidPart, MAX_SIGMA, ROUNDING, invalid};
+use super::{
+    duplicates::first_lines,
+    invalid_part::{FARTHEST, InvalidPart, MAX_SIGMA, ROUNDING, invalid},
+};
 use crate::{
     candidates::Gate,
     edge_candidates::edge_candidates,
     problem::Prior,
     site::{
+        check::COINCIDENT,
         check_edges::{MAX_EDGES, MIN_LENGTH},
         edge::{End, ModelEdge},
         model::ModelPoint,
@@ -19,6 +23,10 @@ use crate::{
 
 /// Maximum number of measured lines.
 const MAX_LINES: usize = 8000;
+/// Minimum variance of a line's offset (m²), a nanometre's; no measurement is more precise.
+const MIN_VARIANCE: f64 = 1e-18;
+/// Minimum eigenvalue of the correlations of a line's offsets, above the rounding errors of their inverse.
+const SINGULAR: f64 = 1e-12;
 
 /// The straight edges of a problem: those of the model, and the measured lines. Empty for a problem of points alone.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -28,6 +36,8 @@ pub struct ProblemEdges {
     /// The measured lines, camera frame.
     pub lines: Vec<MeasuredLine>,
     /// The putative pairs (edge, line), if given; no other pairs are considered.
+    ///
+    /// A line that the file lists more than once takes part as its first.
     pub putative: Option<Vec<(usize, usize)>>,
 }
 
@@ -37,17 +47,28 @@ impl ProblemEdges {
         if self.model.is_empty() || self.lines.is_empty() {
             return Vec::new();
         }
-        let Some(pairs) = &self.putative else {
-            return edge_candidates(&self.model, model, &self.lines, prior, &Gate::default(), None);
+        let mut lists = match &self.putative {
+            None => edge_candidates(&self.model, model, &self.lines, prior, &Gate::default(), None),
+            Some(pairs) => {
+                let mut lists = vec![Vec::new(); self.model.len()];
+                pairs.iter().for_each(|&(edge, line)| lists[edge].push(line));
+                lists
+            }
         };
-        let mut lists = vec![Vec::new(); self.model.len()];
-        pairs.iter().for_each(|&(edge, line)| lists[edge].push(line));
+        // Two edges must not share one line: each would count as evidence.
+        let firsts = first_lines(&self.lines);
         for list in &mut lists {
+            list.iter_mut().for_each(|line| *line = firsts[*line]);
             list.sort_unstable();
             list.dedup();
         }
         lists
     }
+}
+
+/// Whether an end of a line is behind the camera.
+pub(super) fn is_behind(line: &MeasuredLine) -> bool {
+    !line.ends.iter().all(|end| end.coords.z > 0.0)
 }
 
 /// An end of an edge before validation: a place (m), or the index of a model point.
@@ -87,8 +108,8 @@ impl EdgeParts {
     ///
     /// # Errors
     ///
-    /// The first invalid value: too many edges or lines, an edge that is too short or given twice, an index out of range, a number that
-    /// is not finite, or a covariance that is not symmetric and positive definite.
+    /// The first invalid value: too many edges or lines, an edge that is too short or given twice, an index out of range,
+    /// a number that is not finite, or a covariance that is implausibly small, or not symmetric and positive definite.
     pub(super) fn checked(self, model: &[ModelPoint]) -> Result<ProblemEdges, InvalidPart> {
         for (name, count, max) in [("edges", self.edges.len(), MAX_EDGES), ("lines", self.lines.len(), MAX_LINES)] {
             if count > max {
@@ -102,7 +123,11 @@ impl EdgeParts {
             (edges.collect::<Result<_, _>>()?, lines.collect::<Result<_, _>>()?);
         for (index, edge) in edges.iter().enumerate() {
             let [from, to] = edge.places(model);
-            let same = |other: &&ModelEdge| [[from, to], [to, from]].contains(&other.places(model));
+            let same = |other: &&ModelEdge| {
+                let [a, b] = other.places(model);
+                let near = |c: &Point<_>, d: &Point<_>| a.distance(c) < COINCIDENT && b.distance(d) < COINCIDENT;
+                near(&from, &to) || near(&to, &from)
+            };
             if let Some(other) = edges[..index].iter().find(same) {
                 let what = format!("edge {index} is edge {} again", other.id);
                 return Err(invalid(what, "edges", Some(index), "give each edge once".to_owned()));
@@ -165,6 +190,17 @@ fn line(index: usize, raw: &RawLine) -> Result<MeasuredLine, InvalidPart> {
         let what = "has a covariance that is not symmetric and positive definite";
         return Err(wrong(what, "give variances of the four offsets in square metres"));
     }
+    let variances = covariance.diagonal();
+    if variances.min() < MIN_VARIANCE {
+        let remedy = "no measurement is more precise than a nanometre; give variances in square metres";
+        return Err(wrong("has an implausibly small variance", remedy).value(format!("{} m²", number(variances.min()))));
+    }
+    let sigmas = variances.map(f64::sqrt);
+    let correlations = covariance.component_div(&(sigmas * sigmas.transpose()));
+    if (correlations - Matrix4::identity() * SINGULAR).cholesky().is_none() {
+        let remedy = "give four offsets none of which follows from the others";
+        return Err(wrong("has a singular covariance", remedy));
+    }
     Ok(MeasuredLine { ends: ends.map(Point::from), offsets: covariance, segments: None, depth: true })
 }
 
@@ -204,10 +240,36 @@ mod tests {
             fault(|it| it.edges.push([it.edges[0][1], it.edges[0][0]])),
             "edge 1 is edge 0 again; give each edge once"
         );
+        let nearly = fault(|it| it.edges.push([RawEnd::At([1.0, 0.0, 1e-7]), RawEnd::Point(0)]));
+        assert!(nearly.starts_with("edge 1 is edge 0 again"), "{nearly}");
         assert!(fault(|it| it.lines[0].ends[1] = it.lines[0].ends[0]).starts_with("line 0 has one place twice"));
         assert!(fault(|it| it.lines[0].covariance[3][3] = 0.0).contains("positive definite"));
         assert!(fault(|it| it.lines[0].covariance[0][1] = 1e-7).contains("symmetric"));
+        assert_eq!(
+            fault(|it| it.lines[0].covariance[3][3] = 1e-30),
+            "line 0 has an implausibly small variance: 1e-30 m²; no measurement is more precise than a nanometre; give \
+             variances in square metres"
+        );
+        let singular = |it: &mut EdgeParts| {
+            for (i, k) in [(0, 1), (1, 0)] {
+                it.lines[0].covariance[i][k] = 1e-6 * (1.0 - 1e-14);
+            }
+        };
+        assert!(fault(singular).starts_with("line 0 has a singular covariance"));
         assert!(fault(|it| it.lines[0].ends[0][2] = f64::INFINITY).contains("out of range"));
         assert!(fault(|it| it.putative = Some(vec![[0, 1]])).contains("there are 1 edge and 1 line"));
+    }
+
+    /// With or without putative pairs, and with its ends in either order.
+    #[test]
+    fn a_repeated_line_takes_part_as_its_first() {
+        let model = [ModelPoint::exact("0", Point::origin())];
+        let mut repeated = parts();
+        let RawLine { ends: [from, to], covariance } = repeated.lines[0].clone();
+        repeated.lines.push(RawLine { ends: [to, from], covariance });
+        for putative in [Some(vec![[0, 1]]), None] {
+            let problem = EdgeParts { putative, ..repeated.clone() }.checked(&model).unwrap();
+            assert_eq!(problem.candidates(&model, None), [[0]]);
+        }
     }
 }

@@ -3,6 +3,7 @@
 mod answer;
 mod diagnosis;
 mod duplicates;
+mod edge_warnings;
 mod edges;
 mod input;
 mod invalid_part;

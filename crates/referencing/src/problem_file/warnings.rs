@@ -36,13 +36,13 @@ const DISTINGUISHED: f64 = 3.0;
 const OPEN: f64 = 0.09;
 
 /// The warnings about a file.
-struct Hints<'a> {
+pub(super) struct Hints<'a> {
     file: &'a Path,
     all: Vec<Fault>,
 }
 
 impl Hints<'_> {
-    fn warn(&mut self, what: &str, value: impl Into<String>, remedy: &str) {
+    pub(super) fn warn(&mut self, what: &str, value: impl Into<String>, remedy: &str) {
         self.all.push(Fault::new(what, self.file).value(value.into()).remedy(remedy));
     }
 }
@@ -52,12 +52,14 @@ impl CoherenceProblem {
     ///
     /// They cover points too few for a pose, collinear, repeated, or too close for Δ; a symmetric model; zero noise, or noise far
     /// above Δ; putative pairs that determine no pose; a prior that places the object out of view or bounds nothing;
-    /// coordinates that are apparently not in metres; and too many candidates.
+    /// coordinates that are apparently not in metres; edges without lines, or lines without edges; lines that are behind the
+    /// camera, repeated, or shorter than their noise; and too many candidates.
     pub fn warnings(&self, file: &Path) -> Vec<Fault> {
         let mut reported = Hints { file, all: Vec::new() };
         self.of_the_model(&mut reported);
         self.of_the_cloud(&mut reported);
         self.of_duplicates(&mut reported);
+        self.of_the_edges(&mut reported);
         self.of_the_noise(&mut reported);
         self.of_putative(&mut reported);
         let before = reported.all.len();
@@ -68,8 +70,7 @@ impl CoherenceProblem {
     }
 
     fn of_the_model(&self, reported: &mut Hints<'_>) {
-        let by_points = self.edges.model.is_empty();
-        if by_points && self.model.len() < NEEDED {
+        if !self.has_edges() && self.model.len() < NEEDED {
             let value = counted(self.model.len(), "point");
             reported.warn("the model has too few points", value, "a pose needs at least three");
         }
@@ -105,7 +106,7 @@ impl CoherenceProblem {
 
     fn of_the_cloud(&self, reported: &mut Hints<'_>) {
         match self.cloud.len() {
-            few if few < NEEDED && !self.edges.lines.is_empty() => return,
+            few if few < NEEDED && self.has_edges() => return,
             0 => return reported.warn("the cloud has no points", "0 points", "add measured points"),
             few if few < NEEDED => {
                 let value = counted(few, "point");

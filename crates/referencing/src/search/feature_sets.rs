@@ -67,7 +67,7 @@ fn contradicts(features: &Features<'_>, taken: &[usize], next: usize, sense: Sen
 /// three is rejected, a larger one undecided.
 ///
 /// # Errors
-/// [`Rejected::NotFound`] for too few features, [`Rejected::Mirrored`], [`Rejected::Budget`] if the budget ended.
+/// [`Rejected::NoFeaturesFound`] for too few features, [`Rejected::Mirrored`], [`Rejected::Budget`] if the budget ended.
 pub(super) fn conclude(
     features: &Features<'_>,
     ranked: &[usize],
@@ -81,7 +81,7 @@ pub(super) fn conclude(
     let ended = |best: usize| ended.map(|(budget, pair_tests)| Rejected::Budget { budget, best, bound, pair_tests });
     let set = features.set(&taken);
     if set.len() < NEEDED || !enough(set.points.len(), set.edges.len()) {
-        return Err(ended(set.len()).unwrap_or(Rejected::NotFound { bound, needed: NEEDED }));
+        return Err(ended(set.len()).unwrap_or(Rejected::NoFeaturesFound { bound }));
     }
     let mut undecided = None;
     if orientation {

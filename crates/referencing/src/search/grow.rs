@@ -185,10 +185,20 @@ fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, pair_tests:
 
 /// Upper bound of the size of a set: the number of model points with candidates, and of candidates.
 pub(super) fn max_possible(problem: &Problem<'_>) -> usize {
-    let mut clouds: Vec<usize> = problem.candidates.lists.iter().flatten().copied().collect();
-    clouds.sort_unstable();
-    clouds.dedup();
-    problem.candidates.with_candidates().min(clouds.len())
+    most(&problem.candidates.lists)
+}
+
+/// [`max_possible`] for points and edges together.
+pub(super) fn max_possible_features(problem: &Problem<'_>) -> usize {
+    max_possible(problem) + most(problem.edges.candidates)
+}
+
+/// Upper bound of the number of one-to-one pairs of these candidates.
+fn most(lists: &[Vec<usize>]) -> usize {
+    let mut measured: Vec<usize> = lists.iter().flatten().copied().collect();
+    measured.sort_unstable();
+    measured.dedup();
+    lists.iter().filter(|list| !list.is_empty()).count().min(measured.len())
 }
 
 /// Checks the preconditions of every search: three model points with candidates, and at most `max_pairs` pairs.

@@ -87,7 +87,7 @@ pub struct Identification {
     /// Whether the set is proved to be optimal: no admissible set is larger or, for a search by likelihood, more
     /// likely.
     pub optimal: bool,
-    /// Upper bound of the number of pairs of an admissible set.
+    /// Upper bound of the number of pairs of an admissible set, of points and edges together.
     pub consensus_bound: usize,
     /// Number of pair tests, including the tests that build the graph.
     pub pair_tests: u64,
@@ -119,6 +119,8 @@ impl Identification {
 /// Remedy for too few points of the object in the cloud.
 pub(crate) const MORE_POINTS: &str =
     "bring more of the object into view, detect more features (`detector.features`), or widen the prior";
+/// Remedy for too few points and edges of the object in the cloud.
+const MORE_FEATURES: &str = "bring more of the object into view, detect more features and lines, or widen the prior";
 /// Remedy for too many candidates.
 pub(crate) const FEWER: &str = "give a prior pose or smaller gates, or decimate the cloud";
 
@@ -132,6 +134,17 @@ pub enum Rejected {
         with_candidates: usize,
         /// Minimum number of model points.
         needed: usize,
+    },
+    /// Too few model points and edges have a candidate.
+    #[error(
+        "too few candidates: {} and {} with a candidate; a pose needs three",
+        counted(*.points, "model point"), counted(*.edges, "edge")
+    )]
+    TooFewFeatures {
+        /// Number of model points with a candidate.
+        points: usize,
+        /// Number of model edges with a candidate.
+        edges: usize,
     },
     /// The largest coherent set is too small.
     #[error("no consensus: the largest coherent set has {}; {needed} are needed", counted(*.best, "point"))]
@@ -178,6 +191,14 @@ pub enum Rejected {
         /// Minimum size.
         needed: usize,
     },
+    /// A search without a proof found no set of points and edges, or too small a set.
+    #[error(
+        "no pose found: the search met no set of points and edges that one pose explains; at most {bound} are possible"
+    )]
+    NoFeaturesFound {
+        /// Upper bound of the size of a set.
+        bound: usize,
+    },
     /// The search starts from a prior pose, and none is given.
     #[error("no prior pose: this search starts from one")]
     NoPrior,
@@ -194,13 +215,20 @@ pub enum Rejected {
 impl Rejected {
     /// Whether absence is proved, in contrast to a search that only found nothing.
     pub fn is_proved(&self) -> bool {
-        matches!(self, Self::TooFew { .. } | Self::NoConsensus { .. } | Self::Mirrored { proved: true, .. })
+        matches!(
+            self,
+            Self::TooFew { .. }
+                | Self::TooFewFeatures { .. }
+                | Self::NoConsensus { .. }
+                | Self::Mirrored { proved: true, .. }
+        )
     }
 
     /// The remedy in one phrase.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::TooFew { .. } | Self::NoConsensus { .. } | Self::NotFound { .. } => MORE_POINTS,
+            Self::TooFewFeatures { .. } | Self::NoFeaturesFound { .. } => MORE_FEATURES,
             Self::NoPrior => "give a prior pose or another search",
             Self::Budget { .. } => "narrow the prior or raise the budget of the search (`search.budget`)",
             Self::TooLarge { .. } => FEWER,
@@ -211,10 +239,10 @@ impl Rejected {
     /// The reason in logs and tables, in kebab-case.
     pub fn reason(&self) -> &'static str {
         match self {
-            Self::TooFew { .. } => "too-few",
+            Self::TooFew { .. } | Self::TooFewFeatures { .. } => "too-few",
             Self::NoConsensus { .. } => "no-consensus",
             Self::NoPrior => "no-prior",
-            Self::NotFound { .. } => "not-found",
+            Self::NotFound { .. } | Self::NoFeaturesFound { .. } => "not-found",
             Self::Budget { .. } => "budget",
             Self::TooLarge { .. } => "too-large",
             Self::Mirrored { .. } => "mirrored",

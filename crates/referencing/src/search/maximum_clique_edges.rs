@@ -33,7 +33,7 @@ pub(super) fn search(settings: &MaximumClique, problem: &Problem<'_>) -> Result<
     let features = Features::of(problem).filtered(|all, v| all.edge(v).is_none_or(|edge| edge.depth));
     let (with_candidates, of_points) = features.available();
     if with_candidates < NEEDED || !enough(of_points, with_candidates - of_points) {
-        return Err(Rejected::TooFew { with_candidates, needed: NEEDED });
+        return Err(Rejected::TooFewFeatures { points: of_points, edges: with_candidates - of_points });
     }
     if features.len() > settings.max_pairs {
         let bound = features.max_possible();

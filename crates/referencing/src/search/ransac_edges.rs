@@ -29,7 +29,7 @@ pub(super) fn search(settings: &Ransac, problem: &Problem<'_>, rng: &mut dyn Rng
     let bound = features.max_possible();
     let (with_candidates, of_points) = features.available();
     if !enough(of_points, with_candidates - of_points) || with_candidates < NEEDED {
-        return Err(Rejected::TooFew { with_candidates, needed: NEEDED });
+        return Err(Rejected::TooFewFeatures { points: of_points, edges: with_candidates - of_points });
     }
     if size > settings.max_pairs {
         return Err(Rejected::TooLarge { size, what: "candidate pairs", max: settings.max_pairs, bound });

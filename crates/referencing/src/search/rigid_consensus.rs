@@ -25,7 +25,7 @@ use super::{
         structured_clutter::{Occupied, StructuredClutter},
         support::IndependentPairs,
     },
-    grow::{feasible, grow, max_possible, so_far},
+    grow::{feasible, grow, max_possible_features, so_far},
     identification::{Identification, Rejected, Search},
     limits::{NEEDED, bounded},
     orientation::Sense,
@@ -179,12 +179,19 @@ impl Search for RigidConsensus {
 
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
         let enough = |edges: usize| 2 * problem.candidates.with_candidates() + 3 * edges >= ENOUGH;
+        let (edges, has_edges) = (problem.edges.with_candidates(), !problem.edges.model.is_empty());
         match feasible(problem, self.max_pairs) {
-            Err(Rejected::TooFew { .. }) if enough(problem.edges.with_candidates()) => {}
+            Err(Rejected::TooFew { .. }) if enough(edges) => {}
+            Err(Rejected::TooFew { with_candidates: points, .. }) if has_edges => {
+                return Err(Rejected::TooFewFeatures { points, edges });
+            }
             other => other?,
         }
-        let bound = max_possible(problem);
-        let nothing = Rejected::NotFound { bound, needed: NEEDED };
+        let bound = max_possible_features(problem);
+        let nothing = match has_edges {
+            true => Rejected::NoFeaturesFound { bound },
+            false => Rejected::NotFound { bound, needed: NEEDED },
+        };
         let Some(prior_terms) = PriorTerms::of(problem) else { return Err(nothing) };
         let graph = ConsistencyGraph::of(problem, &prior_terms);
         let terms = Terms::of(problem, &prior_terms, &graph);
@@ -316,7 +323,8 @@ impl Search for RigidConsensus {
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut pair_tests);
         let identified = edge_terms.as_ref().map_or_else(Vec::new, |edges| best.edge_pairs(edges));
         if 2 * pairs.len() + 3 * identified.len() < ENOUGH {
-            return if complete { Err(nothing) } else { so_far(problem, true, ended(pairs.len(), pair_tests)) };
+            let size = pairs.len() + identified.len();
+            return if complete { Err(nothing) } else { so_far(problem, true, ended(size, pair_tests)) };
         }
         pairs.sort_unstable();
         let explanation = |mode: &Mode| Explanation {
@@ -334,6 +342,7 @@ impl Search for RigidConsensus {
         let acceptable = joined.as_ref().filter(|_| best.ln_evidence >= STRONG);
         let resembling = acceptable.and_then(|joined| resembling::ln_evidence(joined, best));
         Ok(Identification {
+            undecided: (!complete).then(|| ended(pairs.len() + identified.len(), pair_tests)),
             edges: identified,
             alternatives: Vec::new(),
             alternative_edges: Vec::new(),
@@ -342,7 +351,6 @@ impl Search for RigidConsensus {
             optimal: evidence_gap == Some(0.0) && pairs.len() == best.members.len() && best.edges.is_empty(),
             consensus_bound: bound,
             pair_tests,
-            undecided: (!complete).then(|| ended(pairs.len(), pair_tests)),
             posterior: Some(Posterior {
                 explanations: explain(&swept),
                 beside: explain(&beside),

@@ -25,9 +25,10 @@ const RULE: f64 = 1e-6;
 ///
 /// Millimetres or kilometres are suspected outside of the first.
 pub(crate) const SUSPICIOUS: [f64; 2] = [0.01, 1e3];
-const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
-/// The allowed difference of surveyed and model distances, in standard deviations.
-const SURVEY_SIGMAS: f64 = 4.0;
+pub(super) const IMPOSSIBLE: [f64; 2] = [1e-4, 1e5];
+/// The allowed difference of two statements on the same quantity, such as surveyed and model distances, in standard
+/// deviations.
+pub(super) const SIGMAS: f64 = 4.0;
 
 /// The collected faults and warnings, with the places of the text for their line numbers.
 pub(super) struct Checker<'a> {
@@ -117,12 +118,9 @@ pub(super) fn site(raw: &SiteFile, text: &str, file: &Path) -> Result<Site, Vec<
         let fault = check.at("unknown object in `site_frame`", &["site_frame"]).value(format!("`{}`", raw.site_frame));
         check.fault(fault.remedy(suggestion(&raw.site_frame, ids())));
     }
-    let objects: Vec<_> = raw
-        .objects
-        .iter()
-        .enumerate()
-        .map(|(index, object)| check_object(&mut check, object, index, &raw.format))
-        .collect();
+    check_edges::format(&mut check, raw);
+    let objects: Vec<_> =
+        raw.objects.iter().enumerate().map(|(index, object)| check_object(&mut check, object, index)).collect();
     match (objects.into_iter().collect::<Option<Vec<_>>>(), frame) {
         (Some(objects), Some(frame)) if check.faults.is_empty() => {
             Ok(Site { name: raw.name.clone(), frame, objects, warnings: check.warnings })
@@ -139,7 +137,7 @@ pub(super) fn suggestion<'a>(word: &str, options: impl Iterator<Item = &'a str> 
 }
 
 /// The object, or `None` after a fault that makes it unusable.
-fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize, format: &str) -> Option<SiteObject> {
+fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize) -> Option<SiteObject> {
     let before = check.faults.len();
     let number = index.to_string();
     let of = format!("object `{}`", raw.id);
@@ -181,7 +179,7 @@ fn check_object(check: &mut Checker<'_>, raw: &ObjectFile, index: usize, format:
         .collect();
     spread(check, &points, &of, &number);
     frame_rule(check, &base.map(|i| points[i].at), &of, &number);
-    let edges = check_edges::edges(check, raw, &points, format, &of, &number);
+    let edges = check_edges::edges(check, raw, &points, &of, &number);
     let base_in_world = raw.base_in_world.map(|base| base.map(Point::<World>::from));
     if let Some(world) = &base_in_world {
         survey(check, world, &base.map(|i| &points[i]), raw.survey_sigma, &of, &number);
@@ -304,7 +302,7 @@ fn survey(
     for (i, k) in [(0, 1), (0, 2), (1, 2)] {
         let (surveyed, known) = (world[i].distance(&world[k]), model[i].at.distance(&model[k].at));
         let variance = 2.0 * sigma * sigma + model[i].sigma.powi(2) + model[k].sigma.powi(2);
-        let allowed = SURVEY_SIGMAS * variance.sqrt() + RULE;
+        let allowed = SIGMAS * variance.sqrt() + RULE;
         if !((surveyed - known).abs() <= allowed) {
             let what = format!("{of}: survey and model disagree on the distance P{} P{}", i + 1, k + 1);
             let fault = check.at(what, &["object", number, "base_in_world"]);

@@ -5,16 +5,23 @@ use seafix_component::{counted, number};
 use seafix_geometry::Point;
 
 use super::{
-    check::{COINCIDENT, Checker, suggestion},
+    check::{COINCIDENT, Checker, IMPOSSIBLE, suggestion},
+    check_faces,
     edge::{End, ModelEdge},
-    file::{EdgeFile, EndFile, FORMAT, FORMAT_WITH_EDGES, ObjectFile},
+    file::{EdgeFile, EndFile, FORMAT, FORMAT_WITH_EDGES, ObjectFile, SiteFile},
     model::ModelPoint,
+    target::diameter,
 };
 
 /// The minimum length of an edge (m).
 pub(crate) const MIN_LENGTH: f64 = 0.02;
 /// The length (m) above which an edge is suspicious: over longer ones a structure bends.
 const LONG: f64 = 5.001;
+/// The maximum ratio of an edge's length to the diameter of its object's points; beyond, their units differ.
+const OF_DIAMETER: f64 = 100.0;
+/// The ratio of an end's standard deviation to the diameter above which it is invalid, and to the length above which
+/// the edge's direction is open.
+const UNKNOWN: f64 = 0.5;
 /// The maximum number of edges of an object.
 pub(crate) const MAX_EDGES: usize = 500;
 /// The allowed difference of a normal's length from one; files give six digits.
@@ -22,19 +29,26 @@ const UNIT: f64 = 1e-5;
 /// The sine of the largest angle between parallel edges.
 const PARALLEL: f64 = 0.02;
 
+/// Adds a fault if a site of the format without edges has edges.
+pub(super) fn format(check: &mut Checker<'_>, raw: &SiteFile) {
+    let first = raw.objects.iter().find_map(|object| Some((object, object.edges.first()?)));
+    if let Some((object, edge)) = first.filter(|_| raw.format != FORMAT_WITH_EDGES) {
+        let what = format!("object `{}`: edge `{}` in a file of another format", object.id, edge.id);
+        let fault = check.at(what, &["format"]).value(format!("`{FORMAT}`"));
+        check.fault(fault.remedy(format!("give format = \"{FORMAT_WITH_EDGES}\"")));
+    }
+}
+
 /// The edges of an object; faults and warnings go to `check`.
 pub(super) fn edges(
     check: &mut Checker<'_>,
     raw: &ObjectFile,
     points: &[ModelPoint],
-    format: &str,
     of: &str,
     object: &str,
 ) -> Vec<ModelEdge> {
-    let Some(first) = raw.edges.first() else { return Vec::new() };
-    if format != FORMAT_WITH_EDGES {
-        let fault = check.at(format!("{of}: edge `{}` in a file of another format", first.id), &["format"]);
-        check.fault(fault.value(format!("`{FORMAT}`")).remedy(format!("give format = \"{FORMAT_WITH_EDGES}\"")));
+    if raw.edges.is_empty() {
+        return Vec::new();
     }
     if raw.edges.len() > MAX_EDGES {
         let fault = check.at(format!("{of} has too many edges"), &["object", object]);
@@ -45,22 +59,25 @@ pub(super) fn edges(
         ["object", object, "edge", index, "id"].map(str::to_owned).to_vec()
     });
     let before = check.faults.len();
-    let read: Vec<Option<ModelEdge>> =
-        raw.edges.iter().enumerate().map(|(i, edge)| one(check, edge, points, of, object, &i.to_string())).collect();
+    let extent = diameter(points);
+    let read: Vec<Option<ModelEdge>> = (raw.edges.iter().enumerate())
+        .map(|(i, edge)| one(check, edge, (points, extent), of, object, &i.to_string()))
+        .collect();
     if check.faults.len() > before {
         return Vec::new(); // a comparison of invalid edges would only repeat the faults
     }
     let edges: Vec<ModelEdge> = read.into_iter().flatten().collect();
     twice(check, &edges, points, of, object);
     parallel(check, &edges, points, of, object);
+    between_points(check, &edges, of, object);
     edges
 }
 
-/// One edge; `None` after a fault.
+/// One edge of an object with these points and their diameter; `None` after a fault.
 fn one(
     check: &mut Checker<'_>,
     raw: &EdgeFile,
-    points: &[ModelPoint],
+    (points, extent): (&[ModelPoint], f64),
     of: &str,
     object: &str,
     index: &str,
@@ -72,6 +89,10 @@ fn one(
     let mut end = |key: &'static str, end: &EndFile| match end {
         EndFile::At(at) => {
             check.finite(&format!("{name}: `{key}`"), at, &path(key));
+            if at.iter().any(|x| x.is_finite() && x.abs() > IMPOSSIBLE[1]) {
+                let fault = check.at(format!("{name}: `{key}` is out of range"), &path(key)).value(format!("{at:?}"));
+                check.fault(fault.remedy(format!("give coordinates in metres, at most {:e}", IMPOSSIBLE[1])));
+            }
             Some(End::At(Point::from(*at)))
         }
         EndFile::Point(id) => {
@@ -115,12 +136,44 @@ fn one(
         check.fault(fault.value(format!("{} m", number(length))).remedy(remedy));
         return None;
     }
-    if length > LONG {
+    if length > OF_DIAMETER * extent {
+        let fault = check.at(format!("{name}: implausible units"), &path("to"));
+        let value = format!("{} m long, the diameter of the object's points is {} m", number(length), number(extent));
+        check.fault(fault.value(value).remedy("give coordinates in metres"));
+    } else if length > LONG {
         let warning = check.at(format!("{name} is long"), &path("to"));
         let remedy = "check that the edge is straight over its whole length, or split it";
         check.warnings.push(warning.value(format!("{} m", number(length))).remedy(remedy));
     }
-    Some(edge)
+    if edge.has_place() {
+        sigma(check, &edge, (length, extent), &name, &path("sigma"));
+    }
+    check_faces::faces(check, &edge, points, &name, &path("faces"));
+    (check.faults.len() == before).then_some(edge)
+}
+
+/// Adds a fault if the `sigma` of an edge leaves its place open, and a warning if it leaves its direction open.
+fn sigma(check: &mut Checker<'_>, edge: &ModelEdge, (length, extent): (f64, f64), name: &str, path: &[&str]) {
+    let at = |check: &Checker<'_>, what: &str, of: String| {
+        check.at(format!("{name}: {what}"), path).value(format!("{} m, {of}", number(edge.sigma)))
+    };
+    if edge.sigma > UNKNOWN * extent {
+        let fault = at(check, "`sigma` is out of range", format!("the object's diameter is {} m", number(extent)));
+        check.fault(fault.remedy("give metres, at most half of the diameter"));
+    } else if edge.sigma > UNKNOWN * length {
+        let warning = at(check, "`sigma` leaves its direction open", format!("its length is {} m", number(length)));
+        check.warnings.push(warning.remedy("give the standard deviation of its ends in metres, or remove the edge"));
+    }
+}
+
+/// Warns of a `sigma` of edges whose ends are both points: they have the standard deviations of these.
+fn between_points(check: &mut Checker<'_>, edges: &[ModelEdge], of: &str, object: &str) {
+    let all: Vec<usize> = (0..edges.len()).filter(|&i| !edges[i].has_place() && edges[i].sigma > 0.0).collect();
+    let Some(first) = all.first() else { return };
+    let path = ["object", object, "edge", &first.to_string(), "sigma"];
+    let warning = check.at(format!("{of}: `sigma` of edges between points has no effect"), &path);
+    let value = format!("{}, e.g. `{}`", counted(all.len(), "edge"), edges[*first].id);
+    check.warnings.push(warning.value(value).remedy("remove it, and give the `sigma` of the points"));
 }
 
 /// Adds a fault for every two edges whose ends coincide within two standard deviations.

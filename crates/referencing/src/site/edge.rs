@@ -53,6 +53,11 @@ impl ModelEdge {
         })
     }
 
+    /// Whether an end is a place of its own, whose standard deviation is [`sigma`](Self::sigma).
+    pub fn has_place(&self) -> bool {
+        self.ends.iter().any(|end| matches!(end, End::At(_)))
+    }
+
     /// Whether a camera at this position (object frame) sees one of the edge's faces.
     ///
     /// The limit is that of [`ModelPoint::shows_itself`].

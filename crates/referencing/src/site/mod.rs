@@ -6,6 +6,7 @@
 pub(crate) mod bounding_box;
 pub(crate) mod check;
 pub(crate) mod check_edges;
+mod check_faces;
 pub(crate) mod congruence;
 pub(crate) mod edge;
 mod file;

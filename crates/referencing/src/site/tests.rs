@@ -227,12 +227,12 @@ fn with_edges() -> String {
 id = "front"
 from = "A"
 to = "B"
-sigma = 0.001
 faces = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]
 [[object.edge]]
 id = "post"
 from = [0.0, 0.0, 1.0]
 to = "A"
+sigma = 0.002
 [[object.interest]]"#;
     GOOD.replace("seafix-site/1", "seafix-site/1.1").replacen("[[object.interest]]", edges.trim_start(), 1)
 }
@@ -244,7 +244,8 @@ fn edges_are_read_and_written_in_a_format_of_their_own() {
     let edges = &site.objects[0].edges;
     assert_eq!(edges[0].ends, [End::Point(0), End::Point(1)]);
     assert_eq!(edges[1].ends, [End::At([0.0, 0.0, 1.0].into()), End::Point(0)]);
-    assert_eq!((edges[0].sigmas(&site.objects[0].points), edges[1].sigma), ([0.001, 0.0], 0.0));
+    assert_eq!(edges[0].sigmas(&site.objects[0].points), [0.001, 0.0]);
+    assert_eq!(edges[1].sigmas(&site.objects[0].points), [0.002, 0.001]);
     let text = site.to_toml();
     assert!(text.contains("\"seafix-site/1.1\""));
     assert_eq!(parse(&text).unwrap(), site);
@@ -266,7 +267,13 @@ fn an_invalid_edge_is_refused_in_one_line() {
         ("[-1.0, 0.0, 0.0]", "[-2.0, 0.0, 0.0]", ["a face normal is not a unit vector", "of length 2"]),
         ("[-1.0, 0.0, 0.0]", "[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]", ["edge `front` has too many faces", "3"]),
         ("from = [0.0, 0.0, 1.0]", "from = \"B\"", ["the same edge twice", "`front` and `post`"]),
-        ("sigma = 0.001\nfaces", "sigma = -1.0\nfaces", ["edge `front`: `sigma`", "zero or more"]),
+        ("sigma = 0.002", "sigma = -1.0", ["edge `post`: `sigma`", "zero or more"]),
+        ("sigma = 0.002", "sigma = 1.2", ["edge `post`: `sigma` is out of range", "at most half of the diameter"]),
+        ("from = [0.0, 0.0, 1.0]", "from = [0.0, 0.0, 300.0]", ["edge `post`: implausible units", "300 m long"]),
+        ("from = [0.0, 0.0, 1.0]", "from = [0.0, 0.0, 1e300]", ["edge `post`: `from` is out of range", "1e300"]),
+        ("[-1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", ["a face normal is not at right angles to the edge", "at 0° to it"]),
+        ("[-1.0, 0.0, 0.0]", "[0.0, 0.0, 1.0]", ["the two face normals are equal", "of the other face"]),
+        ("[-1.0, 0.0, 0.0]", "[0.0, 0.0, -1.0]", ["the two face normals are opposite", "of a thin plate"]),
         ("id = \"post\"", "id = \"front\"", ["edge id is used twice", "choose another id"]),
     ] {
         let text = good.replacen(from, to, 1);
@@ -285,6 +292,43 @@ fn suspicious_edges_are_warned_of() {
     assert!(warned("x", "x").is_empty());
     let long = warned("from = [0.0, 0.0, 1.0]", "from = [0.0, 0.0, 6.0]");
     assert!(long[0].to_string().contains("edge `post` is long"));
+    let open = warned("sigma = 0.002", "sigma = 0.6");
+    assert!(open[0].to_string().contains("edge `post`: `sigma` leaves its direction open"), "{open:?}");
+    let unused = warned("to = \"B\"", "to = \"B\"\nsigma = 0.5");
+    let expected =
+        "object `plate`: `sigma` of edges between points has no effect in site.toml:26: 1 edge, e.g. `front`";
+    assert!(unused[0].to_string().starts_with(expected), "{unused:?}");
     let parallel = warned("from = [0.0, 0.0, 1.0]", "from = [0.0, 0.5, 0.0]");
     assert!(parallel[0].to_string().contains("all edges are parallel"));
+}
+
+/// A face contains its edge. A normal may be as far from the right angle to it as visibility tolerates, and farther by
+/// four standard deviations of the edge's direction.
+#[test]
+fn a_face_normal_is_at_right_angles_to_its_edge_within_its_tolerance() {
+    let accepts = |cosine: f64, sigma: f64| {
+        let normal = format!("[{}, {cosine}, 0.0]", -(1.0 - cosine * cosine).sqrt());
+        let text = with_edges().replacen("[-1.0, 0.0, 0.0]", &normal, 1).replacen(
+            "sigma = 0.001",
+            &format!("sigma = {sigma}"),
+            1,
+        );
+        parse(&text).is_ok()
+    };
+    for (cosine, sigma, expected) in
+        [(0.099, 0.0, true), (0.101, 0.0, false), (-0.101, 0.0, false), (0.17, 0.02, true), (0.19, 0.02, false)]
+    {
+        assert_eq!(accepts(cosine, sigma), expected, "{cosine}, {sigma} m");
+    }
+}
+
+/// Fails if each object with edges repeats the fault of the file's format.
+#[test]
+fn a_wrong_format_is_one_fault_whatever_the_number_of_objects() {
+    let edge = "[[object.edge]]\nid = \"e\"\nfrom = \"A\"\nto = \"D\"\n";
+    let text = format!("{}{edge}", with_edges().replace("/1.1", "/1"));
+    let faults = parse(&text).unwrap_err();
+    let line = faults[0].to_string();
+    assert!(line.starts_with("object `plate`: edge `front` in a file of another format in site.toml:2: "), "{line}");
+    assert_eq!(faults.len(), 1, "{faults:?}");
 }

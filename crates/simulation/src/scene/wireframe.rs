@@ -61,6 +61,8 @@ pub(crate) fn add_edges(scene: &mut Scene, plan: &SitePlan, sigma: f64, fraction
             });
             let turn = fit.rotation() * before.rotation();
             let faces = edge.faces.iter().map(|face| (turn * face).map(micrometres).normalize()).collect();
+            let has_place = ends.iter().any(|end| matches!(end, End::At(_)));
+            let sigma = if has_place { sigma } else { 0.0 };
             edges.push(ModelEdge { id: format!("edge-{number}"), ends, sigma, faces });
         }
         let chosen = edges.into_iter().enumerate().filter(|(k, _)| listed(*k)).map(|(_, edge)| edge);

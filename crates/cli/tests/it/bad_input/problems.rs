@@ -24,6 +24,12 @@ fn a_bad_problem_among_good_ones() {
         String::from_utf8(output.stdout).unwrap().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(lines[0]["error"].as_str().unwrap().contains("bad.json"));
     assert_eq!(lines[1]["outcome"], "fix", "{}", lines[1]);
+    assert!(output.stderr.is_empty(), "a line of JSON states the error");
+    let output = program().args(["solve", &bad, &good]).output().unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert_eq!((output.status.code(), error.lines().count()), (Some(3), 1), "{error}");
+    assert!(error.starts_with("error: ") && error.contains("bad.json") && !out.contains("bad.json"), "{error}\n{out}");
+    assert!(out.contains("good.json: fix"), "{out}");
 }
 
 const PROBLEM: &str = r#"{"format": "coherence-problem/1", "id": "t",
@@ -58,7 +64,13 @@ fn problems_that_cannot_be() {
         fs::write(&file, PROBLEM.replacen(from, to, 1)).unwrap();
         for (command, start, code) in [("solve", "error: ", 3), ("check", "fault: ", 1)] {
             let output = program().arg(command).arg(&file).output().unwrap();
-            let said = String::from_utf8(output.stdout).unwrap().replace(folder.path().to_str().unwrap(), "");
+            // Errors are on standard error, findings on standard output.
+            let (said, silent) = match command {
+                "solve" => (output.stderr, output.stdout),
+                _ => (output.stdout, output.stderr),
+            };
+            assert!(silent.is_empty(), "{}", String::from_utf8_lossy(&silent));
+            let said = String::from_utf8(said).unwrap().replace(folder.path().to_str().unwrap(), "");
             assert_eq!((output.status.code(), said.lines().count()), (Some(code), 1), "{said}");
             assert!(said.replace("/p.json", "p.json").starts_with(&format!("{start}{expected}")), "{expected}\n{said}");
         }

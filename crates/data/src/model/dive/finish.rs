@@ -8,7 +8,7 @@ use std::{
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use seafix_component::{Fault, nearest};
 use seafix_geometry::{Camera, Object, Point, Transform, World};
-use seafix_referencing::{ModelEdge, ModelPoint, Site, SiteObject};
+use seafix_referencing::{End, ModelEdge, ModelPoint, Site, SiteObject};
 use seafix_vision::LineFrontEnd;
 
 use super::{
@@ -99,7 +99,7 @@ impl Finish<'_> {
         let model_edge = |(k, edge): (usize, &FoundEdge)| ModelEdge {
             id: format!("edge-{}", k + 1),
             ends: edge.ends,
-            sigma: rounded(edge.sigma),
+            sigma: if edge.ends.iter().any(|end| matches!(end, End::At(_))) { rounded(edge.sigma) } else { 0.0 },
             faces: Vec::new(),
         };
         let dive_edge = |(k, edge): (usize, &FoundEdge)| DiveEdge {

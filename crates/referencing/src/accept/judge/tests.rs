@@ -149,11 +149,11 @@ fn a_set_has_as_many_points_as_are_asked_for_and_the_solver_needs() {
     scene.acceptance.min_points = 5;
     let (pairs, mut solver) = (scene.pairs(), Fixed::at(Transform::identity(), 0.0, 0.0));
     assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..5], &[])), Ok(()));
-    let few = Err(RejectionReason::TooFew { found: 4, needed: 5 });
+    let few = Err(RejectionReason::TooFew { found: 4, edges: 0, needed: 5 });
     assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..4], &[])), few);
     solver.minimum = 6;
     assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..6], &[])), Ok(()));
-    let few = Err(RejectionReason::TooFew { found: 5, needed: 6 });
+    let few = Err(RejectionReason::TooFew { found: 5, edges: 0, needed: 6 });
     assert_eq!(scene.judge(&solver, |judge| judge.size(&pairs[..5], &[])), few);
 }
 
@@ -172,7 +172,7 @@ fn three_points_of_much_clutter_are_random() {
     scene.candidates = Candidates::all(6, scene.cloud.len());
     let (kabsch, three) = (Kabsch::default(), scene.pairs()[..3].to_vec());
     match scene.judge(&kabsch, |judge| judge.a_contrario(&three, &[])) {
-        Err(RejectionReason::Absent { p_wrong, max: MaxPWrong::Balanced, identified: 3, model: 6 }) => {
+        Err(RejectionReason::Absent { p_wrong, max: MaxPWrong::Balanced, identified: 3, model: 6, .. }) => {
             assert!(p_wrong > 1e-2, "{p_wrong}")
         }
         other => panic!("{other:?}"),
@@ -187,8 +187,9 @@ fn three_points_of_much_clutter_are_random() {
 #[test]
 fn a_larger_probability_than_the_setting_is_refused() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
-    let present = |scene: &Scene, p: f64| scene.judge(&Kabsch::default(), |judge| judge.present(p, 4));
-    let refused = |p_wrong, max| Err(RejectionReason::Absent { p_wrong, max, identified: 4, model: 6 });
+    let present =
+        |scene: &Scene, p: f64| scene.judge(&Kabsch::default(), |judge| judge.present(p, [&scene.pairs()[..4], &[]]));
+    let refused = |p_wrong, max| Err(RejectionReason::Absent { p_wrong, max, identified: 4, model: 6, edges: [0, 0] });
     assert_eq!((present(&scene, 0.0), present(&scene, 1e-3)), (Ok(()), Ok(())));
     assert_eq!(present(&scene, 1.001e-3), refused(1.001e-3, MaxPWrong::Balanced));
     assert!(present(&scene, f64::NAN).is_err());

@@ -1,6 +1,10 @@
 //! Problems with edges.
 
+use nalgebra::{UnitQuaternion, Vector3};
+use seafix_geometry::Transform;
+
 use super::*;
+use crate::site::edge::End;
 
 /// The twelve edges of a box of 1.2 × 0.8 × 0.5 m, a point list of three corners, and the lines of the edges that a camera
 /// 3 m in front of it measures, with errors of a millimetre or less.
@@ -29,12 +33,7 @@ fn wireframe(format: &str) -> String {
     )
 }
 
-/// A problem without a single measured point has a fix by its edges.
-#[test]
-fn edges_alone_give_a_fix() {
-    let problem = parse(&wireframe(FORMAT_WITH_EDGES)).unwrap();
-    assert_eq!((problem.edges.model.len(), problem.edges.lines.len()), (12, 12));
-    assert!(problem.warnings(Path::new("p.json")).is_empty(), "{:?}", problem.warnings(Path::new("p.json")));
+fn answered(problem: &CoherenceProblem) -> Answer {
     let acceptance = Acceptance::default();
     let solver = SOLVERS.build(&Choice::named("mahalanobis")).unwrap();
     let method = Method {
@@ -43,8 +42,17 @@ fn edges_alone_give_a_fix() {
         acceptance: &acceptance,
         expand_gates: false,
     };
-    let answer = answer(&problem, Path::new("p.json"), &method, &mut ChaCha8Rng::seed_from_u64(0));
+    answer(problem, Path::new("p.json"), &method, &mut ChaCha8Rng::seed_from_u64(0))
+}
+
+/// A problem without a single measured point has a fix by its edges.
+#[test]
+fn edges_alone_give_a_fix() {
+    let problem = parse(&wireframe(FORMAT_WITH_EDGES)).unwrap();
+    assert_eq!((problem.edges.model.len(), problem.edges.lines.len()), (12, 12));
+    let answer = answered(&problem);
     assert_eq!((answer.outcome, &answer.edges), ("fix", &(0..12).map(|i| [i, i]).collect::<Vec<_>>()), "{answer:?}");
+    assert_eq!((answer.consensus_bound, answer.lines_behind.len()), (Some(12), 0), "edges count as points do");
     let pose = answer.t_cam_obj.unwrap();
     let error = [pose[0][3], pose[1][3], pose[2][3] - 3.0].map(f64::abs).into_iter().fold(0.0, f64::max);
     assert!(error < 2e-3, "{error}");
@@ -75,5 +83,69 @@ fn wrong_types_of_edges_and_lines_are_named() {
         assert!(good.contains(from), "{from}");
         let text = parse(&good.replacen(from, to, 1)).unwrap_err().to_string();
         assert!(text.starts_with(fault) && text.lines().count() == 1, "{text}");
+    }
+}
+
+/// The answers to a problem without points speak of its edges, and bound their number.
+#[test]
+fn a_rejection_counts_edges() {
+    let wrong = (0..6).map(|i| (i, 11 - i)).collect();
+    for (pairs, expected) in [
+        (vec![(0, 0)], "too few candidates: 0 model points and 1 edge with a candidate; a pose needs three"),
+        (vec![(0, 0), (1, 1)], "too few identified points and edges: 2 found, 3 required"),
+        (vec![(0, 0), (1, 1), (2, 2)], "; 0 of 3 points and 3 of 12 edges identified"),
+        (
+            wrong,
+            "no pose found: the search met no set of points and edges that one pose explains; at most 6 are possible",
+        ),
+    ] {
+        let mut problem = parse(&wireframe(FORMAT_WITH_EDGES)).unwrap();
+        let bound = pairs.len();
+        problem.edges.putative = Some(pairs);
+        let answer = answered(&problem);
+        let text = answer.explanation.unwrap();
+        assert!(text.ends_with(expected) && answer.consensus_bound == Some(bound), "{text}\n{expected}");
+    }
+}
+
+/// A fix names its lines behind the camera as it does its points.
+#[test]
+fn identified_lines_behind_the_camera_are_named() {
+    let mut problem = parse(&wireframe(FORMAT_WITH_EDGES)).unwrap();
+    problem.edges.lines.iter_mut().flat_map(|line| &mut line.ends).for_each(|end| end.coords.z -= 3.2);
+    problem.prior.as_mut().unwrap().object_from_camera =
+        Transform::new(UnitQuaternion::identity(), Vector3::new(-0.05, 0.0, 0.2));
+    let answer = answered(&problem);
+    assert_eq!((answer.outcome, answer.lines_behind.len()), ("fix", 8), "{answer:?}");
+}
+
+/// Valid but implausible edges and lines are warned of in one line.
+#[test]
+fn implausible_edges_and_lines_are_warned_of() {
+    type Change = fn(&mut CoherenceProblem);
+    let warned = |change: Change| -> Vec<String> {
+        let mut problem = parse(&wireframe(FORMAT_WITH_EDGES)).unwrap();
+        change(&mut problem);
+        let warnings = problem.warnings(Path::new("p.json"));
+        warnings.iter().map(ToString::to_string).filter(|text| !text.starts_with("the cloud has no points")).collect()
+    };
+    assert!(warned(|_| {}).is_empty(), "{:?}", warned(|_| {}));
+    let table: [(Change, &str); 6] = [
+        (|it| it.edges.lines.clear(), "edges without lines in p.json: 12 edges; "),
+        (|it| it.edges.model.clear(), "lines without edges in p.json: 12 lines; "),
+        (
+            |it| it.edges.lines[3].ends[1].coords.z = -1.0,
+            "lines behind the camera (z ≤ 0) in p.json: 1 of 12, e.g. line 3; ",
+        ),
+        (|it| it.edges.lines[3].offsets *= 1e36, "lines with more noise than length in p.json: 1 of 12, e.g. line 3; "),
+        (|it| it.edges.lines.push(it.edges.lines[5]), "repeated lines in p.json: 1 of 13, e.g. line 12; "),
+        (
+            |it| it.edges.model[1].ends[1] = End::At([1200.0, 0.0, 0.0].into()),
+            "implausible units in p.json: the longest edge has ",
+        ),
+    ];
+    for (change, expected) in table {
+        let warnings = warned(change);
+        assert!(warnings.len() == 1 && warnings[0].starts_with(expected), "{expected}\n{warnings:?}");
     }
 }

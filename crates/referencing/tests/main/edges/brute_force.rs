@@ -269,7 +269,7 @@ fn compared(seed: u64, orientation: bool) -> Option<usize> {
             named.push((found.pairs, found.edges));
             assert!(named.iter().all(|set| best.contains(set)), "seed {seed}: {named:?}, brute {best:?}");
         }
-        Err(Rejected::TooFew { .. }) => {
+        Err(Rejected::TooFewFeatures { .. }) => {
             assert!(size < 3 || 2 * scene.model.len() + 3 * scene.edges.len() < 6 || size == 0, "seed {seed}: {size}")
         }
         Err(Rejected::NoConsensus { best, .. }) => assert!(best < 3 && best == size, "seed {seed}: {best}, {size}"),
