@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use faer::{Side, linalg::solvers::DenseSolveCore};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, MatrixXx4, RowVector3, Vector3, Vector4};
 use seafix_geometry::so3::skew;
 
@@ -22,8 +23,12 @@ pub(super) struct Redrawn<'a> {
     joined: &'a Joined<'a>,
     mode: &'a Mode,
     wireframe: &'a Wireframe,
-    /// The vertices of its parts, ascending; parts of which the camera sees no edge are left out.
+    /// The vertices of the parts of which the mode has a feature, ascending.
     pub(super) vertices: Vec<usize>,
+    /// The vertices of the other parts, one part after the other.
+    others: Vec<Vec<usize>>,
+    /// The index of the first coordinate of each vertex of the wireframe.
+    first: Vec<usize>,
     /// The edges beyond those of the mode that the camera may see.
     further: Vec<usize>,
     /// The place about which the pose turns.
@@ -38,10 +43,24 @@ impl<'a> Redrawn<'a> {
         let free = |i: &usize| !known.contains(i) && terms.edges[*i].shows_itself(terms.points, &camera);
         let further: Vec<usize> = (0..terms.edges.len()).filter(free).collect();
         let about = mode.motion.apply(&joined.climb.prior_terms.centroid);
-        let ends = known.iter().chain(&further).flat_map(|&edge| wireframe.edges[edge]);
-        let mut structure = Self { joined, mode, wireframe, vertices: ends.collect(), further, about };
-        let corners: Vec<usize> = structure.corners().map(|(_, vertex)| vertex).collect();
-        structure.vertices = wireframe.connected(&[structure.vertices, corners].concat());
+        let seen: Vec<usize> = known.iter().flat_map(|&edge| wireframe.edges[edge]).collect();
+        let mut structure =
+            Self { joined, mode, wireframe, vertices: seen, others: Vec::new(), first: Vec::new(), further, about };
+        structure.vertices.extend(structure.corners().map(|(_, vertex)| vertex).collect::<Vec<_>>());
+        structure.vertices = wireframe.connected(&structure.vertices);
+        let mut placed: BTreeSet<usize> = structure.vertices.iter().copied().collect();
+        for &edge in &structure.further {
+            let from = wireframe.edges[edge][0];
+            if !placed.contains(&from) {
+                let part = wireframe.connected(&[from]);
+                placed.extend(&part);
+                structure.others.push(part);
+            }
+        }
+        structure.first = vec![usize::MAX; wireframe.count()];
+        for (k, vertex) in structure.vertices.iter().chain(structure.others.iter().flatten()).enumerate() {
+            structure.first[*vertex] = 6 + 3 * k;
+        }
         structure
     }
 
@@ -49,11 +68,6 @@ impl<'a> Redrawn<'a> {
     pub(super) fn corners(&self) -> impl Iterator<Item = (usize, usize)> {
         let graph = self.joined.climb.graph;
         self.mode.members.iter().filter_map(|&v| Some((v, self.wireframe.points[graph.vertices[v].model]?)))
-    }
-
-    /// The index of the first coordinate of a vertex.
-    fn first(&self, vertex: usize) -> usize {
-        6 + 3 * self.vertices.binary_search(&vertex).unwrap_or(0)
     }
 
     pub(super) fn rows_of_edge(&self, edge: usize, placed: &Placed) -> Rows {
@@ -80,7 +94,7 @@ impl<'a> Redrawn<'a> {
     /// A gradient by the pose, and by the places of vertices.
     fn gradient(&self, turn: &[f64], moves: &[(usize, f64)], by_place: &RowVector3<f64>) -> Vec<(usize, f64)> {
         let of = |&(vertex, weight): &(usize, f64)| {
-            let first = self.first(vertex);
+            let first = self.first[vertex];
             (0..3).map(move |axis| (first + axis, weight * by_place[axis]))
         };
         turn.iter().copied().enumerate().chain(moves.iter().flat_map(of)).collect()
@@ -91,8 +105,9 @@ impl<'a> Redrawn<'a> {
     /// `step` is the displacement of pose and vertices, and `covariance` its covariance. The line with the greatest
     /// predictive likelihood ratio is added first, and determines the structure further (a Kalman update). Lines beyond
     /// the gates of the object's edges count too: the gates do not hold for a structure of other dimensions.
-    pub(super) fn ln_evidence_of_further_lines(&self, mut step: DVector<f64>, mut covariance: DMatrix<f64>) -> f64 {
+    pub(super) fn ln_evidence_of_further_lines(&self, step: DVector<f64>, covariance: DMatrix<f64>) -> f64 {
         let terms = self.joined.edges;
+        let (mut step, mut covariance) = self.with_other_parts(step, covariance);
         let used: BTreeSet<usize> = self.mode.edges.iter().map(|&v| terms.vertices[v].pair.cloud).collect();
         let lines: Vec<usize> = (0..terms.lines.len()).filter(|line| !used.contains(line)).collect();
         let pairs = self.further.iter().flat_map(|&edge| lines.iter().map(move |&line| (edge, line)));
@@ -123,6 +138,23 @@ impl<'a> Redrawn<'a> {
         }
     }
 
+    /// Displacements and covariance with those of the parts of which the mode has no feature: nothing is known of them.
+    fn with_other_parts(&self, step: DVector<f64>, covariance: DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let known = step.len();
+        let size = known + 3 * self.others.iter().map(Vec::len).sum::<usize>();
+        let mut all = covariance.resize(size, size, 0.0);
+        for part in &self.others {
+            let first = self.first[part[0]];
+            let shape = self.wireframe.information(part);
+            if let Ok(factor) = shape.llt(Side::Lower) {
+                let inverse = factor.inverse();
+                let mut own = all.view_mut((first, first), (3 * part.len(), 3 * part.len()));
+                own.copy_from(&DMatrix::from_fn(3 * part.len(), 3 * part.len(), |row, column| inverse[(row, column)]));
+            }
+        }
+        (step.resize_vertically(size, 0.0), all)
+    }
+
     /// A line about the place of an edge in the structure; `None` without overlap, and beyond the gate.
     fn predicted(
         &self,
@@ -134,7 +166,7 @@ impl<'a> Redrawn<'a> {
         let terms = self.joined.edges;
         let (ends, vertices) = (terms.ends(edge), self.wireframe.edges[edge]);
         let displaced = [0, 1].map(|end| {
-            let first = self.first(vertices[end]);
+            let first = self.first[vertices[end]];
             let own = Vector3::from_fn(|axis, _| step[first + axis]);
             let place = self.mode.motion.apply(&(ends[end] + own));
             let [turn, shift] = [0, 3].map(|k| Vector3::new(step[k], step[k + 1], step[k + 2]));

@@ -124,6 +124,11 @@ impl Wireframe {
         }
     }
 
+    /// The number of vertices.
+    pub(super) fn count(&self) -> usize {
+        self.parts.len()
+    }
+
     /// The vertices of the parts of some vertices, ascending.
     pub(super) fn connected(&self, some: &[usize]) -> Vec<usize> {
         let seen = |v: &usize| some.iter().any(|other| self.parts[*other] == self.parts[*v]);
