@@ -92,7 +92,7 @@ pub(crate) fn frame(
     if attempts.is_empty() {
         let why = match navigation_state {
             Some(navigation_state) if !navigation_state.due => NotAttempted::NotDue,
-            _ if frame_result.cloud.is_empty() => NotAttempted::NoData,
+            _ if frame_result.cloud.is_empty() && frame_result.lines.is_empty() => NotAttempted::NoData,
             _ => NotAttempted::NothingInView,
         };
         let without = TargetRecord::not_attempted(search, solver, why.reason());

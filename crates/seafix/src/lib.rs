@@ -71,7 +71,9 @@ pub use keyframe_mapper::{KeyframeMapper, Keyframes};
 pub use localizer::{Localizer, TargetOutcome};
 pub use navigation_stack::{Navigation, NavigationStack};
 pub use odometry_session::{FrameOdometry, OdometryResult, stereo_pair};
-pub use pipeline::{Pipeline, PipelineError, UseOfEdges, build, faults, invalid_setting, resolve};
+pub use pipeline::{
+    Attempts, Pipeline, PipelineError, UseOfEdges, UseOfPoints, build, faults, invalid_setting, resolve,
+};
 pub use places::places;
 pub use seafix_io::Rig;
 pub use seafix_referencing::{Outcome, Site};

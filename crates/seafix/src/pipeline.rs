@@ -36,8 +36,13 @@ pub struct Pipeline {
     /// The triangulator of matched pairs. A table without `name` has the settings of `optimal`.
     #[serde(deserialize_with = "read_triangulator")]
     pub triangulator: Choice,
+    /// Whether points of the model are identified. Without them objects are attempted by their edges alone, and objects
+    /// without edges are not attempted.
+    pub points: UseOfPoints,
     /// Whether straight edges of the model are identified beside its points; a site without edges has none.
     pub edges: UseOfEdges,
+    /// The features that decide whether an object is attempted.
+    pub attempts: Attempts,
     /// The detector of straight segments.
     pub segment_detector: Choice,
     /// The fit of a segment over its length.
@@ -76,7 +81,9 @@ impl Default for Pipeline {
             matcher: Choice::named("epipolar-band"),
             refinement: Choice::named("direct"),
             triangulator: Choice::named("optimal"),
+            points: UseOfPoints::On,
             edges: UseOfEdges::On,
+            attempts: Attempts::Identified,
             segment_detector: Choice::named("a-contrario"),
             segment_fit: SegmentFit::default(),
             segment_matcher: Choice::named("overlap-profile"),
@@ -92,6 +99,17 @@ impl Default for Pipeline {
     }
 }
 
+/// The use of points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
+#[serde(rename_all = "kebab-case")]
+pub enum UseOfPoints {
+    /// Points are measured and identified.
+    #[default]
+    On,
+    /// Edges alone.
+    Off,
+}
+
 /// The use of straight edges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
 #[serde(rename_all = "kebab-case")]
@@ -101,6 +119,17 @@ pub enum UseOfEdges {
     On,
     /// Points alone.
     Off,
+}
+
+/// The features of which three must be in view by the prior; without a prior every object is attempted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
+#[serde(rename_all = "kebab-case")]
+pub enum Attempts {
+    /// The features that the pipeline identifies; edges count if the frame has measured lines, or without points.
+    #[default]
+    Identified,
+    /// All points and edges of the model: pipelines that identify different features make the same attempts.
+    Model,
 }
 
 /// An invalid setting of the pipeline or of navigation.
@@ -173,7 +202,27 @@ impl Pipeline {
         let acceptance = each_invalid(&self.acceptance, Acceptance::check);
         all.extend(acceptance.into_iter().map(|message| invalid_setting("acceptance", message)));
         all.extend(self.window_fits().err());
+        all.extend(self.has_features().err());
         all
+    }
+
+    /// Checks that a pipeline without points identifies edges.
+    fn has_features(&self) -> Result<(), PipelineError> {
+        let fault = |cause: &str| Err(invalid_setting("points", format!("points = off; {cause}")));
+        if self.points == UseOfPoints::On {
+            return Ok(());
+        }
+        if self.edges == UseOfEdges::Off {
+            return fault("`edges` is off too; switch one of them on");
+        }
+        // An unknown component is a fault of its own.
+        if build(&SEARCHES, &self.search).is_ok_and(|search| !search.takes_edges()) {
+            return fault(&format!("the search `{}` takes no edges; choose rigid-consensus", self.search.name));
+        }
+        if build(&SOLVERS, &self.solver).is_ok_and(|solver| !solver.takes_edges()) {
+            return fault(&format!("the solver `{}` takes no edges; choose stereo-reprojection", self.solver.name));
+        }
+        Ok(())
     }
 
     fn window_fits(&self) -> Result<(), PipelineError> {
@@ -238,6 +287,7 @@ impl Pipeline {
         self.tolerance.check().map_err(|message| invalid_setting("tolerance", message))?;
         self.acceptance.check().map_err(|message| invalid_setting("acceptance", message))?;
         self.window_fits()?;
+        self.has_features()?;
         let (search, solver) = (build(&SEARCHES, &self.search)?, build(&SOLVERS, &self.solver)?);
         Ok(PipelineStages::new(self.front_end()?, self.line_front_end()?, search, solver, self.clone()))
     }

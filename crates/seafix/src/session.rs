@@ -252,7 +252,7 @@ impl<'a> NavigationSession<'a> {
         let prior_pose = sensor_frame.target_priors(self.targets);
         let priors = self.priors(&prior_pose);
         let in_view =
-            || self.targets.iter().zip(&priors).any(|(target, prior)| PipelineStages::shows(target, prior, self.rig));
+            || self.targets.iter().zip(&priors).any(|(target, prior)| self.stages.shows(target, prior, self.rig));
         let due = match accepted {
             true => self.navigator.due(in_view()),
             false => {

@@ -14,7 +14,7 @@ use seafix_vision::{FrontEnd, FrontEndOutput, Keypoint, LineFrontEnd, LineOutput
 
 use crate::{
     in_view::{edges_in_view, in_view, regions, visible},
-    pipeline::{Pipeline, UseOfEdges},
+    pipeline::{Attempts, Pipeline, UseOfEdges, UseOfPoints},
     sensor_frame::{FrameData, Hints, SensorFrame},
     times::{FrameTimes, TargetTimes, milliseconds, timed},
 };
@@ -215,9 +215,38 @@ impl PipelineStages {
         Ok(fix.pairs.iter().map(|pair| pair.model).zip(sensitivities).collect())
     }
 
-    /// Whether enough points of `target` may be in view for a fix; true without a prior.
-    pub fn shows(target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
-        in_view(&target.points, prior.as_ref(), rig).is_some()
+    /// Whether enough of `target` may be in view for a fix; true without a prior.
+    pub fn shows(&self, target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
+        self.features(target, prior.as_ref(), rig, false).is_some()
+    }
+
+    /// The points and the edges of a target that may be in view; `None` if they are too few for an attempt.
+    ///
+    /// `has_lines` states whether lines were measured. Edges that do not count are omitted.
+    fn features(
+        &self,
+        target: &Target,
+        prior: Option<&Prior>,
+        rig: &StereoRig,
+        has_lines: bool,
+    ) -> Option<[Vec<bool>; 2]> {
+        let Pipeline { points: uses_points, attempts, .. } = self.settings;
+        let points = &target.points;
+        let by_model = attempts == Attempts::Model;
+        let counts_edges = has_lines || by_model || uses_points == UseOfPoints::Off;
+        let edges = if counts_edges { edges_in_view(target, prior, rig) } else { Vec::new() };
+        let shown = count(&edges);
+        let counts_points = by_model || uses_points == UseOfPoints::On;
+        let mask = match in_view(points, prior, rig) {
+            Some(mask) if counts_points => mask,
+            _ => {
+                let mask = prior.map_or_else(|| vec![true; points.len()], |prior| visible(points, prior, rig));
+                let seen = if counts_points { count(&mask) } else { 0 };
+                // Three edges can show that two of them are right.
+                (shown >= 3 || (seen > 0 && shown >= 2)).then_some(mask)?
+            }
+        };
+        Some([mask, edges])
     }
 
     /// Whether the cloud depends on where the targets are expected.
@@ -242,20 +271,26 @@ impl PipelineStages {
     ///
     /// The `regions` are those where the targets are expected ([`PipelineStages::regions`]).
     ///
-    /// Straight edges are measured if a target has some, or if corners are made of them (`edge-corners`).
+    /// Straight edges are measured if a target has some, or if corners are made of them (`edge-corners`). A pipeline
+    /// without points has no points in its cloud.
     pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig, targets: &[Target], regions: &[Regions; 2]) -> Cloud {
+        let uses_points = self.settings.points == UseOfPoints::On;
+        let given = |cloud: &[MeasuredPoint], lines: &[MeasuredLine]| {
+            let lines = if self.settings.edges == UseOfEdges::On { lines } else { &[] };
+            Cloud::given(if uses_points { cloud } else { &[] }, lines)
+        };
         let (left, right) = match frame_data {
-            FrameData::Points(cloud) => return Cloud::given(cloud, &[]),
-            FrameData::Features(cloud, lines) => {
-                let lines = if self.settings.edges == UseOfEdges::On { &lines[..] } else { &[] };
-                return Cloud::given(cloud, lines);
-            }
+            FrameData::Points(cloud) => return given(cloud, &[]),
+            FrameData::Features(cloud, lines) => return given(cloud, lines),
             FrameData::Stereo(left, right) => (left, right),
         };
         let start = Instant::now();
         // Frames are processed in parallel. A single thread within a frame keeps the durations comparable.
         let mut output = FrontEndOutput::default();
-        self.front_end.run_guided([left, right], rig, regions, &mut output);
+        match uses_points {
+            true => self.front_end.run_guided([left, right], rig, regions, &mut output),
+            false => self.front_end.filter_pair([left, right], &mut output),
+        }
         let times = FrameTimes {
             detect_ms: Some(output.times.filter_ms + output.times.detect_ms),
             locate_ms: Some(output.times.locate_ms),
@@ -269,11 +304,11 @@ impl PipelineStages {
         let identified = self.settings.edges == UseOfEdges::On && targets.iter().any(|target| !target.edges.is_empty());
         let corners = &self.settings.edge_corners;
         let mut measured = LineOutput::default();
-        if identified || corners.enabled {
+        if identified || (corners.enabled && uses_points) {
             self.line_front_end.run([l.unwrap_or(left), r.unwrap_or(right)], rig, &mut measured);
         }
         // An edge serves as itself or by its corners: as both, its errors would count twice.
-        if !identified {
+        if !identified && uses_points {
             let triangulator = &*self.front_end.triangulator;
             corners.add_to(&mut output.cloud, measured.segments(), &measured.matches, rig, triangulator);
             measured.lines.clear();
@@ -313,17 +348,15 @@ impl PipelineStages {
         let Cloud { points: cloud, lines, .. } = view.cloud;
         let (points, started) = (&target.points, Instant::now());
         let uses_lines = !lines.is_empty() && !target.edges.is_empty();
-        let of_edges = if uses_lines { edges_in_view(target, prior, view.rig) } else { Vec::new() };
-        let shown = of_edges.iter().filter(|shown| **shown).count();
-        let of_points = match in_view(points, prior, view.rig) {
-            Some(mask) => mask,
-            None if forced => vec![true; points.len()],
-            None => {
-                let mask = prior.map(|prior| visible(points, prior, view.rig))?;
-                let seen = mask.iter().filter(|seen| **seen).count();
-                // Three edges can show that two of them are right.
-                (shown >= 3 || (seen > 0 && shown >= 2)).then_some(mask)?
-            }
+        let all = || [vec![true; points.len()], edges_in_view(target, prior, view.rig)];
+        let [of_points, of_edges] = match forced && in_view(points, prior, view.rig).is_none() {
+            true => all(),
+            false => self.features(target, prior, view.rig, uses_lines).or_else(|| forced.then(all))?,
+        };
+        // Points that the pipeline does not identify have no candidates.
+        let of_points = match self.settings.points {
+            UseOfPoints::On => of_points,
+            UseOfPoints::Off => vec![false; points.len()],
         };
         let candidates = candidates(points, cloud, prior, gate, Some(&of_points));
         let edges = match uses_lines {
@@ -345,16 +378,20 @@ impl PipelineStages {
 
     /// Stages 1 and 2 of a problem with candidates, tolerance and prior pose of its own.
     fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> SearchResult {
-        let (listed, stage1) = timed(|| problem.candidates());
+        let none = || Candidates::from_pairs(target.points.len(), []);
+        let (listed, stage1) = timed(|| match self.settings.points {
+            UseOfPoints::On => problem.candidates(),
+            UseOfPoints::Off => Ok(none()),
+        });
         let (candidates, refused) = match listed {
             Ok(candidates) => (candidates, None),
-            Err(refused) => (Candidates::from_pairs(target.points.len(), []), Some(refused)),
+            Err(refused) => (none(), Some(refused)),
         };
         let edges = match self.settings.edges {
             UseOfEdges::On => problem.edges.candidates(&target.points, problem.prior.as_ref()),
             UseOfEdges::Off => Vec::new(),
         };
-        let posed = posed(target, problem, &candidates, &edges);
+        let posed = self.posed(target, problem, &candidates, &edges);
         let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
         SearchResult { candidates, edges, found, spent: [stage1, stage2] }
     }
@@ -420,7 +457,7 @@ impl PipelineStages {
         TargetAttempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
     }
 
-    /// The answer for labelled points; `None` for a target without any.
+    /// The answer for labelled points; `None` for a target without any, and for a pipeline without points.
     fn labelled(
         &self,
         view: View<'_>,
@@ -431,7 +468,7 @@ impl PipelineStages {
         let started = Instant::now();
         let target = &view.targets[index];
         let (pairs, stage1) = timed(|| labelled(names, index, target));
-        if pairs.is_empty() {
+        if pairs.is_empty() || self.settings.points == UseOfPoints::Off {
             return None;
         }
         let places = pairs.iter().map(|pair| (pair.model, pair.cloud));
@@ -453,11 +490,32 @@ impl PipelineStages {
     /// The answer to a problem with candidates, tolerance and prior pose of its own.
     fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: SearchResult) -> TargetAttempt {
         let SearchResult { candidates, edges, found, spent: [stage1, stage2] } = sought;
-        let posed = posed(target, problem, &candidates, &edges);
+        let posed = self.posed(target, problem, &candidates, &edges);
         let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
         let times = [stage1, stage2, solution];
         TargetAttempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
     }
+
+    /// The input of the search for a problem with tolerance and prior pose of its own.
+    fn posed<'a>(
+        &self,
+        target: &'a Target,
+        problem: &'a CoherenceProblem,
+        candidates: &'a Candidates,
+        edges: &'a [Vec<usize>],
+    ) -> Problem<'a> {
+        let cloud: &[MeasuredPoint] = match self.settings.points {
+            UseOfPoints::On => &problem.cloud,
+            UseOfPoints::Off => &[],
+        };
+        let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
+        let edges = edges_of(target, &problem.edges.lines, edges);
+        Problem { model: &target.points, cloud, candidates, tolerance, prior, edges }
+    }
+}
+
+fn count(mask: &[bool]) -> usize {
+    mask.iter().filter(|shown| **shown).count()
 }
 
 /// The edges of a problem; none without candidates.
@@ -466,18 +524,6 @@ fn edges_of<'a>(target: &'a Target, lines: &'a [MeasuredLine], candidates: &'a [
         true => Edges::default(),
         false => Edges { model: &target.edges, lines, candidates },
     }
-}
-
-/// The input of the search for a problem with tolerance and prior pose of its own.
-fn posed<'a>(
-    target: &'a Target,
-    problem: &'a CoherenceProblem,
-    candidates: &'a Candidates,
-    edges: &'a [Vec<usize>],
-) -> Problem<'a> {
-    let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
-    let edges = edges_of(target, &problem.edges.lines, edges);
-    Problem { model: &target.points, cloud: &problem.cloud, candidates, tolerance, prior, edges }
 }
 
 /// The pairs that the labels of the cloud points state, in the order of the model. A target of one object takes the

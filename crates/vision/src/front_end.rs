@@ -131,6 +131,20 @@ impl FrontEnd {
         self.run_guided([left, right], rig, &[Regions::NONE; 2], output);
     }
 
+    /// Applies the filters alone; the rest of `output` does not change.
+    pub fn filter_pair(&self, [left, right]: [&Image; 2], output: &mut FrontEndOutput) {
+        let FrontEndOutput { sides: [l, r], filtered: [clear_left, clear_right], work, times, .. } = output;
+        let threads = work.threads();
+        times.filter_ms = timed(|| {
+            if !self.filters.is_empty() {
+                threads.join(
+                    || self.filter(left, clear_left, &mut l.work),
+                    || self.filter(right, clear_right, &mut r.work),
+                );
+            }
+        });
+    }
+
     /// Replaces the contents of `output` by the results for the left and the right image of a pair.
     ///
     /// A guided detector selects more key points in the `regions` of the images.
@@ -141,18 +155,12 @@ impl FrontEnd {
         [left_regions, right_regions]: &[Regions; 2],
         output: &mut FrontEndOutput,
     ) {
+        self.filter_pair([left, right], output);
         let FrontEndOutput { sides: [l, r], filtered, work, matches, pairs, pixels, cloud, times } = output;
-        let [clear_left, clear_right] = filtered;
         let threads = work.threads();
-        let (mut left, mut right) = (left, right);
-        times.filter_ms = timed(|| {
-            if !self.filters.is_empty() {
-                (left, right) = threads.join(
-                    || self.filter(left, clear_left, &mut l.work),
-                    || self.filter(right, clear_right, &mut r.work),
-                );
-            }
-        });
+        let [clear_left, clear_right] =
+            filtered.each_ref().map(|image| image.as_ref().filter(|_| !self.filters.is_empty()));
+        let (left, right) = (clear_left.unwrap_or(left), clear_right.unwrap_or(right));
         times.detect_ms = timed(|| {
             let detect = |image, regions, side: &mut SideOutput| {
                 self.detector.detect_guided_into(image, regions, &mut side.work, &mut side.keypoints);
@@ -218,7 +226,7 @@ impl FrontEnd {
     }
 
     /// The filtered `image`, written into the memory of `kept`.
-    fn filter<'a>(&self, image: &Image, kept: &'a mut Option<Image>, work: &mut Workspace) -> &'a Image {
+    fn filter(&self, image: &Image, kept: &mut Option<Image>, work: &mut Workspace) {
         let kept = match kept {
             Some(kept) => {
                 kept.copy_from(image);
@@ -227,7 +235,6 @@ impl FrontEnd {
             None => kept.insert(image.clone()),
         };
         self.filters.iter().for_each(|filter| filter.apply(kept, work));
-        kept
     }
 }
 

@@ -59,9 +59,9 @@ fn same_front_end(a: &Trial, b: &Trial) -> bool {
     let alone = |trial: &Trial| trial.navigation_stack.is_none();
     let same_priors = !a.stages.is_guided() || alone(a) && alone(b) && target(a) == target(b);
     let stages = |trial: &Trial| {
-        let Pipeline { filters, detector, locator, descriptor, matcher, refinement, triangulator, .. } =
+        let Pipeline { filters, points, detector, locator, descriptor, matcher, refinement, triangulator, .. } =
             trial.resolved.pipeline.clone();
-        (filters, detector, locator, descriptor, matcher, refinement, triangulator)
+        (filters, points, detector, locator, descriptor, matcher, refinement, triangulator)
     };
     let lines = |trial: &Trial| {
         let Pipeline { edges, segment_detector, segment_fit, segment_matcher, lines, .. } =
@@ -75,8 +75,8 @@ fn same_front_end(a: &Trial, b: &Trial) -> bool {
 /// random numbers of one target depend on the solver's result for the previous one.
 fn same_search(a: &Trial, b: &Trial) -> bool {
     let searched = |trial: &Trial| {
-        let Pipeline { target, gate, tolerance, search, .. } = trial.resolved.pipeline.clone();
-        (target, gate, tolerance, search)
+        let Pipeline { target, attempts, gate, tolerance, search, .. } = trial.resolved.pipeline.clone();
+        (target, attempts, gate, tolerance, search)
     };
     let alone = |trial: &Trial| trial.navigation_stack.is_none() && !trial.resolved.pipeline.expand_gates;
     alone(a) && alone(b) && same_front_end(a, b) && searched(a) == searched(b)

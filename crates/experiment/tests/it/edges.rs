@@ -6,15 +6,22 @@ use seafix_experiment::{Options, Plan, Replay, Silent, run};
 use seafix_log::{Outcome, TargetRecord, TargetTimes, read};
 use tempfile::TempDir;
 
-/// The rows of a short dive with these settings, without what only edges have.
+/// A short dive.
+const EXPERIMENT: &str = "question = 'The same?'\nseed = 5\n[source]\nname = 'dive'\nframes = 2\nroute.altitude = 2.5\n\
+    rig.size = [512, 384]\nrig.focal = 250.0\n";
+
+/// The short dive with these settings.
+fn plan_of(folder: &Path, settings: &[&str]) -> Plan {
+    let file = folder.join("e.toml");
+    fs::write(&file, EXPERIMENT).unwrap();
+    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
+    Plan::read(&file, &settings).unwrap()
+}
+
+/// The rows of the short dive with these settings, without what only edges have.
 fn rows(settings: &[&str]) -> Vec<TargetRecord> {
     let folder = TempDir::new().unwrap();
-    let file = folder.path().join("e.toml");
-    let source =
-        "[source]\nname = 'dive'\nframes = 2\nroute.altitude = 2.5\nrig.size = [512, 384]\nrig.focal = 250.0\n";
-    fs::write(&file, format!("question = 'The same?'\nseed = 5\n{source}")).unwrap();
-    let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    let plan = Plan::read(&file, &settings).unwrap();
+    let plan = plan_of(folder.path(), settings);
     let out = folder.path().join("run");
     run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
     let frames = read(&out.join(format!("{}.mcap", plan.trials[0].name))).unwrap().frames;
@@ -87,4 +94,82 @@ fn edges_of_a_problem_are_used_and_replayed() {
     assert_eq!(row(&Replay::default().plan(&log).unwrap(), &here.join("again")), found);
     let off = Plan::read(&file, &["pipeline.edges=off".to_owned()]).unwrap();
     assert_eq!(row(&off, &here.join("off")).outcome, Outcome::Rejected);
+}
+
+/// A pipeline without points measures the same edges, identifies no point, and repeats its rows from the log.
+///
+/// Seen to fail with the points of the cloud kept.
+#[test]
+fn points_that_are_off_leave_the_edges() {
+    let folder = TempDir::new().unwrap();
+    let of = |name: &str, settings: &[&str]| {
+        let out = folder.path().join(name);
+        let plan = plan_of(folder.path(), settings);
+        run(&plan, &Options { threads: 2, ..Options::into(&out) }, &Silent).unwrap();
+        out.join(format!("{}.mcap", plan.trials[0].name))
+    };
+    let (alone, both) = (of("alone", &["pipeline.points=off"]), of("both", &[]));
+    let again = folder.path().join("again");
+    run(&Replay::default().plan(&alone).unwrap(), &Options { threads: 2, ..Options::into(&again) }, &Silent).unwrap();
+    let again = read(&again.join(alone.file_name().unwrap())).unwrap().frames;
+    let (alone, both) = (read(&alone).unwrap().frames, read(&both).unwrap().frames);
+    let mut fixes = 0;
+    for ((alone, both), again) in alone.iter().zip(&both).zip(&again) {
+        assert!(alone.cloud.is_empty() && !both.cloud.is_empty());
+        assert_eq!(alone.lines, both.lines);
+        for (row, again) in alone.targets.iter().zip(&again.targets) {
+            assert!(row.pairs.is_empty() && row.candidates.iter().all(Vec::is_empty));
+            assert_eq!((row.outcome, &row.edges), (again.outcome, &again.edges));
+            fixes += usize::from(row.outcome == Outcome::Fix && row.edges.len() > 2);
+        }
+    }
+    assert!(fixes > 0);
+}
+
+/// Attempts by edges alone depend on the prior, not on the images: water without sight has as many as clear water.
+///
+/// Seen to fail where an attempt needs a measured line.
+#[test]
+fn attempts_by_edges_alone_do_not_depend_on_the_water() {
+    let names = |settings: &[&str]| -> Vec<String> {
+        let rows = rows(&[settings, &["pipeline.points=off"]].concat());
+        rows.into_iter().map(|row| row.object).filter(|object| !object.is_empty()).collect()
+    };
+    let clear = names(&[]);
+    assert!(!clear.is_empty());
+    assert_eq!(names(&["source.water.attenuation=4.0"]), clear);
+}
+
+/// Attempts that the model decides are the same for points, edges and both, in clear water and in water without sight.
+///
+/// Seen to fail with the rule of the identified features.
+#[test]
+fn attempts_by_the_model_are_the_same_for_all_features() {
+    let names = |settings: &[&str]| -> Vec<String> {
+        let rows = rows(&[settings, &["pipeline.attempts=model"]].concat());
+        rows.into_iter().map(|row| row.object).filter(|object| !object.is_empty()).collect()
+    };
+    let both = names(&[]);
+    assert!(!both.is_empty());
+    let features = ["pipeline.points=off", "pipeline.edges=off", "pipeline.points=on"];
+    for settings in features.iter().flat_map(|one| [vec![*one], vec![*one, "source.water.attenuation=4.0"]]) {
+        assert_eq!(names(&settings), both, "{settings:?}");
+    }
+}
+
+/// A pipeline that could identify nothing is refused.
+///
+/// Seen to fail without each of the checks.
+#[test]
+fn points_are_not_switched_off_without_edges() {
+    let folder = TempDir::new().unwrap();
+    let refused = |setting: &str| {
+        let settings = ["pipeline.points=off".to_owned(), setting.to_owned()];
+        fs::write(folder.path().join("e.toml"), EXPERIMENT).unwrap();
+        let faults = Plan::read(&folder.path().join("e.toml"), &settings).unwrap_err();
+        faults.iter().map(|fault| fault.to_string() + "\n").collect::<String>()
+    };
+    assert!(refused("pipeline.edges=off").contains("switch one of them on"), "{}", refused("pipeline.edges=off"));
+    assert!(refused("pipeline.solver=kabsch").contains("the solver `kabsch` takes no edges"));
+    assert!(refused("pipeline.search=icp").contains("the search `icp` takes no edges"));
 }

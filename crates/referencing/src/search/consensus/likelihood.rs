@@ -70,8 +70,13 @@ pub(in crate::search) struct Terms {
 
 impl Terms {
     pub(in crate::search) fn of(problem: &Problem<'_>, prior_terms: &PriorTerms, graph: &ConsistencyGraph) -> Self {
-        // A model point for which a matcher proposed no partner could not be identified if it were visible.
-        let n = if problem.prior.is_some() { problem.candidates.lists.len() } else { graph.starts.len() - 1 };
+        // A model point for which a matcher proposed no partner could not be identified if it were visible, nor any without
+        // measured points.
+        let n = match problem.prior {
+            Some(_) if problem.cloud.is_empty() => 0,
+            Some(_) => problem.candidates.lists.len(),
+            None => graph.starts.len() - 1,
+        };
         let ln_density = densities(problem, prior_terms);
         let count = graph.vertices.len();
         let of_parts = |parts: &Parts| graph.vertices.iter().map(|pair| parts.ln_excess(pair.cloud)).collect();

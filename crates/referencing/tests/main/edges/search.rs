@@ -255,3 +255,29 @@ fn print_the_table_of_edges() {
         }
     }
 }
+
+/// Points of the model count neither for nor against a pose by edges if no point was measured.
+///
+/// Seen to fail where none of n points stands for one of n + 1 equally probable numbers.
+#[test]
+fn points_that_could_not_be_measured_say_nothing() {
+    let few = model();
+    let mut many = model();
+    // More points at the places of others, so that the extent of the model stays the same.
+    many.points.extend((0..8).flat_map(|_| model().points));
+    for seed in 0..4 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let truth = pose(3.5, seed as f64);
+        let prior = random_prior(&truth, (0.0087, 0.1), &mut rng);
+        let into = truth.inverse();
+        let mut seen = |ends: [Point<Object>; 2]| line(&rig(), ends.map(|end| into * end), SIGMA, &mut rng);
+        let lines: Vec<MeasuredLine> =
+            few.edges.iter().step_by(5).map(|edge| seen(edge.places(&few.points).map(|end| end))).collect();
+        let p_absent = |model: &Model| {
+            let mut rng = ChaCha8Rng::seed_from_u64(1);
+            model.attempt((&[], &lines), &prior, &mut rng).p_absent.unwrap()
+        };
+        let (one, other) = (p_absent(&few), p_absent(&many));
+        assert!(one > 0.0 && (other / one).ln().abs() < 0.2, "seed {seed}: {one:e} and {other:e}");
+    }
+}
