@@ -56,6 +56,7 @@
 mod a_contrario;
 mod accept;
 mod alternative;
+mod anchors;
 mod candidates;
 mod chi_square;
 mod edge_candidates;

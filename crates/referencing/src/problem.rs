@@ -1,11 +1,14 @@
 //! The input of a search.
 
+use std::borrow::Cow;
+
 use nalgebra::Vector3;
 use seafix_component::{Settings, in_range};
 use seafix_geometry::{Camera, Covariance6, MeasuredLine, MeasuredPoint, Object, Transform};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    anchors::anchors,
     candidates::Candidates,
     site::{edge::ModelEdge, model::ModelPoint},
 };
@@ -106,6 +109,11 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
+    /// The places that stand for the object where two of its poses are compared: see [`anchors`].
+    pub(crate) fn anchors(&self) -> Cow<'_, [ModelPoint]> {
+        anchors(self.model, self.edges.model)
+    }
+
     /// The tolerance (m) of the distances of two pairs in model and cloud.
     pub fn delta(&self, a: Correspondence, b: Correspondence) -> f64 {
         match self.tolerance {

@@ -1,6 +1,6 @@
 //! The tests of a set of pairs and of its alternatives.
 
-use std::collections::BTreeSet;
+use std::{borrow::Cow, collections::BTreeSet};
 
 use nalgebra::Matrix6;
 use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
@@ -21,6 +21,7 @@ use crate::{
     observations::Observations,
     problem::{Correspondence, Prior, PriorBound, Problem},
     search::{feature_sets, features::FeatureSet, grow::elsewhere, identification::Identification},
+    site::model::ModelPoint,
     solve::{
         covariance::association::association,
         degeneracy::Degenerate,
@@ -34,7 +35,9 @@ pub(super) struct Judge<'a> {
     pub(super) problem: &'a Problem<'a>,
     pub(super) solver: &'a dyn Solver,
     pub(super) acceptance: &'a Acceptance,
-    /// The distance (m, RMS over the model points) beyond which two poses are different answers.
+    /// The places that stand for the object where two of its poses are compared.
+    pub(super) anchors: Cow<'a, [ModelPoint]>,
+    /// The distance (m, RMS over the anchors) beyond which two poses are different answers.
     pub(super) alert_limit: f64,
     /// The number of pairs of the largest tested set; of points and edges if the search counts.
     pub(super) largest: usize,
@@ -278,7 +281,7 @@ impl Judge<'_> {
     /// Whether the pose passes the tests of precision and prior.
     pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let covariance = self.covariance(hypothesis)?;
-        let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
+        let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
         // A NaN is rejected as well.
         if !(2.0 * rms <= limit) {
@@ -331,7 +334,7 @@ impl Judge<'_> {
 
     /// Whether two poses are different answers.
     pub(super) fn apart(&self, a: &Transform<Object, Camera>, b: &Transform<Object, Camera>) -> bool {
-        !(rms_apart(self.problem.model, a, b) <= self.alert_limit)
+        !(rms_apart(&self.anchors, a, b) <= self.alert_limit)
     }
 
     /// Raises the protection levels to cover other poses within the alert limit.
@@ -348,7 +351,7 @@ impl Judge<'_> {
     pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
         let data = self.observations(&fix.pairs, &fix.edges);
         let pose = &fix.object_from_camera;
-        let transfer = Transfer::of(self.problem.model, pose);
+        let transfer = Transfer::of(&self.anchors, pose);
         let level =
             protection(&data, pose, &fix.covariance, self.acceptance, &transfer, self.alert_limit, misidentified)
                 .protection;
@@ -364,7 +367,7 @@ impl Judge<'_> {
             Ok(covariance) => covariance,
             Err(why) => return Outcome::Degenerate(why),
         };
-        let transfer = Transfer::of(self.problem.model, &hypothesis.pose);
+        let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let mistaken = misidentified.unwrap_or(0.0);
         let left_out =
             protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, self.alert_limit, mistaken);

@@ -78,7 +78,8 @@ pub fn judge(
             return Attempt { outcome, ..attempt };
         }
     };
-    let alert_limit = alert_limit(problem.model, acceptance);
+    let anchors = problem.anchors();
+    let alert_limit = alert_limit(&anchors, acceptance);
     let found = match solver.takes_edges() {
         true => found,
         false => Identification { edges: Vec::new(), alternative_edges: Vec::new(), ..found },
@@ -88,7 +89,8 @@ pub fn judge(
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
     let supported = found.posterior.as_ref().is_some_and(|posterior| posterior.support.is_some());
-    let judge = Judge { problem, solver, acceptance, alert_limit, largest, searched: true, rig, supported, near };
+    let judge =
+        Judge { problem, solver, acceptance, anchors, alert_limit, largest, searched: true, rig, supported, near };
     let a_contrario = AContrario::of(problem, &found.pairs);
     let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario);
     let mut probability = evidence.probability();
@@ -168,11 +170,13 @@ pub fn judge_labelled(
     acceptance: &Acceptance,
     rig: Option<&StereoRig>,
 ) -> Attempt {
-    let alert_limit = alert_limit(problem.model, acceptance);
+    let anchors = problem.anchors();
+    let alert_limit = alert_limit(&anchors, acceptance);
     let judge = Judge {
         problem,
         solver,
         acceptance,
+        anchors,
         alert_limit,
         largest: pairs.len(),
         searched: false,

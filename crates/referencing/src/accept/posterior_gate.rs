@@ -27,12 +27,12 @@ impl Judge<'_> {
         probability: Probability,
     ) -> (Outcome, Option<Alternative>, Probability) {
         let max = self.acceptance.max_p_wrong;
-        let runner_up = posterior.next(self.problem.model, self.alert_limit).map(Explanation::alternative);
+        let runner_up = posterior.next(&self.anchors, self.alert_limit).map(Explanation::alternative);
         let with_copies = evidence.with_copies();
         let suffices = |ln_evidence: f64| evidence.is_copy(ln_evidence, max.value());
         if max.allows(with_copies.absent)
             && let Some(best) = posterior.explanations.first()
-            && let Some(copy) = posterior.copy(self.problem.model, self.alert_limit, suffices)
+            && let Some(copy) = posterior.copy(&self.anchors, self.alert_limit, suffices)
         {
             let copies = Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]);
             return (copies, None, with_copies.among(2));
@@ -41,7 +41,7 @@ impl Judge<'_> {
             return (Outcome::Rejected(rejection), runner_up, probability);
         }
         if !max.allows(probability.wrong) {
-            let elsewhere = posterior.elsewhere(self.problem.model, self.alert_limit);
+            let elsewhere = posterior.elsewhere(&self.anchors, self.alert_limit);
             if elsewhere.is_empty() {
                 let rejection = self.improbable(probability.wrong, [&found.pairs, &found.edges]);
                 return (Outcome::Rejected(rejection), runner_up, probability);

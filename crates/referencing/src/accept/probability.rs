@@ -113,7 +113,7 @@ impl<'a> Evidence<'a> {
         limit: f64,
         a_contrario: &'a AContrario<'a>,
     ) -> Self {
-        let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(problem.model, limit));
+        let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(&problem.anchors(), limit));
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
         let counted = match &found.posterior {
             Some(_) => None,

@@ -18,6 +18,7 @@ use crate::{
         outcome::{Attempt, BestPose, Outcome},
     },
     alternative::Alternative,
+    anchors::anchors,
     observations::Observations,
     problem::Correspondence,
 };
@@ -270,7 +271,8 @@ pub fn printed(
         unbelieved: (fix.is_none() && !attempt.identified.is_empty()).then(|| indices(&attempt.identified)),
         best: attempt.best.as_ref().map(Best::from),
         integrity: fix.map(|fix| {
-            let (risk, limit) = (method.acceptance.risk, alert_limit(&problem.model, method.acceptance));
+            let anchors = anchors(&problem.model, &problem.edges.model);
+            let (risk, limit) = (method.acceptance.risk, alert_limit(&anchors, method.acceptance));
             Support::of(&fix.integrity, risk, limit)
         }),
         alternatives: match &attempt.outcome {

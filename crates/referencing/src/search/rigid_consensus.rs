@@ -24,6 +24,7 @@ use super::{
         seeds::{Seeds, Swept, guided::LARGE},
         structured_clutter::{Occupied, StructuredClutter},
         support::IndependentPairs,
+        turned::turned,
     },
     grow::{feasible, grow, max_possible_features, so_far},
     identification::{Identification, Rejected, Search},
@@ -125,7 +126,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 10;
+    const VERSION: u32 = 11;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -235,6 +236,11 @@ impl Search for RigidConsensus {
             let shifts = pattern.shifts(problem, &climb, edge_terms.as_ref(), best);
             swept.insert(shifts);
         }
+        if let (Some(edges), Some(best)) = (&edge_terms, swept.modes.first().filter(|best| !best.edges.is_empty())) {
+            let climb = Climb::new(problem.model, parts, &none);
+            let turned = turned(&Joined { climb: &climb, edges, taken: &none }, best);
+            swept.insert(turned);
+        }
         swept.modes.truncate(MAX_COMPARED);
         if !large {
             weighted(&mut swept);
@@ -283,6 +289,12 @@ impl Search for RigidConsensus {
                 let lines = lines_of(best, edges);
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
                 with_edges(problem, parts, edges, [&taken, &lines], &mut beside);
+                // A structure of the object's kind beside the object is no second object.
+                let climb = Climb::new(problem.model, parts, &none);
+                let joined = Joined { climb: &climb, edges, taken: &none };
+                for mode in beside.modes.iter_mut().filter(|mode| mode.ln_evidence >= floor) {
+                    mode.ln_evidence -= resembling::ln_evidence(&joined, mode).unwrap_or(0.0).max(0.0);
+                }
                 beside.modes.retain(|mode| mode.ln_evidence >= floor);
             }
             // Parts of an object whose pattern continues are visible anyway.

@@ -136,9 +136,12 @@ fn one(
         check.fault(fault.value(format!("{} m", number(length))).remedy(remedy));
         return None;
     }
-    if length > OF_DIAMETER * extent {
+    let away = |end: &Point<_>| points.iter().map(|point| point.at.distance(end)).fold(f64::INFINITY, f64::min);
+    let far = length.max(away(&a)).max(away(&b));
+    if far > OF_DIAMETER * extent {
         let fault = check.at(format!("{name}: implausible units"), &path("to"));
-        let value = format!("{} m long, the diameter of the object's points is {} m", number(length), number(extent));
+        let how = if far > length { "from the object's points, whose" } else { "long, the object's points'" };
+        let value = format!("{} m {how} diameter is {} m", number(far), number(extent));
         check.fault(fault.value(value).remedy("give coordinates in metres"));
     } else if length > LONG {
         let warning = check.at(format!("{name} is long"), &path("to"));
@@ -176,16 +179,25 @@ fn between_points(check: &mut Checker<'_>, edges: &[ModelEdge], of: &str, object
     check.warnings.push(warning.value(value).remedy("remove it, and give the `sigma` of the points"));
 }
 
-/// Adds a fault for every two edges whose ends coincide within two standard deviations.
+/// Adds a fault for every two edges whose ends coincide, and a warning if they do within two standard deviations.
 fn twice(check: &mut Checker<'_>, edges: &[ModelEdge], points: &[ModelPoint], of: &str, object: &str) {
     for (i, one) in edges.iter().enumerate() {
         let ([a, b], [sa, sb]) = (one.places(points), one.sigmas(points));
         for other in &edges[..i] {
             let ([c, d], [sc, sd]) = (other.places(points), other.sigmas(points));
-            let near = |p: &Point<_>, s: f64, q: &Point<_>, t: f64| p.distance(q) <= (2.0 * s.hypot(t)).max(COINCIDENT);
-            if (near(&a, sa, &c, sc) && near(&b, sb, &d, sd)) || (near(&a, sa, &d, sd) && near(&b, sb, &c, sc)) {
-                let fault = check.at(format!("{of}: the same edge twice"), &["object", object, "edge", &i.to_string()]);
-                check.fault(fault.value(format!("`{}` and `{}`", other.id, one.id)).remedy("remove one"));
+            let within = |sigmas: f64| {
+                let near =
+                    |p: &Point<_>, s: f64, q: &Point<_>, t: f64| p.distance(q) <= (sigmas * s.hypot(t)).max(COINCIDENT);
+                (near(&a, sa, &c, sc) && near(&b, sb, &d, sd)) || (near(&a, sa, &d, sd) && near(&b, sb, &c, sc))
+            };
+            let path = ["object", object, "edge", &i.to_string()];
+            let value = format!("`{}` and `{}`", other.id, one.id);
+            if within(0.0) {
+                let fault = check.at(format!("{of}: the same edge twice"), &path);
+                check.fault(fault.value(value).remedy("remove one"));
+            } else if within(2.0) {
+                let warning = check.at(format!("{of}: two edges coincide within their errors"), &path);
+                check.warnings.push(warning.value(value).remedy("remove one, or state a smaller `sigma`"));
             }
         }
     }

@@ -98,6 +98,7 @@ impl Scene {
             problem: &problem,
             solver,
             acceptance,
+            anchors: problem.anchors(),
             alert_limit,
             largest,
             searched,

@@ -19,8 +19,9 @@ const FOLLOWED: usize = 100;
 const FRUITLESS: usize = 30;
 /// Evidence (nats) below the best at which an ascent ends early.
 const HOPELESS: f64 = 20.0;
-/// Maximum number of vertices of each kind in the graph.
+/// Maximum number of vertices of each kind in the graph about the prior, and in one about a displacement of it.
 const MAX_VERTICES: usize = 320;
+const MAX_VOTERS: usize = 1000;
 
 /// A vertex of the common graph: a pair of edges or a pair of points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,17 +44,13 @@ pub(in crate::search) fn edge_modes(joined: &Joined<'_>, known: &[Mode], work: &
     if let Some((prior, votes)) = votes.filter(|_| !peaks.is_empty()) {
         let centroid = prior.motion.apply(&joined.climb.prior_terms.centroid);
         for displacement in peaks {
-            let voters = votes.voters(joined, prior, &pairs, &displacement);
+            let voters = most_precise(joined, votes.voters(joined, prior, &pairs, &displacement), MAX_VOTERS);
             let start = prior.motion.moved(&Vector3::zeros(), &displacement, &centroid);
             grow(joined, voters, Some(start), (known, &mut found), work);
         }
     } else {
-        let [mut edges, mut points] = pairs;
-        let EdgeTerms { vertices, .. } = joined.edges;
-        keep_best(&mut edges, |v| vertices[v].gain);
-        keep_best(&mut points, |v| joined.climb.terms.pairs[v].gain);
         let start = joined.climb.prior_terms.known.as_ref().map(|known| known.motion);
-        grow(joined, [edges, points], start, (known, &mut found), work);
+        grow(joined, most_precise(joined, pairs, MAX_VERTICES), start, (known, &mut found), work);
     }
     found
 }
@@ -110,6 +107,9 @@ fn grow(
             seed.iter().filter_map(|node| if let Node::Edge(v) = node { Some(*v) } else { None }).collect();
         let points: Vec<usize> =
             seed.iter().filter_map(|node| if let Node::Point(v) = node { Some(*v) } else { None }).collect();
+        // An edge that the start leaves beside its line says nothing there.
+        let near = |start: &Motion| edges.iter().all(|&v| joined.edges.vertices[v].placed(start).is_some());
+        let start = start.filter(|start| !points.is_empty() || near(start));
         for start in start.map_or_else(|| closed_forms(joined, &edges), |start| vec![start]) {
             let Some((motion, factor)) = joined.fit(&points, &edges, &start, 3) else { continue };
             let best = found.iter().chain(known.iter()).map(|mode| mode.ln_evidence).fold(0.0, f64::max);
@@ -134,13 +134,18 @@ fn free(joined: &Joined<'_>) -> [Vec<usize>; 2] {
     [edges.collect(), points.collect()]
 }
 
-/// Keeps at most [`MAX_VERTICES`] vertices, those of the greatest gain, ascending.
-fn keep_best(all: &mut Vec<usize>, gain: impl Fn(usize) -> f64) {
-    if all.len() > MAX_VERTICES {
-        all.sort_by(|&a, &b| gain(b).total_cmp(&gain(a)).then(a.cmp(&b)));
-        all.truncate(MAX_VERTICES);
-        all.sort_unstable();
-    }
+/// At most `max` vertices of each kind, those of the greatest gain, ascending.
+fn most_precise(joined: &Joined<'_>, [mut edges, mut points]: [Vec<usize>; 2], max: usize) -> [Vec<usize>; 2] {
+    let keep = |all: &mut Vec<usize>, gain: &dyn Fn(usize) -> f64| {
+        if all.len() > max {
+            all.sort_by(|&a, &b| gain(b).total_cmp(&gain(a)).then(a.cmp(&b)));
+            all.truncate(max);
+            all.sort_unstable();
+        }
+    };
+    keep(&mut edges, &|v| joined.edges.vertices[v].gain);
+    keep(&mut points, &|v| joined.climb.terms.pairs[v].gain);
+    [edges, points]
 }
 
 /// Whether two vertices seed a pose; `None` if they are not coherent.

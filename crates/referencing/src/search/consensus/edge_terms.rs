@@ -106,6 +106,8 @@ pub(in crate::search) struct EdgeTerms<'a> {
     expected: Option<Motion>,
     /// The area (m²) in which the prior places each edge.
     areas: Vec<f64>,
+    /// The area (m²) of all lines, for those beyond the gate.
+    anywhere: f64,
     measured: &'a [MeasuredLine],
 }
 
@@ -133,6 +135,7 @@ impl<'a> EdgeTerms<'a> {
             candidates,
             expected: known.map(|known| known.motion),
             areas: model.iter().map(|edge| area(edge).unwrap_or(anywhere)).collect(),
+            anywhere,
             measured: lines,
         };
         let pairs = candidates.iter().enumerate().flat_map(|(i, list)| list.iter().map(move |&j| (i, j)));
@@ -144,19 +147,25 @@ impl<'a> EdgeTerms<'a> {
     pub(in crate::search) fn vertex(&self, edge: usize, line: usize) -> Option<EdgeVertex> {
         let noise = self.noise(edge, line)?;
         let root = noise.cholesky()?;
-        let (list, of) = (&self.candidates[edge], self.lines[line]?);
+        let of = self.lines[line]?;
         // From offsets at both ends to offset and direction.
         let ln_peak = -half_ln_det(&root) - 4.0 * HALF_LN_2PI + 2.0 * libm::log(of.length());
         let own = turn_spread(&noise, of.length());
-        let beyond = Some(line).filter(|line| list.binary_search(line).is_err());
-        let others = list.iter().copied().chain(beyond).filter_map(|other| self.lines[other].as_ref());
-        let alike: f64 = others.map(|other| direction_density(&of, &own, other)).sum();
+        let density = |other: &SpaceLine| direction_density(&of, &own, other);
+        let list = &self.candidates[edge];
+        let ln_clutter = match list.binary_search(&line) {
+            Ok(_) => {
+                let others = list.iter().filter_map(|&other| self.lines[other].as_ref());
+                libm::log(others.map(density).sum::<f64>() / self.areas[edge])
+            }
+            Err(_) => libm::log(self.lines.iter().flatten().map(density).sum::<f64>() / self.anywhere),
+        };
         Some(EdgeVertex {
             pair: Correspondence { model: edge, cloud: line },
             model: self.ends(edge),
             line: of,
             weight: root.inverse(),
-            gain: ln_peak - libm::log(alike / self.areas[edge]),
+            gain: ln_peak - ln_clutter,
             depth: self.measured[line].depth,
         })
     }
@@ -268,7 +277,7 @@ fn area(
     std::f64::consts::PI * COUNTED * (a * c - b * b).max(f64::MIN_POSITIVE).sqrt()
 }
 
-/// The cross-section (m²) of the box about all lines, without a prior.
+/// The cross-section (m²) of the box about all lines.
 fn cross_section(problem: &Problem<'_>) -> f64 {
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for end in problem.edges.lines.iter().flat_map(|line| &line.ends) {

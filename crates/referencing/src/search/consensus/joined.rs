@@ -85,8 +85,8 @@ impl Joined<'_> {
     ) -> Option<Mode> {
         // The last step may move an edge off its line.
         edges.retain(|&v| self.edges.vertices[v].placed(&motion).is_some());
-        let Climb { model, terms, prior_terms, .. } = self.climb;
-        if !prior_terms.holds(model, &motion, factor) {
+        let Climb { terms, prior_terms, .. } = self.climb;
+        if !prior_terms.holds(&motion, factor) {
             return None;
         }
         let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();

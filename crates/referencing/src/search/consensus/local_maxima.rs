@@ -100,7 +100,7 @@ impl<'a> Climb<'a> {
 
     /// The mode of these pairs (ascending) under their MAP motion; `None` if the prior's box excludes the motion.
     pub(in crate::search) fn mode(&self, members: Vec<usize>, motion: Motion, factor: &Factor) -> Option<Mode> {
-        if !self.prior_terms.holds(self.model, &motion, factor) {
+        if !self.prior_terms.holds(&motion, factor) {
             return None;
         }
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();

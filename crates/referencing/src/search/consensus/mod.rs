@@ -34,6 +34,7 @@ pub(crate) mod seeds;
 mod solve6;
 pub(crate) mod structured_clutter;
 pub(crate) mod support;
+pub(crate) mod turned;
 mod visible;
 mod wireframe;
 

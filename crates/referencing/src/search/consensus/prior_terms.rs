@@ -10,7 +10,6 @@ use super::{
 use crate::{
     parts::Parts,
     problem::{Prior, PriorBound, Problem},
-    site::model::ModelPoint,
 };
 
 /// Number of standard deviations that a bound of the prior stands for, since bounds are given to hold.
@@ -19,7 +18,7 @@ pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
 /// The prior's terms of a likelihood.
 ///
 /// Motions are compared by η = (φ, τ): the rotation from the prior attitude (rad, camera axes) and the translation of
-/// the model's centroid (m). dφ dτ is the measure of every density here.
+/// the model's centroid, that of its anchors (m). dφ dτ is the measure of every density here.
 pub(in crate::search) struct PriorTerms {
     /// The prior motion; `None` without a prior.
     pub(in crate::search) known: Option<Known>,
@@ -40,14 +39,16 @@ pub(in crate::search) struct Known {
     pub(in crate::search) attitude: f64,
     /// Predicted place of each model point, with its standard deviation along each axis (m).
     pub(in crate::search) places: Vec<(Vector3<f64>, Vector3<f64>)>,
-    /// Half-size of a box prior along each camera axis (m): the pose must leave every model point within it.
+    /// Half-size of a box prior along each camera axis (m): the pose must leave every anchor within it.
     pub(in crate::search) half: Option<f64>,
+    /// The anchors, object frame, with their predicted places.
+    anchors: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl PriorTerms {
     pub(in crate::search) fn of(problem: &Problem<'_>) -> Option<Self> {
-        let n = problem.model.len().max(1) as f64;
-        let centroid = problem.model.iter().map(|point| point.at.coords).sum::<Vector3<f64>>() / n;
+        let anchors: Vec<Vector3<f64>> = problem.anchors().iter().map(|anchor| anchor.at.coords).collect();
+        let centroid = anchors.iter().sum::<Vector3<f64>>() / anchors.len().max(1) as f64;
         let Some(prior) = problem.prior else {
             // Any attitude (8π² is the volume of SO(3) in this measure), anywhere in the boxes of the candidates'
             // parts.
@@ -57,7 +58,7 @@ impl PriorTerms {
         };
         let motion = Motion::of(&prior.object_from_camera.inverse());
         let at = motion.apply(&centroid);
-        let covariance = covariance(problem, prior, &motion, &at);
+        let covariance = covariance(&anchors, prior, &motion, &at);
         let chol = covariance.cholesky()?;
         let information = chol.inverse();
         let ln_peak = -half_ln_det(&chol) - 6.0 * HALF_LN_2PI;
@@ -75,7 +76,8 @@ impl PriorTerms {
             PriorBound::Box(half) => Some(half),
             PriorBound::Gaussian(_) => None,
         };
-        let known = Some(Known { motion, information, attitude, places, half });
+        let anchors = anchors.iter().map(|anchor| (*anchor, motion.apply(anchor))).collect();
+        let known = Some(Known { motion, information, attitude, places, half, anchors });
         Some(Self { known, centroid, ln_peak, parts: None })
     }
 
@@ -86,23 +88,17 @@ impl PriorTerms {
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
     }
 
-    /// Whether the prior's box holds every model point under a motion, up to the motion's error.
-    pub(in crate::search) fn holds(
-        &self,
-        model: &[ModelPoint],
-        motion: &Motion,
-        information: &Cholesky<f64, U6>,
-    ) -> bool {
+    /// Whether the prior's box holds every anchor under a motion, up to the motion's error.
+    pub(in crate::search) fn holds(&self, motion: &Motion, information: &Cholesky<f64, U6>) -> bool {
         let Some((known, half)) = self.known.as_ref().and_then(|known| Some((known, known.half?))) else { return true };
-        let step = |i: usize| motion.apply(&model[i].at.coords) - known.places[i].0;
         let mut covariance = None;
-        (0..model.len()).all(|i| {
-            let step = step(i);
+        known.anchors.iter().all(|(anchor, predicted)| {
+            let step = motion.apply(anchor) - predicted;
             if step.amax() <= half {
                 return true;
             }
             let covariance = covariance.get_or_insert_with(|| information.inverse());
-            let lever = skew(&(motion.apply(&model[i].at.coords) - motion.apply(&self.centroid)));
+            let lever = skew(&(motion.apply(anchor) - motion.apply(&self.centroid)));
             // x = τ − [lever]× φ.
             let mut j = Matrix3x6::zeros();
             j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-lever);
@@ -132,7 +128,7 @@ pub(in crate::search) fn spread(covariance: &Matrix6<f64>, lever: &Vector3<f64>)
 }
 
 /// Covariance of η.
-fn covariance(problem: &Problem<'_>, prior: &Prior, motion: &Motion, at: &Vector3<f64>) -> Matrix6<f64> {
+fn covariance(anchors: &[Vector3<f64>], prior: &Prior, motion: &Motion, at: &Vector3<f64>) -> Matrix6<f64> {
     match &prior.bound {
         PriorBound::Gaussian(xi) => {
             // Exp(−ξ) moves camera coordinates: φ = −φ_ξ, τ = −ρ − φ_ξ × p̄ to first order; signs cancel in Σ.
@@ -141,7 +137,7 @@ fn covariance(problem: &Problem<'_>, prior: &Prior, motion: &Motion, at: &Vector
             j * xi.matrix * j.transpose()
         }
         PriorBound::Box(half) => {
-            let reach = problem.model.iter().map(|point| (motion.apply(&point.at.coords) - at).norm());
+            let reach = anchors.iter().map(|anchor| (motion.apply(anchor) - at).norm());
             let reach = reach.fold(0.0, f64::max).max(1e-9);
             let (tau, phi) = (half / BOUND_SIGMAS, half / (BOUND_SIGMAS * reach));
             Matrix6::from_diagonal(&Vector6::new(phi * phi, phi * phi, phi * phi, tau * tau, tau * tau, tau * tau))

@@ -51,7 +51,7 @@ fn evidence(prover: &Prover<'_>, members: &[usize]) -> Option<f64> {
         let filled = (prior_terms.ln_peak + ln_volume(&factor)).min(0.0);
         let ln_evidence =
             gains + terms.ln_fraction[count] + prior_terms.ln_density(&motion) - prior_terms.ln_peak + filled;
-        let allowed = prover.climb.allows(members, &motion) && prior_terms.holds(prover.climb.model, &motion, &factor);
+        let allowed = prover.climb.allows(members, &motion) && prior_terms.holds(&motion, &factor);
         allowed.then_some(ln_evidence)
     };
     starts.filter_map(at).fold(None, |max: Option<f64>, one| Some(max.map_or(one, |max| max.max(one))))
