@@ -45,6 +45,25 @@ fn answered(problem: &CoherenceProblem) -> Answer {
     answer(problem, Path::new("p.json"), &method, &mut ChaCha8Rng::seed_from_u64(0))
 }
 
+/// Generated problems: a box with a smaller one on it, among other lines.
+#[test]
+fn generated_problems_have_their_answers() {
+    let all = [
+        // A structure of the object's kind is no second object.
+        (include_str!("box_beside.json"), "fix"),
+        // Without model points, a prior is about the ends of edges.
+        (include_str!("panel_lines.json"), "fix"),
+        (include_str!("floor_grid.json"), "rejected"),
+        // No predicted edge overlaps its line.
+        (include_str!("wide_prior.json"), "fix"),
+    ];
+    for (text, outcome) in all {
+        let problem = parse(text).unwrap();
+        let answer = answered(&problem);
+        assert_eq!(answer.outcome, outcome, "{}: {answer:?}", problem.id);
+    }
+}
+
 /// A problem without a single measured point has a fix by its edges.
 #[test]
 fn edges_alone_give_a_fix() {

@@ -1,7 +1,6 @@
 //! Laws of edges: the bound of the solvers, and the search with acceptance.
 
 mod absent;
-mod beside;
 mod bound;
 mod brute_force;
 mod far;
