@@ -44,7 +44,6 @@ pub struct Acceptance {
     /// ([`RejectionReason::Inconsistent`](super::RejectionReason::Inconsistent)).
     pub moved_part_rate: f64,
     /// Tests to leave out, for ablation studies only; none by default.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<AcceptanceTest>,
 }
 

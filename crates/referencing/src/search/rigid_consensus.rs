@@ -118,7 +118,6 @@ pub struct RigidConsensus {
     /// Whether to prove that no set has more evidence, with the budget once more; a proved answer is `optimal`.
     pub prove: bool,
     /// Mechanisms to leave out, for ablation studies only; none by default.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub without: Vec<SearchMechanism>,
 }
 
@@ -306,7 +305,7 @@ impl Search for RigidConsensus {
                 beside.modes.retain(|mode| mode.ln_evidence >= floor);
             }
             // Parts of an object whose pattern continues are visible anyway.
-            copies_sought = Some(beside.complete && beside.parts && pattern.is_none());
+            copies_sought = Some(copies && beside.complete && beside.parts && pattern.is_none());
             // Structured clutter: poses elsewhere with at least the evidence of absence, in an eighth of that time.
             let effort = left.min((work / 8).max(MIN_EFFORT / 10));
             let structured = with(SearchMechanism::StructuredClutter);
