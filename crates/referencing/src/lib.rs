@@ -54,6 +54,7 @@
 //! ```
 
 mod a_contrario;
+mod ablation;
 mod accept;
 mod alternative;
 mod anchors;
@@ -73,6 +74,7 @@ mod solve;
 mod space_line;
 
 pub use a_contrario::{expected_sets_as_good, nfa};
+pub use ablation::{AcceptanceTest, SearchMechanism};
 pub use accept::{
     Acceptance, Alternative, Attempt, BestPose, Consistency, Fix, Integrity, MaxPWrong, Outcome, Protection,
     Redundancy, RejectionReason, compute_fix, judge, judge_labelled, rms_apart, search_with_expanding_gates, wider,

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and print its measurements")]
 
 mod a_contrario;
+mod ablation;
 mod acceptance;
 mod answers;
 mod association;

@@ -4,6 +4,7 @@ use seafix_component::{Settings, in_range};
 use serde::{Deserialize, Serialize};
 
 use super::max_p_wrong::MaxPWrong;
+use crate::ablation::AcceptanceTest;
 
 /// The limits of the tests by which an identified set becomes a fix.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
@@ -42,6 +43,8 @@ pub struct Acceptance {
     /// Zero excludes the case, from the levels and from the test of consistency
     /// ([`RejectionReason::Inconsistent`](super::RejectionReason::Inconsistent)).
     pub moved_part_rate: f64,
+    /// Tests to leave out, for ablation studies only; none by default.
+    pub without: Vec<AcceptanceTest>,
 }
 
 impl Default for Acceptance {
@@ -57,11 +60,17 @@ impl Default for Acceptance {
             wrong_match_rate: 0.1,
             two_wrong_rate: 0.0,
             moved_part_rate: 0.1,
+            without: Vec::new(),
         }
     }
 }
 
 impl Acceptance {
+    /// Whether a test applies.
+    pub(super) fn with(&self, test: AcceptanceTest) -> bool {
+        !self.without.contains(&test)
+    }
+
     /// The Bayes factor of a displaced part beyond which the parts of an object are inconsistent.
     ///
     /// An object as modelled exceeds it with a probability of at most one minus the confidence (Markov's inequality).

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::ablation::AcceptanceTest;
+
 use super::{hypothesis::Hypothesis, judge::Judge};
 
 /// Number of pairs per excluded pair.
@@ -20,6 +22,9 @@ impl Judge<'_> {
     /// each is tested for false alarms again: their poses, and those of complete sets, may contradict each other.
     /// Exclusion serves the residual test only.
     pub(super) fn thinned(&self, fallen: &[Hypothesis]) -> Vec<Hypothesis> {
+        if !self.acceptance.with(AcceptanceTest::Exclusion) {
+            return Vec::new();
+        }
         let mut known = BTreeSet::new();
         let sets = fallen
             .iter()

@@ -16,6 +16,7 @@ use super::{
     transfer::Transfer,
 };
 use crate::{
+    ablation::AcceptanceTest,
     alternative::Alternative,
     chi_square::chi_square,
     observations::Observations,
@@ -269,7 +270,11 @@ impl Judge<'_> {
     pub(super) fn residuals(&self, hypothesis: &Hypothesis) -> Result<(), RejectionReason> {
         let (chi2, limit) = (hypothesis.likelihood.cost, self.chi2_limit(hypothesis.dof()));
         // A NaN is rejected as well.
-        if chi2 <= limit { Ok(()) } else { Err(RejectionReason::Residuals { chi2, limit }) }
+        if chi2 <= limit || !self.acceptance.with(AcceptanceTest::Residuals) {
+            Ok(())
+        } else {
+            Err(RejectionReason::Residuals { chi2, limit })
+        }
     }
 
     /// The limit of χ² with these degrees of freedom.
@@ -315,7 +320,7 @@ impl Judge<'_> {
             }
             false => covariance,
         };
-        if !self.searched || pairs.is_empty() {
+        if !self.searched || pairs.is_empty() || !self.acceptance.with(AcceptanceTest::Association) {
             return Ok(covariance);
         }
         let of_edges = match edges.is_empty() {

@@ -5,6 +5,7 @@ use seafix_geometry::StereoRig;
 
 use crate::{
     a_contrario::AContrario,
+    ablation::AcceptanceTest,
     problem::{Correspondence, Problem},
     search::identification::{Identification, Rejected, Search},
     site::{bounding_box::BoundingBox, model::ModelPoint, target::diameter},
@@ -92,7 +93,7 @@ pub fn judge(
     let judge =
         Judge { problem, solver, acceptance, anchors, alert_limit, largest, searched: true, rig, supported, near };
     let a_contrario = AContrario::of(problem, &found.pairs);
-    let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario);
+    let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario, &acceptance.without);
     let mut probability = evidence.probability();
     let sized = judge.size(&found.pairs, &found.edges);
     let (outcome, runner_up) = match (sized, &found.posterior) {
@@ -108,7 +109,7 @@ pub fn judge(
         (Err(rejection), _) => (Outcome::Rejected(rejection), None),
     };
     // The search compares the poses of edges with those of a self-symmetry itself.
-    let outcome = match found.edges.is_empty() {
+    let outcome = match found.edges.is_empty() && acceptance.with(AcceptanceTest::SelfSymmetry) {
         true => judge.distinguished(outcome, found.posterior.is_some(), &mut probability),
         false => outcome,
     };

@@ -7,6 +7,7 @@ use super::{
     rejection::RejectionReason,
 };
 use crate::{
+    ablation::AcceptanceTest,
     alternative::Alternative,
     problem::Correspondence,
     search::{
@@ -30,7 +31,8 @@ impl Judge<'_> {
         let runner_up = posterior.next(&self.anchors, self.alert_limit).map(Explanation::alternative);
         let with_copies = evidence.with_copies();
         let suffices = |ln_evidence: f64| evidence.is_copy(ln_evidence, max.value());
-        if max.allows(with_copies.absent)
+        if self.acceptance.with(AcceptanceTest::SecondCopies)
+            && max.allows(with_copies.absent)
             && let Some(best) = posterior.explanations.first()
             && let Some(copy) = posterior.copy(&self.anchors, self.alert_limit, suffices)
         {

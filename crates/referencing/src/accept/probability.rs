@@ -5,6 +5,7 @@
 
 use crate::{
     a_contrario::{AContrario, absence::by_nfa, expected_sets},
+    ablation::AcceptanceTest,
     problem::{Correspondence, Problem},
     search::{
         consensus::edge_nfa::{Counted, of_counted},
@@ -103,6 +104,8 @@ pub(super) struct Evidence<'a> {
     posterior: Option<PosteriorProbabilities>,
     /// The numbers of false alarms, computed on demand.
     a_contrario: &'a AContrario<'a>,
+    /// The tests left out.
+    without: &'a [AcceptanceTest],
 }
 
 impl<'a> Evidence<'a> {
@@ -112,6 +115,7 @@ impl<'a> Evidence<'a> {
         found: &'a Identification,
         limit: f64,
         a_contrario: &'a AContrario<'a>,
+        without: &'a [AcceptanceTest],
     ) -> Self {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(&problem.anchors(), limit));
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
@@ -131,7 +135,12 @@ impl<'a> Evidence<'a> {
             nfa_independent,
             posterior,
             a_contrario,
+            without,
         }
+    }
+
+    fn with(&self, test: AcceptanceTest) -> bool {
+        !self.without.contains(&test)
     }
 
     /// Whether the number of false alarms is that of independent pairs.
@@ -191,9 +200,15 @@ impl<'a> Evidence<'a> {
         let unseen = (absent * NEEDED as f64 / (self.problem.model.len() + 1) as f64).min(1.0);
         // Too few edges as well: one at most.
         let edges = self.problem.edges.with_candidates() as f64;
+        let unseen = if self.with(AcceptanceTest::FewVisible) { unseen } else { 0.0 };
         let unseen = if self.edges.is_empty() { unseen } else { unseen * (2.0 / (edges + 1.0)).min(1.0) };
-        let permuted = by_nfa(self.a_contrario.at_their_pose());
-        let absent_by_any = larger(larger(absent, permuted), by_nfa(self.nfa()));
+        let mut absent_by_any = absent;
+        if self.with(AcceptanceTest::PermutedPartners) {
+            absent_by_any = larger(absent_by_any, by_nfa(self.a_contrario.at_their_pose()));
+        }
+        if self.with(AcceptanceTest::Nfa) {
+            absent_by_any = larger(absent_by_any, by_nfa(self.nfa()));
+        }
         let present = 1.0 - absent;
         Probability::of(absent_by_any, if present > 0.0 { ((elsewhere + unseen) / present).min(1.0) } else { 0.0 })
     }

@@ -13,6 +13,7 @@ use super::{
     probability::Probability,
 };
 use crate::{
+    ablation::AcceptanceTest,
     observations::Observations,
     problem::Correspondence,
     solve::{kabsch::Kabsch, solver::Solver},
@@ -187,6 +188,7 @@ impl Judge<'_> {
     /// Whether the camera sees the identified points from their visible sides.
     pub(super) fn faces(&self, hypothesis: &Hypothesis) -> bool {
         let camera = hypothesis.pose.translation();
-        hypothesis.pairs.iter().all(|pair| self.problem.model[pair.model].shows_itself(&camera))
+        !self.acceptance.with(AcceptanceTest::Visibility)
+            || hypothesis.pairs.iter().all(|pair| self.problem.model[pair.model].shows_itself(&camera))
     }
 }

@@ -32,7 +32,9 @@ use super::{
     orientation::Sense,
     posterior::{COPY, Explanation, Posterior},
 };
-use crate::{a_contrario::coordinates::shuffled, problem::Problem, solve::likelihood::mixed::ENOUGH};
+use crate::{
+    a_contrario::coordinates::shuffled, ablation::SearchMechanism, problem::Problem, solve::likelihood::mixed::ENOUGH,
+};
 
 /// Maximum-a-posteriori pose search with Bayesian model comparison (MacKay 2003, ch. 27 and 28).
 ///
@@ -116,11 +118,13 @@ pub struct RigidConsensus {
     pub max_pairs: usize,
     /// Whether to prove that no set has more evidence, with the budget once more; a proved answer is `optimal`.
     pub prove: bool,
+    /// Mechanisms to leave out, for ablation studies only; none by default.
+    pub without: Vec<SearchMechanism>,
 }
 
 impl Default for RigidConsensus {
     fn default() -> Self {
-        Self { budget: 400_000_000, max_pairs: 40_000, prove: false }
+        Self { budget: 400_000_000, max_pairs: 40_000, prove: false, without: Vec::new() }
     }
 }
 
@@ -199,8 +203,12 @@ impl Search for RigidConsensus {
         let parts = (&terms, &prior_terms, &graph);
         let none = BTreeSet::new();
         let seeds = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget);
+        let with = |mechanism| !self.without.contains(&mechanism);
         // A large putative set is judged by its independent pairs.
-        let large = problem.edges.with_candidates() == 0 && shuffled(problem) && graph.starts.len() > LARGE;
+        let large = with(SearchMechanism::IndependentPairs)
+            && problem.edges.with_candidates() == 0
+            && shuffled(problem)
+            && graph.starts.len() > LARGE;
         // The proof starts from the complete enumeration.
         let mut swept = match enough(0) {
             true => if self.prove { seeds } else { seeds.guided(self.budget).sampled(large) }.sweep(),
@@ -218,7 +226,7 @@ impl Search for RigidConsensus {
         if let Some(edges) = &edge_terms {
             with_edges(problem, parts, edges, [&none, &none], &mut swept);
         }
-        let mut clutter_density = ClutterDensity::default();
+        let mut clutter_density = ClutterDensity::without(&self.without);
         let mut weighted = |swept: &mut Swept| {
             for mode in &mut swept.modes {
                 clutter_density.weigh(problem, parts, mode);
@@ -229,9 +237,13 @@ impl Search for RigidConsensus {
         };
         // The pattern is that of points.
         let by_points = swept.modes.first().is_some_and(|best| best.members.len() >= NEEDED);
-        let pattern =
-            if strong(&swept) && by_points && !large { Pattern::of(problem.model, problem.edges.model) } else { None };
-        if let (Some(pattern), Some(best)) = (&pattern, swept.modes.first()) {
+        let pattern = if with(SearchMechanism::Pattern) && strong(&swept) && by_points && !large {
+            Pattern::of(problem.model, problem.edges.model)
+        } else {
+            None
+        };
+        if let (true, Some(pattern), Some(best)) = (with(SearchMechanism::PatternShifts), &pattern, swept.modes.first())
+        {
             let climb = Climb::new(problem.model, parts, &none);
             let shifts = pattern.shifts(problem, &climb, edge_terms.as_ref(), best);
             swept.insert(shifts);
@@ -244,7 +256,9 @@ impl Search for RigidConsensus {
         swept.modes.truncate(MAX_COMPARED);
         if !large {
             weighted(&mut swept);
-            largest_evidence_first(&mut swept.modes);
+            if with(SearchMechanism::LargestFirst) {
+                largest_evidence_first(&mut swept.modes);
+            }
         }
         let continued =
             pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
@@ -253,7 +267,11 @@ impl Search for RigidConsensus {
             return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, pair_tests)) };
         };
         // Two edges and more have a sense of their own.
-        let image = if best.edges.len() < 2 { mirror_image(problem.model, parts, best) } else { None };
+        let image = if with(SearchMechanism::Mirror) && best.edges.len() < 2 {
+            mirror_image(problem.model, parts, best)
+        } else {
+            None
+        };
         if let Some(image) = image {
             return Err(Rejected::Mirrored { best: image.members.len(), proved: false });
         }
@@ -274,7 +292,8 @@ impl Search for RigidConsensus {
             let work = swept.pair_tests + graph.pair_tests / PAIRS_A_WORD;
             let full = work.max(MIN_EFFORT);
             let by_points = enough(0);
-            beside = if !by_points {
+            let copies = with(SearchMechanism::SecondCopies);
+            beside = if !(by_points && copies) {
                 Swept { complete: true, parts: true, ..Swept::default() }
             } else if pattern.is_some() {
                 Seeds::new(problem.model, parts, &taken, (min, STRONG), left).sweep()
@@ -285,7 +304,7 @@ impl Search for RigidConsensus {
                 let seeds = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), left);
                 seeds.with_parts(min, left.min(2 * full), left.min(full / 2)).guided(self.budget).sweep()
             };
-            if let Some(edges) = &edge_terms {
+            if let Some(edges) = edge_terms.as_ref().filter(|_| copies) {
                 let lines = lines_of(best, edges);
                 let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
                 with_edges(problem, parts, edges, [&taken, &lines], &mut beside);
@@ -298,9 +317,10 @@ impl Search for RigidConsensus {
                 beside.modes.retain(|mode| mode.ln_evidence >= floor);
             }
             // Parts of an object whose pattern continues are visible anyway.
-            copies_sought = Some(beside.complete && beside.parts && pattern.is_none());
+            copies_sought = Some(copies && beside.complete && beside.parts && pattern.is_none());
             // Structured clutter: poses elsewhere with at least the evidence of absence, in an eighth of that time.
             let effort = left.min((work / 8).max(MIN_EFFORT / 10));
+            let structured = with(SearchMechanism::StructuredClutter);
             let mut others = match by_points && best.members.len() >= NEEDED {
                 true => Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep(),
                 false => Swept::default(),
@@ -309,10 +329,15 @@ impl Search for RigidConsensus {
             weighted(&mut others);
             if best.members.len() >= NEEDED {
                 let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::distinctive));
-                let mistaken = occupied.mistaken(problem, (&terms, &graph), &others.modes);
+                let mistaken = with(SearchMechanism::Mislabelled)
+                    .then(|| occupied.mistaken(problem, (&terms, &graph), &others.modes))
+                    .flatten();
                 others.modes.retain(elsewhere);
-                let clutter_patterns =
-                    others.modes.iter().map(|other| occupied.structured_clutter(problem, parts, other));
+                let clutter_patterns = others
+                    .modes
+                    .iter()
+                    .filter(|_| structured)
+                    .map(|other| occupied.structured_clutter(problem, parts, other));
                 let weight = |of: &StructuredClutter| of.ln_evidence + of.ln_alone;
                 structured_clutter = clutter_patterns.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));
             }
@@ -351,7 +376,7 @@ impl Search for RigidConsensus {
         let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());
         let joined = joined.map(|edges| Joined { climb: &climb, edges, taken: &none });
         let ln_nfa = joined.as_ref().and_then(|joined| ln_nfa(joined, best));
-        let acceptable = joined.as_ref().filter(|_| best.ln_evidence >= STRONG);
+        let acceptable = joined.as_ref().filter(|_| with(SearchMechanism::Resembling) && best.ln_evidence >= STRONG);
         let resembling = acceptable.and_then(|joined| resembling::ln_evidence(joined, best));
         Ok(Identification {
             undecided: (!complete).then(|| ended(pairs.len() + identified.len(), pair_tests)),

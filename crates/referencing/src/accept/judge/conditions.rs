@@ -5,6 +5,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Point, Transform};
 
 use super::Judge;
 use crate::{
+    ablation::AcceptanceTest,
     accept::{
         hypothesis::{Fallen, Hypothesis},
         integrity::Integrity,
@@ -29,7 +30,11 @@ impl Judge<'_> {
             }
             PriorBound::Box(half) => self.off_box(hypothesis, &covariance, &prior.object_from_camera, *half),
         };
-        if off <= 1.0 { Ok(()) } else { Err(Fallen::Refused(RejectionReason::Prior { off })) }
+        if off <= 1.0 || !self.acceptance.with(AcceptanceTest::Prior) {
+            Ok(())
+        } else {
+            Err(Fallen::Refused(RejectionReason::Prior { off }))
+        }
     }
 
     /// Whether the camera sees the identified points from their visible sides.
@@ -85,7 +90,11 @@ impl Judge<'_> {
         hinge: Option<(usize, f64)>,
         all: f64,
     ) -> Result<(), RejectionReason> {
-        let Some((place, rms)) = hinge.filter(|_| self.searched && !self.supported) else { return Ok(()) };
+        let Some((place, rms)) =
+            hinge.filter(|_| self.searched && !self.supported && self.acceptance.with(AcceptanceTest::Hinge))
+        else {
+            return Ok(());
+        };
         // A NaN is rejected as well.
         if 2.0 * rms <= self.alert_limit || rms <= (1.0 + CARRIED) * all {
             return Ok(());
@@ -106,7 +115,9 @@ impl Judge<'_> {
         hypothesis: &Hypothesis,
         integrity: &Integrity,
     ) -> Result<(), RejectionReason> {
-        let Some(scale_error) = integrity.scale_error else { return Ok(()) };
+        let Some(scale_error) = integrity.scale_error.filter(|_| self.acceptance.with(AcceptanceTest::Scale)) else {
+            return Ok(());
+        };
         // Residuals above their noise also raise the error of the scale.
         let sigmas = scale_error.value / scale_error.sigma;
         let left = (integrity.chi2 - sigmas * sigmas).max(0.0) / (integrity.dof - 1) as f64;
@@ -128,7 +139,9 @@ impl Judge<'_> {
     /// `rms` is the predicted error of the model points, which includes the displacement.
     pub(super) fn consistent(&self, integrity: &Integrity, points: usize, rms: f64) -> Result<(), RejectionReason> {
         let limit = self.acceptance.max_bayes_factor();
-        let significant = integrity.consistency.filter(|found| found.bayes_factor > limit);
+        let significant = integrity
+            .consistency
+            .filter(|found| found.bayes_factor > limit && self.acceptance.with(AcceptanceTest::Consistency));
         let Some(consistency) = significant.filter(|_| !(2.0 * rms <= self.alert_limit)) else { return Ok(()) };
         Err(RejectionReason::Inconsistent { consistency, points, limit, rms, alert_limit: self.alert_limit })
     }

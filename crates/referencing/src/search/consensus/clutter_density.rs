@@ -12,6 +12,7 @@ use super::{
 };
 use crate::{
     a_contrario::{coordinates::shuffled, sample::spread_sample},
+    ablation::SearchMechanism,
     problem::{Correspondence, Problem},
 };
 
@@ -54,6 +55,8 @@ pub(in crate::search) struct ClutterDensity {
     clumped_clutter: Option<ClumpedClutter>,
     /// A distance (m) and the fraction of candidates with another so near; `None` until it is needed.
     duplicates: Option<(f64, f64)>,
+    /// The mechanisms left out.
+    without: Vec<SearchMechanism>,
 }
 
 /// The densities along lines and in clumps, and the fractions of clutter that have them.
@@ -63,6 +66,15 @@ struct Lines {
 }
 
 impl ClutterDensity {
+    /// The density without these mechanisms.
+    pub(in crate::search) fn without(mechanisms: &[SearchMechanism]) -> Self {
+        Self { without: mechanisms.to_vec(), ..Self::default() }
+    }
+
+    fn with(&self, mechanism: SearchMechanism) -> bool {
+        !self.without.contains(&mechanism)
+    }
+
     /// Recomputes the evidence of a mode with the local clutter density about each of its points.
     ///
     /// A point in dense clutter may contribute negatively; it is then rather clutter than the object's. The evidence is
@@ -75,7 +87,7 @@ impl ClutterDensity {
     ) {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
-        let known = prior_terms.known.as_ref();
+        let known = prior_terms.known.as_ref().filter(|_| self.with(SearchMechanism::ClumpedClutter));
         let clumped = known.map(|known| {
             let clumped_clutter = self.clumped_clutter.get_or_insert_with(|| ClumpedClutter::of(problem, known));
             (known, clumped_clutter.beside(&members))
@@ -87,19 +99,32 @@ impl ClutterDensity {
                 let v = mode.members[at];
                 let Correspondence { model, cloud } = graph.vertices[v];
                 let place = &problem.cloud[cloud].position.at.coords;
-                let excess = self.excess(problem, (terms, graph), v, &members);
+                let excess = match self.with(SearchMechanism::LocalDensity) {
+                    true => self.excess(problem, (terms, graph), v, &members),
+                    false => 0.0,
+                };
                 let clumped = clumped.as_ref().map(|(known, clumped)| clumped.about(known, model, place));
-                let duplicate = self.duplicate(problem, terms, graph, v, &members[..at]);
+                let duplicate = match self.with(SearchMechanism::Duplicates) {
+                    true => self.duplicate(problem, terms, graph, v, &members[..at]),
+                    false => None,
+                };
                 // Sparser clutter than the gate's counts in favour of a point, unless one of these is found.
                 [clumped, duplicate].into_iter().flatten().filter(|of| *of > 0.0).fold(excess, f64::max)
             })
             .collect();
         let mean = excess.iter().sum::<f64>() / excess.len().max(1) as f64;
         let excess = |at: usize| if at.is_multiple_of(every) { excess[at / every] } else { mean };
-        let dense: Vec<f64> =
-            (0..members.len()).map(|at| any_of(terms, graph, mode.members[at], mode, even[at]) - excess(at)).collect();
+        let gain = |at: usize| match self.with(SearchMechanism::AllCandidates) {
+            true => any_of(terms, graph, mode.members[at], mode, even[at]),
+            false => even[at],
+        };
+        let dense: Vec<f64> = (0..members.len()).map(|at| gain(at) - excess(at)).collect();
         let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_fraction[even.len()];
-        let (even, dense) = (ln_visible(&even, &terms.ln_fraction), ln_visible(&dense, &terms.ln_fraction));
+        let sum = |gains: &[f64]| match self.with(SearchMechanism::Subsets) {
+            true => ln_visible(gains, &terms.ln_fraction),
+            false => gains.iter().sum::<f64>() + terms.ln_fraction[gains.len()],
+        };
+        let (even, dense) = (sum(&even), sum(&dense));
         mode.ln_evidence = of_pose + dense;
         mode.ln_clutter_density = even - dense;
     }
@@ -115,7 +140,8 @@ impl ClutterDensity {
         let lines = self.lines.get_or_insert_with(|| Lines::of(problem, (terms, graph), members));
         let cloud = graph.vertices[v].cloud;
         let Densities { along, near, wide } = lines.density.at(cloud, |j| members.contains(&j));
-        let peak = (near / (CLUMP * wide).max(f64::MIN_POSITIVE)).clamp(1.0, PEAK);
+        let max = if self.without.contains(&SearchMechanism::ClumpPeak) { 1.0 } else { PEAK };
+        let peak = (near / (CLUMP * wide).max(f64::MIN_POSITIVE)).clamp(1.0, max);
         let density = [along, peak * RECIPROCAL * near];
         let even = even(problem, (terms, graph), &lines.density, v);
         libm::log1p(density.iter().zip(lines.fractions).map(|(density, w)| w * (density / even - 1.0)).sum())

@@ -4,7 +4,7 @@ use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{MeasuredLine, MeasuredPoint, Point};
-use seafix_referencing::{MaxPWrong, Outcome};
+use seafix_referencing::{MaxPWrong, Outcome, RigidConsensus, SearchMechanism};
 
 use super::{
     scene::{SIDES, line, point, pose, rig, within},
@@ -111,6 +111,10 @@ impl Scene {
 
 /// The numbers of frames with an answer at the limits `balanced` and `strict`.
 fn answers(scene: Scene, prior: (f64, f64), frames: usize, seed: u64) -> [usize; 2] {
+    answers_by(&RigidConsensus::default(), scene, prior, frames, seed)
+}
+
+fn answers_by(search: &RigidConsensus, scene: Scene, prior: (f64, f64), frames: usize, seed: u64) -> [usize; 2] {
     let (mut rng, rig, model) = (ChaCha8Rng::seed_from_u64(seed), rig(), model());
     let mut counts = [0; 2];
     for _ in 0..frames {
@@ -129,7 +133,7 @@ fn answers(scene: Scene, prior: (f64, f64), frames: usize, seed: u64) -> [usize;
         for _ in 0..30 {
             cloud.push(point(&rig, &(into * Point::from(centre() + within([1.0, 1.0, 0.2], &mut rng))), 0.2, &mut rng));
         }
-        let attempt = model.attempt((&cloud, &lines), &prior, &mut rng);
+        let attempt = model.attempt_by(search, (&cloud, &lines), &prior, &mut rng);
         if matches!(attempt.outcome, Outcome::Fix(_)) {
             counts[0] += 1;
             counts[1] += usize::from(attempt.p_wrong.is_none_or(|p| p <= MaxPWrong::Strict.value()));
@@ -178,5 +182,20 @@ fn print_the_answers_to_structures_with_dimensions_of_the_object() {
     {
         let [balanced, strict] = answers(scene, prior, FRAMES, 12);
         println!("{scene:?}, prior {} m: {balanced} and {strict} of {FRAMES} answered", prior.1);
+    }
+}
+
+/// What another structure of the object's kind, as a hypothesis, protects.
+#[test]
+#[ignore = "table"]
+fn print_the_answers_without_another_structure_of_the_kind() {
+    const FRAMES: usize = 300;
+    let scenes = SCENES.into_iter().chain([Scene::Longer, Scene::Mirrored]);
+    for (scene, prior) in scenes.flat_map(|scene| PRIORS.map(|prior| (scene, prior))) {
+        let counts = [vec![], vec![SearchMechanism::Resembling], vec![SearchMechanism::SecondCopies]].map(|without| {
+            let search = RigidConsensus { without, ..RigidConsensus::default() };
+            answers_by(&search, scene, prior, FRAMES, 12)
+        });
+        println!("{scene:?}, prior {} m: {counts:?} of {FRAMES} answered with, without, without copies", prior.1);
     }
 }

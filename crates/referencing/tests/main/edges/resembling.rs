@@ -5,7 +5,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{MeasuredLine, Point};
 use seafix_referencing::{
-    Edges, End, Gate, ModelEdge, Problem, RigidConsensus, Search, Tolerance, candidates, edge_candidates,
+    Edges, End, Gate, ModelEdge, Problem, RigidConsensus, Search, SearchMechanism, Tolerance, candidates,
+    edge_candidates,
 };
 
 use super::{
@@ -46,6 +47,9 @@ fn beyond(sides: &[[usize; 2]], longer: f64, sigma: f64) -> (f64, usize) {
     };
     let found = RigidConsensus::default().search(&problem, &mut rng).expect("the sides");
     let posterior = found.posterior.expect("a posterior");
+    let without = RigidConsensus { without: vec![SearchMechanism::Resembling], ..RigidConsensus::default() };
+    let plain = without.search(&problem, &mut rng).expect("the sides").posterior.expect("a posterior");
+    assert_eq!(plain.resembling, None);
     (posterior.explanations[0].ln_evidence - posterior.resembling.expect("edges"), found.edges.len())
 }
 

@@ -30,7 +30,7 @@ impl Model {
     }
 
     /// The attempt by a search and the default solver.
-    fn attempt_by(
+    pub(super) fn attempt_by(
         &self,
         search: &dyn Search,
         (cloud, lines): (&[MeasuredPoint], &[MeasuredLine]),
