@@ -198,9 +198,9 @@ fn tried(
     };
     let judged = |found: &Result<Identification, Rejected>, without: Vec<AcceptanceTest>| {
         let none = Tried { defined, p_wrong: 1.0, right: false, balanced: false };
-        let mut at_least = 0.0;
+        let mut lowest = 0.0;
         for limit in LIMITS {
-            if limit < at_least || found.is_err() {
+            if limit < lowest || found.is_err() {
                 continue;
             }
             let (max_p_wrong, without) = (MaxPWrong::Number(limit), without.clone());
@@ -211,7 +211,7 @@ fn tried(
                 let right = right(&fix.object_from_camera);
                 return Tried { defined, p_wrong, right, balanced: limit == LIMITS[0] };
             }
-            at_least = p_wrong.min(1.0);
+            lowest = p_wrong.min(1.0);
         }
         none
     };
@@ -333,7 +333,7 @@ fn what_each_mechanism_gains() {
 }
 
 /// What search and acceptance say with a mechanism left out.
-fn says(problem: &Problem<'_>, variant: Variant) -> String {
+fn answer_of(problem: &Problem<'_>, variant: Variant) -> String {
     let (mut search, mut acceptance) = (RigidConsensus::default(), Acceptance::default());
     match variant {
         Variant::Nothing => {}
@@ -387,8 +387,8 @@ fn seven(prior: Option<&Prior>, moved: impl Fn(usize, Vector3<f64>) -> Vector3<f
 fn each_mechanism_can_be_left_out() {
     let mut open: Vec<Variant> = Variant::all()[1..].to_vec();
     let mut try_on = |problem: &Problem<'_>| {
-        let full = says(problem, Variant::Nothing);
-        open.retain(|variant| says(problem, *variant) == full);
+        let full = answer_of(problem, Variant::Nothing);
+        open.retain(|variant| answer_of(problem, *variant) == full);
     };
     for (pattern, visible, seed) in [
         (ClutterPattern::Doubles, 8, 0),
@@ -409,7 +409,8 @@ fn each_mechanism_can_be_left_out() {
     let elsewhere = Transform::new(UnitQuaternion::identity(), Vector3::new(1.0, 0.0, -3.0));
     let prior = Prior { object_from_camera: elsewhere, bound: PriorBound::Box(0.1) };
     seven(Some(&prior), |_, at| at, &mut try_on);
-    // Edges, large sets, mislabelled and symmetric objects, points with faces, and displaced parts have other tests.
+    // These fixtures have no edges, no large sets, no mislabelled or symmetric objects, no points with faces and no
+    // displaced parts.
     let others = [
         Variant::Search(SearchMechanism::Resembling),
         Variant::Search(SearchMechanism::IndependentPairs),

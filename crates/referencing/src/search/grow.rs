@@ -185,16 +185,16 @@ fn grown(of: &[Correspondence], problem: &Problem<'_>, sense: Sense, pair_tests:
 
 /// Upper bound of the size of a set: the number of model points with candidates, and of candidates.
 pub(super) fn max_possible(problem: &Problem<'_>) -> usize {
-    most(&problem.candidates.lists)
+    with_candidates(&problem.candidates.lists)
 }
 
 /// [`max_possible`] for points and edges together.
 pub(super) fn max_possible_features(problem: &Problem<'_>) -> usize {
-    max_possible(problem) + most(problem.edges.candidates)
+    max_possible(problem) + with_candidates(problem.edges.candidates)
 }
 
 /// Upper bound of the number of one-to-one pairs of these candidates.
-fn most(lists: &[Vec<usize>]) -> usize {
+fn with_candidates(lists: &[Vec<usize>]) -> usize {
     let mut measured: Vec<usize> = lists.iter().flatten().copied().collect();
     measured.sort_unstable();
     measured.dedup();

@@ -5,8 +5,8 @@ use seafix_component::{counted, number};
 use seafix_geometry::Point;
 
 use super::{
-    check::{COINCIDENT, Checker, IMPOSSIBLE, suggestion},
-    check_faces,
+    check::{COINCIDENT, Checker, IMPOSSIBLE, SIGMAS, suggestion},
+    check_faces::faults_of_faces,
     edge::{End, ModelEdge},
     file::{EdgeFile, EndFile, FORMAT, FORMAT_WITH_EDGES, ObjectFile, SiteFile},
     model::ModelPoint,
@@ -151,7 +151,11 @@ fn one(
     if edge.has_place() {
         sigma(check, &edge, (length, extent), &name, &path("sigma"));
     }
-    check_faces::faces(check, &edge, points, &name, &path("faces"));
+    let [from, to] = edge.sigmas(points);
+    for (what, value, remedy) in faults_of_faces(&edge, points, SIGMAS * from.hypot(to) / length) {
+        let fault = check.at(format!("{name}: {what}"), &path("faces"));
+        check.fault(fault.value(value).remedy(remedy));
+    }
     (check.faults.len() == before).then_some(edge)
 }
 

@@ -3,7 +3,6 @@
 use seafix_component::number;
 
 use super::{
-    check::{Checker, SIGMAS},
     edge::ModelEdge,
     model::{BACK, ModelPoint},
 };
@@ -13,21 +12,23 @@ const ALONG: f64 = -BACK;
 /// The minimum sine of the angle between the two normals of an edge, one degree; a flatter ridge is no visible edge.
 const DISTINCT: f64 = 0.02;
 
-/// Adds a fault for a normal that is not at right angles to the edge, and for two normals of one plane.
+/// A fault of a face: what is wrong, the value and the remedy.
+pub(super) type FaceFault = (String, String, &'static str);
+
+/// The faults of normals that are not at right angles to the edge, and of two normals of one plane.
 ///
-/// A face contains its edge, so that its normal is at right angles to it. The tolerance is [`ALONG`], and four standard
-/// deviations of the edge's direction.
-pub(super) fn faces(check: &mut Checker<'_>, edge: &ModelEdge, points: &[ModelPoint], name: &str, path: &[&str]) {
+/// A face contains its edge, so that its normal is at right angles to it. The tolerance is [`ALONG`], and `error` (rad),
+/// that of the edge's direction.
+pub(super) fn faults_of_faces(edge: &ModelEdge, points: &[ModelPoint], error: f64) -> Vec<FaceFault> {
     let [from, to] = edge.places(points);
-    let [a, b] = edge.sigmas(points);
-    let along = to - from;
-    let allowed = ALONG + SIGMAS * a.hypot(b) / along.norm();
+    let along = (to - from).normalize();
+    let mut faults = Vec::new();
     for face in &edge.faces {
-        let cosine = face.dot(&along.normalize()).abs();
-        if cosine > allowed {
-            let fault = check.at(format!("{name}: a face normal is not at right angles to the edge"), path);
+        let cosine = face.dot(&along).abs();
+        if cosine > ALONG + error {
             let value = format!("{:?}, at {:.0}° to it", face.as_slice(), libm::acos(cosine.min(1.0)).to_degrees());
-            check.fault(fault.value(value).remedy("a face contains its edge; correct the normal or the ends"));
+            let what = "a face normal is not at right angles to the edge".to_owned();
+            faults.push((what, value, "a face contains its edge; correct the normal or the ends"));
         }
     }
     if let [one, other] = &edge.faces[..]
@@ -37,8 +38,8 @@ pub(super) fn faces(check: &mut Checker<'_>, edge: &ModelEdge, points: &[ModelPo
             true => ("equal", "give one of them, or that of the other face"),
             false => ("opposite", "correct one, or omit `faces` of a thin plate: its edge is visible from every side"),
         };
-        let fault = check.at(format!("{name}: the two face normals are {which}"), path);
-        let degrees = number(one.angle(other).to_degrees());
-        check.fault(fault.value(format!("{degrees}° between them")).remedy(remedy));
+        let value = format!("{}° between them", number(one.angle(other).to_degrees()));
+        faults.push((format!("the two face normals are {which}"), value, remedy));
     }
+    faults
 }

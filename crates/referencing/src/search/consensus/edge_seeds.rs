@@ -44,13 +44,13 @@ pub(in crate::search) fn edge_modes(joined: &Joined<'_>, known: &[Mode], work: &
     if let Some((prior, votes)) = votes.filter(|_| !peaks.is_empty()) {
         let centroid = prior.motion.apply(&joined.climb.prior_terms.centroid);
         for displacement in peaks {
-            let voters = most_precise(joined, votes.voters(joined, prior, &pairs, &displacement), MAX_VOTERS);
+            let voters = limited(joined, votes.voters(joined, prior, &pairs, &displacement), MAX_VOTERS);
             let start = prior.motion.moved(&Vector3::zeros(), &displacement, &centroid);
             grow(joined, voters, Some(start), (known, &mut found), work);
         }
     } else {
         let start = joined.climb.prior_terms.known.as_ref().map(|known| known.motion);
-        grow(joined, most_precise(joined, pairs, MAX_VERTICES), start, (known, &mut found), work);
+        grow(joined, limited(joined, pairs, MAX_VERTICES), start, (known, &mut found), work);
     }
     found
 }
@@ -135,7 +135,7 @@ fn free(joined: &Joined<'_>) -> [Vec<usize>; 2] {
 }
 
 /// At most `max` vertices of each kind, those of the greatest gain, ascending.
-fn most_precise(joined: &Joined<'_>, [mut edges, mut points]: [Vec<usize>; 2], max: usize) -> [Vec<usize>; 2] {
+fn limited(joined: &Joined<'_>, [mut edges, mut points]: [Vec<usize>; 2], max: usize) -> [Vec<usize>; 2] {
     let keep = |all: &mut Vec<usize>, gain: &dyn Fn(usize) -> f64| {
         if all.len() > max {
             all.sort_by(|&a, &b| gain(b).total_cmp(&gain(a)).then(a.cmp(&b)));

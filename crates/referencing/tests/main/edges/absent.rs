@@ -79,14 +79,14 @@ impl Scene {
                 own.iter().map(|ends| ends.map(cast)).filter(|[from, to]| (to - from).norm() > 0.05).collect()
             }
             Self::Longer => {
-                let stretch = |(along, from): (Vector3<f64>, Vector3<f64>), by: f64| {
+                let lengthen = |(along, from): (Vector3<f64>, Vector3<f64>), by: f64| {
                     move |at: Vector3<f64>| at + along * ((at - from).dot(&along) * by)
                 };
                 let boxes = own.chunks(9).flat_map(|sides| {
                     let [from, to] = sides[0];
                     let by = if rng.random() { rng.random_range(0.1..0.5) } else { rng.random_range(-0.4..-0.1) };
-                    let stretch = stretch(((to - from).normalize(), from), by);
-                    sides.iter().map(move |ends| ends.map(stretch))
+                    let lengthen = lengthen(((to - from).normalize(), from), by);
+                    sides.iter().map(move |ends| ends.map(lengthen))
                 });
                 boxes.collect()
             }
