@@ -311,7 +311,8 @@ impl Search for RigidConsensus {
                 // A structure of the object's kind beside the object is no second object.
                 let climb = Climb::new(problem.model, parts, &none);
                 let joined = Joined { climb: &climb, edges, taken: &none };
-                for mode in beside.modes.iter_mut().filter(|mode| mode.ln_evidence >= floor) {
+                let compared = |mode: &&mut Mode| with(SearchMechanism::Resembling) && mode.ln_evidence >= floor;
+                for mode in beside.modes.iter_mut().filter(compared) {
                     mode.ln_evidence -= resembling::ln_evidence(&joined, mode).unwrap_or(0.0).max(0.0);
                 }
                 beside.modes.retain(|mode| mode.ln_evidence >= floor);

@@ -18,9 +18,10 @@ const SIGMAS: f64 = 4.0;
 const FOLLOWED: usize = 100;
 const FRUITLESS: usize = 30;
 /// Evidence (nats) below the best at which an ascent ends early.
-const HOPELESS: f64 = 20.0;
-/// Maximum number of vertices of each kind in the graph about the prior, and in one about a displacement of it.
+pub(super) const HOPELESS: f64 = 20.0;
+/// Maximum number of vertices of each kind in the graph about the prior.
 const MAX_VERTICES: usize = 320;
+/// The same in a graph about a displacement of the prior; its time is quadratic. Tried on two problems of 120 and 300 edges.
 const MAX_VOTERS: usize = 1000;
 
 /// A vertex of the common graph: a pair of edges or a pair of points.

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Gate of a pair about its place under the pose (χ²₄).
-const FAR: f64 = 28.0;
+pub(super) const FAR: f64 = 28.0;
 /// Gate (χ²₄) of the area about a predicted edge in which lines are counted.
 const COUNTED: f64 = 13.28;
 

@@ -7,13 +7,14 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix4, MatrixXx4, RowVector3, Vector
 use seafix_geometry::so3::skew;
 
 use super::{
-    edge_terms::Placed, fractions::ln_fraction, gaussian::half_ln_det, joined::Joined, likelihood::Mode,
+    edge_terms::{FAR, Placed},
+    fractions::ln_fraction,
+    gaussian::half_ln_det,
+    joined::Joined,
+    likelihood::Mode,
     wireframe::Wireframe,
 };
 use crate::space_line::LineOffset;
-
-/// Gate (χ²₄) of a further line about its place in the structure.
-const FAR: f64 = 28.0;
 
 /// The derivatives of some residuals, each by its parameters: pose (rotation, translation), then places of vertices.
 pub(super) type Rows = Vec<Vec<(usize, f64)>>;

@@ -24,9 +24,9 @@ use super::{
 /// Λ = ∫∫ p(T) p(c) B(k) Π N(r(T, c); 0, S)/ρ dc dT
 ///
 /// lacks the factor s/σ of each dimension that the features measure, but it has the lines that the object leaves
-/// unexplained and a structure of other dimensions explains ([`Redrawn::ln_evidence_of_further_lines`]). Points apart from the wireframe are
-/// clutter. If rounding hides the dimensions, it is the evidence of the mode itself. `None` for a mode without edges, or
-/// without a prior.
+/// unexplained and a structure of other dimensions explains ([`Redrawn::ln_evidence_of_further_lines`]). Points apart from
+/// the wireframe are clutter. If rounding hides the dimensions, it is the evidence of the mode itself. `None` for a mode
+/// without edges, or without a prior.
 pub(in crate::search) fn ln_evidence(joined: &Joined<'_>, mode: &Mode) -> Option<f64> {
     let prior_terms = joined.climb.prior_terms;
     let known = prior_terms.known.as_ref().filter(|_| !mode.edges.is_empty())?;

@@ -2,19 +2,18 @@
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-use super::{joined::Joined, likelihood::Mode, motion::Motion};
+use super::{edge_seeds::HOPELESS, joined::Joined, likelihood::Mode, motion::Motion};
 
 /// Standard deviations of the prior's attitude within which a turn is possible.
 const SIGMAS: f64 = 5.0;
-/// Evidence (nats) below the mode at which an ascent ends early.
-const HOPELESS: f64 = 20.0;
 /// Maximum cosine of two directions that count as at right angles.
 const ACROSS: f64 = 0.1;
 
 /// The modes near a mode turned by 90°, 180° and 270° about the directions of its edges.
 ///
 /// A plain box has four attitudes, and a square one eight or 24. A narrow prior excludes all but one; under a wide one,
-/// an ascent from the prior's attitude reaches only the nearest. The turns are about the middle of the edges.
+/// an ascent from the prior's attitude reaches only the nearest. The turns are about the middle of the edges; two turns in
+/// succession are not tried.
 pub(in crate::search) fn turned(joined: &Joined<'_>, mode: &Mode) -> Vec<Mode> {
     let edges = joined.edges;
     let Some(known) = &joined.climb.prior_terms.known else { return Vec::new() };

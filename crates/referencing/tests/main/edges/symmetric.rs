@@ -9,7 +9,7 @@ use seafix_referencing::{
 };
 
 use super::{
-    planted::searches,
+    planted::{edge, searches},
     scene::{SIDES, corner, line, normal3, point, pose, rig},
 };
 
@@ -51,15 +51,7 @@ fn a_plain_box_without_a_prior_gets_no_fix() {
 #[test]
 fn a_plain_box_of_edges_under_a_wide_prior_gets_no_fix() {
     let rig = rig();
-    let edges: Vec<ModelEdge> = SIDES
-        .iter()
-        .map(|ends| ModelEdge {
-            id: format!("{ends:?}"),
-            ends: ends.map(|end| End::At(corner(end).into())),
-            sigma: 5e-4,
-            faces: Vec::new(),
-        })
-        .collect();
+    let edges: Vec<ModelEdge> = SIDES.iter().map(|ends| edge(ends.map(|end| End::At(corner(end).into())))).collect();
     for seed in 0..6 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = pose(2.5, 0.3 + seed as f64);
