@@ -19,8 +19,6 @@ pub enum SearchMechanism {
     AllCandidates,
     /// The sum over the subsets of a pose's pairs; all pairs are the object's.
     Subsets,
-    /// The order of poses by uniform clutter if local clutter explains every pose better.
-    LargestFirst,
     /// The continuation of a pattern that the object repeats, and its shifts.
     Pattern,
     /// The search for shifts of the object within its pattern.
@@ -41,14 +39,13 @@ pub enum SearchMechanism {
 
 impl SearchMechanism {
     /// All mechanisms.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 14] = [
         Self::ClumpedClutter,
         Self::LocalDensity,
         Self::ClumpPeak,
         Self::Duplicates,
         Self::AllCandidates,
         Self::Subsets,
-        Self::LargestFirst,
         Self::Pattern,
         Self::PatternShifts,
         Self::Mirror,

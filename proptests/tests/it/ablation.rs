@@ -152,9 +152,6 @@ impl Variant {
             | SearchMechanism::Duplicates
             | SearchMechanism::AllCandidates
             | SearchMechanism::Subsets => posterior.is_some(),
-            SearchMechanism::LargestFirst => {
-                posterior.is_some_and(|posterior| posterior.explanations.first().is_some_and(|of| of.ln_evidence < 0.0))
-            }
             SearchMechanism::Pattern | SearchMechanism::PatternShifts => {
                 posterior.is_some_and(|posterior| posterior.pattern_alone.is_some())
                     || matches!(full, Err(Rejected::Mirrored { .. }))

@@ -147,7 +147,7 @@ pub enum Rejected {
         edges: usize,
     },
     /// The largest coherent set is too small.
-    #[error("no consensus: the largest coherent set has {}; {needed} are needed", counted(*.best, "point"))]
+    #[error("no consensus: the largest coherent set has {}; {needed} are needed", counted(*.best, "feature"))]
     NoConsensus {
         /// Size of the largest set.
         best: usize,
@@ -157,7 +157,7 @@ pub enum Rejected {
     /// The budget was spent before the search could answer.
     #[error(
         "search incomplete: the budget of {budget} pair tests or equivalent work is spent; best set so far {}, upper bound {bound}",
-        counted(*.best, "point")
+        counted(*.best, "feature")
     )]
     Budget {
         /// The budget (pair tests, or the unit that the search counts in their place).
@@ -203,7 +203,7 @@ pub enum Rejected {
     #[error("no prior pose: this search starts from one")]
     NoPrior,
     /// Only mirror images of the model were found.
-    #[error("mirror image of the model: {} set has {best} points and is reflected", if *proved { "the largest coherent" } else { "the best known" })]
+    #[error("mirror image of the model: {} set has {best} features and is reflected", if *proved { "the largest coherent" } else { "the best known" })]
     Mirrored {
         /// Size of the mirror image.
         best: usize,

@@ -130,7 +130,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 11;
+    const VERSION: u32 = 12;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -256,9 +256,6 @@ impl Search for RigidConsensus {
         swept.modes.truncate(MAX_COMPARED);
         if !large {
             weighted(&mut swept);
-            if with(SearchMechanism::LargestFirst) {
-                largest_evidence_first(&mut swept.modes);
-            }
         }
         let continued =
             pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
@@ -431,18 +428,6 @@ fn with_edges(
     let found = edge_modes(&joined, &upgraded, &mut swept.pair_tests);
     swept.insert(upgraded);
     swept.insert(found);
-}
-
-/// Moves the mode of greatest evidence under uniform clutter to the front if local clutter explains every mode better.
-///
-/// None of them is accepted by its evidence then. The largest set has most to lose to clutter, and a small accidental
-/// one that loses little is no better pose.
-fn largest_evidence_first(modes: &mut [Mode]) {
-    if modes.first().is_none_or(|best| best.ln_evidence >= 0.0) {
-        return;
-    }
-    let best = (0..modes.len()).max_by(|&a, &b| modes[a].ln_even.total_cmp(&modes[b].ln_even).then(b.cmp(&a)));
-    modes[..=best.unwrap_or(0)].rotate_right(1);
 }
 
 #[cfg(test)]

@@ -38,10 +38,12 @@ impl Pattern {
         };
         let (first, half) = (of(mode), mode.members.len() / 2);
         let evidence = mode.ln_evidence.max(first.around);
-        let comparable = |shifted: &Mode| {
+        let comparable = |shifted: &Mode, by: &Vector3<f64>| {
             let other = of(shifted);
             shifted.ln_evidence.max(other.around) >= evidence - MARGIN
-                || first.continues && shifted.members.len() > half && other.against(&first) >= -MARGIN
+                || shifted.members.len() > half
+                    && other.against(&first) >= -MARGIN
+                    && self.goes_on_to(problem, parts, mode, by)
         };
         let mut found = Vec::new();
         let mut known: BTreeSet<[i32; 3]> = BTreeSet::from([[0; 3]]);
@@ -55,7 +57,7 @@ impl Pattern {
                 }
                 let by = self.basis.iter().zip(to).map(|(step, times)| step * f64::from(times)).sum::<Vector3<f64>>();
                 let start = Motion { translation: mode.motion.apply(&by), ..mode.motion };
-                let Some(shifted) = near(&start).filter(&comparable) else { continue };
+                let Some(shifted) = near(&start).filter(|shifted| comparable(shifted, &by)) else { continue };
                 // A weak shift slides back to the place of a neighbour.
                 if found.iter().chain([mode]).all(|other: &Mode| other.members != shifted.members) {
                     found.push(shifted);

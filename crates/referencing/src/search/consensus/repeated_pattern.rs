@@ -30,8 +30,8 @@ const MIN_STEP: f64 = 3.0;
 const TELLING: usize = 3;
 /// Maximum number of shifts whose places are compared.
 const MAX_REGION: usize = 64;
-/// Evidence (nats) that a pattern ends at the object, above which a complete identification decides between its shifts;
-/// the margin of the search.
+/// Evidence (nats) that a pattern ends at one side of the object, above which a complete identification decides against
+/// the shifts to this side; the margin of the search.
 const ENDS: f64 = 10.0;
 /// Sine of the angle between two steps below which they are one direction.
 const SAME: f64 = 0.3;
@@ -69,8 +69,6 @@ pub(in crate::search) struct Continued {
     ln_prior: f64,
     /// Whether the pose identifies a point outside the pattern.
     identifies: bool,
-    /// Whether the cloud shows the pattern beyond the object, and no complete identification shows that it ends there.
-    pub(super) continues: bool,
 }
 
 impl Continued {
@@ -178,26 +176,71 @@ impl Pattern {
             let (less, more) =
                 if around < mode.ln_evidence { (around, mode.ln_evidence) } else { (mode.ln_evidence, around) };
             mode.ln_evidence = more + libm::log1p(libm::exp(less - more));
-            (mode, continued, shifts[at].is_some())
+            (mode, continued, shifts[at])
         };
-        let mut ranked: Vec<(Mode, Continued, bool)> = modes.drain(..).enumerate().map(add).collect();
+        let mut ranked: Vec<(Mode, Continued, Option<Vector3<f64>>)> = modes.drain(..).enumerate().map(add).collect();
         let by_evidence =
             |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
         ranked.sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
-        if let Some((best, of_best, true)) = ranked.first()
-            && of_best.continues
-        {
-            let (ln_evidence, of_best) = (best.ln_evidence, *of_best);
-            for (other, continued, _) in ranked.iter_mut().filter(|(.., shifted)| *shifted) {
-                // Not above the best: only evidence decides which of them is the first.
-                let equal = ln_evidence + continued.against(&of_best).min(0.0);
-                other.ln_evidence = other.ln_evidence.max(equal);
+        if let Some(((best, of_best, Some(own)), others)) = ranked.split_first_mut() {
+            for (other, continued, shift) in others.iter_mut() {
+                let Some(shift) = shift else { continue };
+                if self.goes_on_to(problem, parts, best, &(*shift - *own)) {
+                    other.ln_evidence = other.ln_evidence.max(best.ln_evidence + continued.against(of_best));
+                }
             }
-            ranked[1..].sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
+            ranked.sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
         }
         let of_best = ranked.first().map(|(_, continued, _)| *continued);
         modes.extend(ranked.into_iter().map(|(mode, ..)| mode));
         of_best
+    }
+
+    /// Whether the cloud shows the pattern where the object would be at this shift from the pose of a mode.
+    ///
+    /// A complete identification with few of these places seen shows that the pattern ends there. What lies on the other
+    /// sides of the object says nothing: a board with a border continues on the sides from which a shifted pose came.
+    pub(super) fn goes_on_to(
+        &self,
+        problem: &Problem<'_>,
+        (terms, _, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        mode: &Mode,
+        shift: &Vector3<f64>,
+    ) -> bool {
+        let own = |place: &Vector3<f64>| self.at.iter().any(|known| (known - place).norm() <= 2.0 * self.off);
+        let places: Vec<Vector3<f64>> = self.at.iter().map(|place| place + shift).filter(|place| !own(place)).collect();
+        let (further, _) = self.seen_at(problem, (terms, graph), mode, &places);
+        let (all, n) = (self.at.len(), places.len());
+        let seen = mode.members.iter().filter(|v| self.repeats[graph.vertices[**v].model]).count();
+        let ln_ends = ln_fraction(seen, all) + ln_fraction(further, n) - ln_fraction(seen + further, all + n);
+        further > 0 && !(seen == all && ln_ends >= ENDS)
+    }
+
+    /// The number of these places (object frame) at which the cloud has a point that no pair of the mode uses, and the
+    /// sum of their evidence against clutter (nats).
+    fn seen_at(
+        &self,
+        problem: &Problem<'_>,
+        (terms, graph): (&Terms, &ConsistencyGraph),
+        mode: &Mode,
+        places: &[Vector3<f64>],
+    ) -> (usize, f64) {
+        let of_pattern = || mode.members.iter().filter(|v| self.repeats[graph.vertices[**v].model]);
+        let ln_clutter = of_pattern().map(|&v| terms.ln_density_about(v, graph.vertices[v].model)).sum::<f64>()
+            / of_pattern().count().max(1) as f64;
+        let mut taken = vec![false; problem.cloud.len()];
+        mode.members.iter().for_each(|&v| taken[graph.vertices[v].cloud] = true);
+        let (mut further, mut gains) = (0, 0.0);
+        for place in places.iter().map(|place| mode.motion.apply(place)) {
+            let free = problem.cloud.iter().zip(&taken).filter(|(_, taken)| !**taken);
+            let gain = free
+                .filter_map(|(point, _)| ln_measured(&point.position, &place))
+                .map(|ln_density| ln_density - ln_clutter)
+                .fold(0.0, f64::max);
+            gains += gain;
+            further += usize::from(gain > 0.0);
+        }
+        (further, gains)
     }
 
     /// The shift of each mode from the first, if it is one: the same attitude, and a step onto the pattern itself.
@@ -261,20 +304,7 @@ impl Pattern {
         let own = points + by_edges.all - by_edges.repeated;
         let (n, all) = (self.repeats.len(), self.repeats.iter().filter(|&&repeats| repeats).count());
         let (k, seen) = (mode.members.len(), of_pattern.len());
-        let ln_clutter = of_pattern.iter().map(|&v| terms.ln_density_about(v, graph.vertices[v].model)).sum::<f64>()
-            / seen.max(1) as f64;
-        let (mut further, mut gains) = (0, 0.0);
-        let mut taken = vec![false; problem.cloud.len()];
-        mode.members.iter().for_each(|&v| taken[graph.vertices[v].cloud] = true);
-        for place in beyond.iter().map(|place| mode.motion.apply(place)) {
-            let free = problem.cloud.iter().zip(&taken).filter(|(_, taken)| !**taken);
-            let gain = free
-                .filter_map(|(point, _)| ln_measured(&point.position, &place))
-                .map(|ln_density| ln_density - ln_clutter)
-                .fold(0.0, f64::max);
-            gains += gain;
-            further += usize::from(gain > 0.0);
-        }
+        let (further, gains) = self.seen_at(problem, (terms, graph), mode, beyond);
         let beyond = beyond.len();
         let shown = mode.ln_evidence - ln_fraction(k, n) - own;
         let goes_on = gains + ln_fraction(seen + further, all + beyond);
@@ -290,9 +320,7 @@ impl Pattern {
         let in_blocks = of_points - ln_fraction(k, n) + ln_fraction(k - seen, n - all) + gains + by_edges.distinctive;
         let ln_prior = prior_terms.known.as_ref().map_or(0.0, |_| prior_terms.ln_density(&mode.motion));
         let ln_prior = ln_prior + by_edges.distinctive;
-        let ln_ends = ln_fraction(seen, all) + ln_fraction(further, beyond) - ln_fraction(seen + further, all + beyond);
-        let continues = further > 0 && !(seen == all && ln_ends >= ENDS);
-        Continued { alone: another, shifted, around, in_blocks, ln_prior, identifies: k > seen, continues }
+        Continued { alone: another, shifted, around, in_blocks, ln_prior, identifies: k > seen }
     }
 }
 

@@ -1,7 +1,6 @@
 //! Tests of the search on six points.
 
 use super::*;
-use crate::search::consensus::motion::Motion;
 use crate::{
     candidates::Candidates,
     problem::{Prior, PriorBound, Tolerance},
@@ -80,27 +79,6 @@ fn a_mirror_image_is_no_explanation() {
     let reflected = |i: usize| Vector3::new(0.0, 0.0, -2.0 * PLACES[i][2]);
     let size = answered(None, reflected).map_or(0, |found| found.pairs.len());
     assert!(size <= 3, "{size} points of a mirror image");
-}
-
-/// Fails if the order by local clutter stands although it explains every mode better.
-#[test]
-fn the_largest_set_comes_first_if_clutter_explains_all() {
-    let motion = Motion { rotation: nalgebra::Matrix3::identity(), translation: Vector3::zeros() };
-    let mode = |of: usize, ln_evidence: f64, ln_even: f64| Mode {
-        members: vec![of],
-        edges: Vec::new(),
-        motion,
-        ln_evidence,
-        ln_even,
-        ln_clutter_density: ln_even - ln_evidence,
-    };
-    let first = |evidence: f64| {
-        let mut modes = [mode(0, evidence, 9.0), mode(1, -20.0, 70.0), mode(2, -30.0, 300.0), mode(3, -40.0, 20.0)];
-        largest_evidence_first(&mut modes);
-        modes.map(|mode| mode.members[0])
-    };
-    assert_eq!((first(-3.0), first(0.0)), ([2, 0, 1, 3], [0, 1, 2, 3]));
-    largest_evidence_first(&mut []);
 }
 
 /// A plane of forty points with errors across it in model and cloud: its mirror image fits as well, half of the time
