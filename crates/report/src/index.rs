@@ -5,6 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use seafix_component::Ownership;
+
 use crate::{
     content::{self, Authored},
     error::ReportError,
@@ -38,6 +40,45 @@ pub fn claim_index(folder: &Path) -> Result<(), ReportError> {
 pub fn index<'a>(findings: impl IntoIterator<Item = &'a str>, folder: &Path) -> Result<PathBuf, ReportError> {
     claim_index(folder)?;
     write(folder, NAME, text(findings).as_bytes())
+}
+
+/// Replaces the sections of these reports in the page `README.md` of `folder`; all else stays. The result are the reports
+/// without a section: they are not added, because a complete list alone gives the order.
+///
+/// A folder without the page stays without it, and a page in a folder that is not claimed stays as it is.
+///
+/// # Errors
+/// [`ReportError`] when the page cannot be read or written.
+pub fn update_index<'a>(
+    findings: impl IntoIterator<Item = &'a str>,
+    folder: &Path,
+) -> Result<Vec<String>, ReportError> {
+    let path = folder.join(NAME);
+    if !path.exists() || !matches!(Ownership::of(folder, KIND)?, Ownership::Ours(_)) {
+        return Ok(Vec::new());
+    }
+    let io = |source| ReportError::Io { doing: "read", path: path.clone(), source };
+    let mut page = fs::read_to_string(&path).map_err(io)?;
+    let mut without = Vec::new();
+    for fresh in findings {
+        match section_of(&page, fresh) {
+            Some(section) => page.replace_range(section, fresh),
+            None => without.push(fresh.trim_start().lines().next().unwrap_or_default().replace("## ", "")),
+        }
+    }
+    write(folder, NAME, page.as_bytes())?;
+    Ok(without)
+}
+
+/// The range of the section with the heading of `fresh`: from the empty line before it to its line of links.
+fn section_of(page: &str, fresh: &str) -> Option<std::ops::Range<usize>> {
+    let heading = format!("\n{}\n", fresh.trim_start().lines().next()?);
+    let start = page.find(&heading)?;
+    let links = start + page[start..].find("\n[Report](")? + 1;
+    let end = links + page[links..].find('\n')? + 1;
+    // The links of another section end this one.
+    let other = page[start + heading.len()..].find("\n## ").is_some_and(|next| start + heading.len() + next < links);
+    (!other).then_some(start..end)
 }
 
 /// Whether `README.md` in `folder` has exactly these findings and the version of the program.

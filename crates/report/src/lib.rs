@@ -60,7 +60,7 @@ pub use answer::{Answer, AnswerError};
 pub use compare::{Compared, compare};
 pub use error::ReportError;
 pub use forms::Forms;
-pub use index::{claim_index, index, index_holds};
+pub use index::{claim_index, index, index_holds, update_index};
 pub use summary::{Distribution, Limits, Row, RunSummary, StageTimeSummary};
 pub use verify::{Mismatch, Verified, verify, verify_answered};
 pub use write::{Prepared, Report, prepare, report};

@@ -9,7 +9,7 @@ use clap::Args;
 use rayon::prelude::*;
 use seafix_component::counted;
 use seafix_experiment::{Existing, Options, Remade, RunError, kept_identity, remake, run};
-use seafix_report::{Forms, Prepared, Report, claim_index, index, index_holds, prepare, verify_answered};
+use seafix_report::{Forms, Prepared, Report, claim_index, index, index_holds, prepare, update_index, verify_answered};
 
 use super::report::{failure, verified};
 use crate::{
@@ -32,7 +32,7 @@ pub(crate) struct Publish {
     /// The folder of the kept runs, one folder each.
     #[arg(long, default_value = "runs/reports")]
     runs: PathBuf,
-    /// Publish only the experiments of these names; README.md does not change.
+    /// Publish only the experiments of these names; the rest of README.md stays.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
     /// Write nothing: compute every printed number again from the logs of the kept runs, and list differences.
@@ -75,10 +75,15 @@ impl Publish {
         let written = list.iter().zip(prepared).map(|(one, report)| report.write(&self.out.join(&one.name)));
         let written: Vec<Report> = written.collect::<Result<_, _>>().map_err(failure)?;
         written.iter().for_each(|report| notify(&format!("report: {}", report.page.display())));
+        let findings = written.iter().map(|report| report.findings.as_str());
         if self.only.is_empty() {
             self.distinguish_others(&list);
-            let page = index(written.iter().map(|report| report.findings.as_str()), &self.out).map_err(failure)?;
+            let page = index(findings, &self.out).map_err(failure)?;
             print(&format!("{}\n", page.display()))?;
+        } else {
+            for name in update_index(findings, &self.out).map_err(failure)? {
+                notify(&format!("{name}: no section in README.md; a complete publication adds it"));
+            }
         }
         Ok(DONE)
     }

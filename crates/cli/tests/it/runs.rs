@@ -269,6 +269,17 @@ fn a_list_of_experiments_is_published_again_to_the_last_byte() {
     assert!(code == 3 && out.contains("1 of 2 reports") && error.contains("reports/a/report.html"), "{out}{error}");
     fs::rename(folder.join("a-away"), folder.join("reports/a")).unwrap();
 
+    // A single report renews its own section of the page.
+    let page = folder.join("reports/README.md");
+    let a_lost = text("README.md").replace("(a/main.svg)", "");
+    let own = "\nWords of a person.\n\n### A chapter\n";
+    fs::write(&page, a_lost.replace("(b/main.svg)", "") + own).unwrap();
+    assert_eq!(publish(&["--only", "b"]).0, 0);
+    assert_eq!(fs::read_to_string(&page).unwrap(), a_lost.clone() + own);
+    fs::write(&page, &a_lost[..a_lost.find("\n## b\n").unwrap()]).unwrap();
+    let (code, _, error) = publish(&["--only", "b"]);
+    assert!(code == 0 && error.contains("b: no section in README.md"), "{error}");
+
     let (code, _, error) = publish(&["--only", "c"]);
     assert!(code == 2 && error.contains("no experiment `c` in list.toml; it has a, b"), "{error}");
     let (code, out, _) = seafix(folder, &["check", "list.toml"]);
