@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use cpu_time::ThreadTime;
-use seafix::{Pipeline, Rig, StereoImages, component::Choice, vision::LineOutput, vision::SEGMENT_DETECTORS};
+use seafix::{PipelineSettings, Rig, StereoImages, component::Choice, vision::LineOutput, vision::SEGMENT_DETECTORS};
 
 /// Number of turns of each pair.
 const TURNS: usize = 9;
@@ -34,9 +34,9 @@ fn main() {
 fn measure(folder: &Path) {
     let rig = Rig::from_file(folder.join("dataset.toml")).expect("a dataset.toml with a rig");
     let pairs = pairs(folder, &rig);
-    let default = Pipeline::default();
+    let default = PipelineSettings::default();
     for name in SEGMENT_DETECTORS.names() {
-        let pipeline = Pipeline { segment_detector: Choice::named(name), ..default.clone() };
+        let pipeline = PipelineSettings { segment_detector: Choice::named(name), ..default.clone() };
         let front_end = pipeline.line_front_end().expect("valid defaults");
         let mut output = LineOutput::default();
         let (mut detection, mut minima, mut all) = (0.0, Vec::new(), Vec::new());

@@ -97,7 +97,8 @@ def drawn(folder, grain):
 
 
 def logged(run):
-    """The half-points (px) of the lines that both cameras measured, as Seafix logs them: n × 2 × 2 by frame and side."""
+    """The half-points (px) of the lines that both cameras measured, and their stated standard deviations (px), as Seafix
+    logs them: arrays n × 2 × 2 and n × 2 for each side, by frame."""
     from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
 
@@ -107,9 +108,9 @@ def logged(run):
             reader = make_reader(log, decoder_factories=[DecoderFactory()])
             for message in reader.iter_decoded_messages(topics=["/referencing/frame"]):
                 frame = message[3]
-                lines = [[[o.u, o.v] for o in line.offsets] for line in frame.lines if len(line.offsets) == 4]
-                both = np.array(lines, float).reshape(-1, 4, 2)
-                found[frame.frame] = [both[:, :2], both[:, 2:]]
+                lines = [[[o.u, o.v, o.sigma] for o in line.offsets] for line in frame.lines if len(line.offsets) == 4]
+                both = np.array(lines, float).reshape(-1, 4, 3)
+                found[frame.frame] = [(part[..., :2], part[..., 2]) for part in (both[:, :2], both[:, 2:])]
     return found
 
 
@@ -142,7 +143,7 @@ def half_planes(seafix, folder):
             for frame, sides in lines.items():
                 for side in (0, 1):
                     _, normal, distance = images[2 * frame + side]
-                    best = max(sides[side], key=lambda h: np.linalg.norm(h[1] - h[0]), default=None)
+                    best = max(sides[side][0], key=lambda h: np.linalg.norm(h[1] - h[0]), default=None)
                     if best is not None:
                         found += 1
                         errors.extend(best @ normal - distance)
@@ -170,7 +171,7 @@ def projected(camera, pose, ends):
 
 
 def belonging(edge, halves):
-    """The errors of the two offsets of the longest segment that lies on the edge, or `None`."""
+    """The longest segment that lies on the edge, and the errors (px) of its two offsets, or `None`."""
     if not len(halves):
         return None
     along = (edge[1] - edge[0]) / np.linalg.norm(edge[1] - edge[0])
@@ -181,7 +182,8 @@ def belonging(edge, halves):
     turn = np.abs(step @ normal) / np.maximum(length, 1e-9)
     inside = (place.min(1) > 0) & (place.max(1) < np.linalg.norm(edge[1] - edge[0]))
     fits = (np.abs(off).max(1) < NEAR) & (turn < math.sin(PARALLEL)) & inside & (length * math.sqrt(3) >= LENGTH / 2)
-    return off[np.argmax(np.where(fits, length, -1))] if fits.any() else None
+    longest = np.argmax(np.where(fits, length, -1))
+    return (longest, off[longest]) if fits.any() else None
 
 
 def edges_of(dataset, stamp):
@@ -198,9 +200,10 @@ def edges_of(dataset, stamp):
 
 def images(seafix, source, folder):
     dataset = data.Dataset(data.variant(source, folder / "data"))
-    run = data.run(seafix, dataset.folder, folder / "run")
+    # The images have no calibration error: without its allowance the stated deviation is that of the fit.
+    run = data.run(seafix, dataset.folder, folder / "run", "--set", "pipeline.triangulator.calibration-px=0")
     lines = logged(run)
-    errors, count = {name: {} for name in [*SETTINGS, "Seafix"]}, 0
+    errors, stated, count = {name: {} for name in [*SETTINGS, "Seafix"]}, {}, 0
     times = {name: [] for name in SETTINGS}
     for number, frame in enumerate(dataset.frames):
         shot = [cv2.imread(str(dataset.folder / frame[side]), cv2.IMREAD_GRAYSCALE) for side in ("left", "right")]
@@ -211,13 +214,15 @@ def images(seafix, source, folder):
                 times[name].append(took)
                 segments[name, side] = np.array([half_points(*s) for s in found]).reshape(-1, 2, 2)
         for side in (0, 1):
-            segments["Seafix", side] = lines[number][side] if number in lines else np.zeros((0, 2, 2))
+            segments["Seafix", side] = lines[number][side][0] if number in lines else np.zeros((0, 2, 2))
         for key, (side, edge) in enumerate(edges_of(dataset, int(frame["stamp_ns"]))):
             count += 1
             for name in errors:
-                off = belonging(edge, segments[name, side])
-                if off is not None:
-                    errors[name][number, key] = off
+                belongs = belonging(edge, segments[name, side])
+                if belongs is not None:
+                    errors[name][number, key] = belongs[1]
+                    if name == "Seafix":
+                        stated[number, key] = lines[number][side][1][belongs[0]]
     common = set.intersection(*(set(found) for found in errors.values()))
     print(f"\n{Path(source).resolve().name}: {2 * len(dataset.frames)} images, {count} edges in them, hidden ones included; ")
     print(f"{len(common)} found by all. Offsets of these in px:\n")
@@ -225,6 +230,11 @@ def images(seafix, source, folder):
     for name, found in errors.items():
         ms = f"{statistics.median(times[name]):.1f}" if name in times else "–"
         print(f"| {name} | {len(found)} | {summary([e for key in common for e in found[key]])} | {ms} |")
+    for name, keys in (("common", common), ("all found", set(stated))):
+        sigma = np.array([s for key in keys for s in stated[key]])
+        ratio = np.array([e for key in keys for e in errors["Seafix"][key]]) / sigma
+        print(f"\nSeafix, {name}: stated deviation {np.median(sigma):.4f} px (median of {len(sigma)} offsets); errors divided by it: ")
+        print(f"{1.4826 * np.median(np.abs(ratio)):.3f} (1.48 × median), {100 * (np.abs(ratio) > 3).mean():.1f} % above 3")
 
 
 def compare(seafix, sources, folder):
