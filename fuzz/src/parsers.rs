@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use seafix::{Pipeline, Rig};
+use seafix::{PipelineSettings, Rig};
 use seafix_component::{Choice, Marker, Ownership, read_text};
 use seafix_data::{
     ModelByHand,
@@ -194,7 +194,7 @@ fn marks(folder: &Path) {
     };
     if let (Ok(left), Ok(right)) = (image(0), image(11))
         && let Ok(rig) = Rig::from_file(folder)
-        && let Ok(front_end) = Pipeline::default().front_end()
+        && let Ok(front_end) = PipelineSettings::default().front_end()
         && let Ok(text) = read_text(&file)
     {
         let object = "marked".to_owned();

@@ -61,7 +61,7 @@ impl Localizer {
             None => String::new(),
             Some(given) => settings_text(py, given)?,
         };
-        let pipeline: seafix::Pipeline = toml::from_str(&text).map_err(|error| {
+        let pipeline: seafix::PipelineSettings = toml::from_str(&text).map_err(|error| {
             stated(py, "settings", &format!("cannot read the settings: {}", error.to_string().trim_end()))
         })?;
         let built = detached(py, || seafix::Localizer::with_pipeline(&site.inner, &rig.inner, &pipeline))?;

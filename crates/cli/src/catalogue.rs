@@ -6,7 +6,7 @@ use seafix_experiment::components;
 /// A kind of component with its names and components.
 pub(crate) struct Kind {
     pub(crate) singular: &'static str,
-    pub(crate) plural: &'static str,
+    pub(crate) plural: String,
     pub(crate) listings: Vec<Listing>,
 }
 
@@ -19,24 +19,11 @@ pub(crate) fn kinds() -> Vec<Kind> {
     components().into_iter().map(kind).collect()
 }
 
-fn plural(kind: &str) -> &'static str {
-    match kind {
-        "source" => "sources",
-        "filter" => "filters",
-        "detector" => "detectors",
-        "locator" => "locators",
-        "descriptor" => "descriptors",
-        "matcher" => "matchers",
-        "refinement" => "refinements",
-        "triangulator" => "triangulators",
-        "segment-detector" => "segment-detectors",
-        "segment-matcher" => "segment-matchers",
-        "search" => "searches",
-        "solver" => "solvers",
-        "odometry" => "odometries",
-        "policy" => "policies",
-        "fusion" => "fusions",
-        _ => "components",
+fn plural(kind: &str) -> String {
+    match kind.strip_suffix('y') {
+        Some(stem) => format!("{stem}ies"),
+        None if kind.ends_with("ch") => format!("{kind}es"),
+        None => format!("{kind}s"),
     }
 }
 

@@ -60,12 +60,12 @@ pub use fault::{Fault, line_at, place_at};
 pub use owned::{LOCK, MARKER, Marker, Ownership, PartialFile, create_real_folder, is_plain_name};
 pub use places::{Part, Places, line_of, place_of};
 pub use registry::{
-    BuildError, Component, Entry, Listing, Properties, Registry,
+    BuildError, Component, Components, Entry, Listing, Properties, Registry,
     added::{Added, Construct, NotAdded},
     each_invalid, in_range, inside, out_of_range, settings, take_out,
 };
 pub use seafix_derive::Settings;
-pub use settings::{Bound, Field, Form, Range, Refusals, Setting, Settings, SettingsError, SettingsTable};
+pub use settings::{Bound, Chosen, Field, Form, Range, Refusals, Setting, Settings, SettingsError, SettingsTable};
 pub use suggest::{nearest, unknown};
 pub use text::{read_long_text, read_text};
 pub use words::{counted, number, plain};

@@ -490,6 +490,39 @@ impl<T: ?Sized> Registry<T> {
     }
 }
 
+/// The part of a registry that does not depend on the trait of its components.
+pub trait Components: Sync {
+    /// As [`Registry::kind`].
+    fn kind(&self) -> &'static str;
+    /// As [`Registry::listings`].
+    fn listings(&self) -> Vec<Listing>;
+    /// As [`Registry::faults`].
+    fn faults(&self, choice: &Choice) -> Vec<BuildError>;
+    /// As [`Registry::resolve`].
+    ///
+    /// # Errors
+    /// As [`Registry::build`].
+    fn resolve(&self, choice: &Choice) -> Result<Choice, BuildError>;
+}
+
+impl<T: ?Sized> Components for Registry<T> {
+    fn kind(&self) -> &'static str {
+        self.kind()
+    }
+
+    fn listings(&self) -> Vec<Listing> {
+        self.listings()
+    }
+
+    fn faults(&self, choice: &Choice) -> Vec<BuildError> {
+        self.faults(choice)
+    }
+
+    fn resolve(&self, choice: &Choice) -> Result<Choice, BuildError> {
+        self.resolve(choice)
+    }
+}
+
 pub(crate) mod added;
 mod listing;
 #[cfg(test)]

@@ -35,11 +35,52 @@ fn implemented(input: &DeriveInput) -> Result<Tokens> {
         Data::Union(_) => return Err(Error::new_spanned(&input.ident, "a union has no settings")),
     };
     let name = &input.ident;
+    let choices = match &input.data {
+        Data::Struct(data) => choices(&data.fields, &container)?,
+        _ => Vec::new(),
+    };
+    let choices = (!choices.is_empty()).then(|| {
+        quote! {
+            fn choices(&mut self) -> Vec<::seafix_component::Chosen<'_>> {
+                let mut all = Vec::new();
+                #(#choices)*
+                all
+            }
+        }
+    });
     Ok(quote! {
         impl ::seafix_component::Settings for #name {
             fn form() -> ::seafix_component::Form { #form }
+            #choices
         }
     })
+}
+
+/// The statements that add the choices of each field to `all`.
+fn choices(fields: &Fields, container: &Container) -> Result<Vec<Tokens>> {
+    let mut statements = Vec::new();
+    for field in fields {
+        let (Some(ident), Some(kind)) = (&field.ident, kind_of(field)?) else { continue };
+        let Options { rename, .. } = Options::read(&field.attrs)?;
+        let key = rename.unwrap_or_else(|| container.fields.apply(&ident.to_string()));
+        let chosen = |place: Tokens, choice: Tokens| quote!(::seafix_component::Chosen { key: #key, kind: #kind, place: #place, choice: #choice });
+        statements.push(if field.ty.to_token_stream().to_string() == "Choice" {
+            let one = chosen(quote!(None), quote!(&mut self.#ident));
+            quote!(all.push(#one);)
+        } else {
+            let each = chosen(quote!(Some(place)), quote!(choice));
+            quote!(all.extend(self.#ident.iter_mut().enumerate().map(|(place, choice)| #each));)
+        });
+    }
+    Ok(statements)
+}
+
+/// The kind of component that a field chooses: its key, `solver`, or its singular, `filters`, unless stated.
+fn kind_of(field: &Field) -> Result<Option<String>> {
+    let written = field.ty.to_token_stream().to_string();
+    let (Some(ident), "Choice" | "Vec < Choice >") = (&field.ident, written.as_str()) else { return Ok(None) };
+    let key = Rename::Kebab.apply(&ident.to_string());
+    Ok(Some(Options::read(&field.attrs)?.component.unwrap_or_else(|| key.trim_end_matches('s').to_owned())))
 }
 
 /// The form of a table with these fields.
@@ -65,14 +106,11 @@ fn one(field: &Field, container: &Container) -> Result<Tokens> {
 /// The form of a field's value.
 fn form_of(field: &Field) -> Result<Tokens> {
     let options = Options::read(&field.attrs)?;
-    let written = field.ty.to_token_stream().to_string();
-    if let (Some(ident), "Choice" | "Vec < Choice >") = (&field.ident, written.as_str()) {
-        // The kind is the key, `solver`, or its singular, `filters`.
-        let key = Rename::Kebab.apply(&ident.to_string());
-        let kind = options.component.unwrap_or_else(|| key.trim_end_matches('s').to_owned());
+    if let Some(kind) = kind_of(field)? {
         let nameless = options.nameless;
         let choice = quote!(::seafix_component::Form::component(#kind, #nameless));
-        return Ok(if written == "Choice" { choice } else { quote!(::seafix_component::Form::list(#choice)) });
+        let single = field.ty.to_token_stream().to_string() == "Choice";
+        return Ok(if single { choice } else { quote!(::seafix_component::Form::list(#choice)) });
     }
     let of = options.form.as_ref().unwrap_or(&field.ty);
     Ok(quote!(<#of as ::seafix_component::Settings>::form()))

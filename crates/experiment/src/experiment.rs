@@ -11,7 +11,7 @@ use seafix_log::looks_like;
 use seafix_referencing::TargetKind;
 use serde::{Deserialize, Serialize};
 
-use seafix::{NavigationStack, Pipeline, PipelineError, PipelineStages};
+use seafix::{NavigationStack, Pipeline, PipelineError, PipelineSettings};
 use seafix_data::{
     dataset::hex,
     source::{SOURCES, Source},
@@ -42,7 +42,7 @@ pub struct Experiment {
     pub source: Choice,
     /// The pipeline from a sensor frame to a fix.
     #[serde(default)]
-    pub pipeline: Pipeline,
+    pub pipeline: PipelineSettings,
     /// The navigation between fixes; without it every frame is processed separately.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub navigation: Option<Navigation>,
@@ -127,7 +127,7 @@ impl Experiment {
             seed: 0,
             repetitions: 1,
             source: Choice::named("dataset").with("path", folder.to_string_lossy().into_owned()),
-            pipeline: Pipeline::default(),
+            pipeline: PipelineSettings::default(),
             navigation: None,
             log: Logging::default(),
             published: Vec::new(),
@@ -177,7 +177,7 @@ pub struct Trial {
     /// The source of the frames.
     pub source: Box<dyn Source>,
     /// The pipeline.
-    pub stages: PipelineStages,
+    pub stages: Pipeline,
     /// The navigation stack, if the experiment navigates.
     pub navigation_stack: Option<NavigationStack>,
 }

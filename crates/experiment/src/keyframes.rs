@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hmac_sha256::Hash as Sha256;
-use seafix::Keyframes;
+use seafix::KeyframeSettings;
 use seafix_component::{Fault, read_long_text};
 use seafix_data::dataset::hex;
 use seafix_navigation::PoseGraph;
@@ -13,7 +13,7 @@ const MAX: u64 = 1 << 30;
 
 /// Records the hash of the file that is read, unless the settings have one. A file that cannot be read is reported on
 /// opening.
-pub(crate) fn pin(keyframes: &mut Keyframes, folder: &Path) {
+pub(crate) fn pin(keyframes: &mut KeyframeSettings, folder: &Path) {
     if !keyframes.read.is_empty()
         && keyframes.sha256.is_empty()
         && let Ok(text) = read_long_text(&folder.join(&keyframes.read), MAX)
@@ -26,7 +26,7 @@ pub(crate) fn pin(keyframes: &mut Keyframes, folder: &Path) {
 ///
 /// # Errors
 /// A file without a valid pose graph, or with another hash than expected.
-pub(crate) fn open(keyframes: &Keyframes, folder: &Path) -> Result<Option<PoseGraph>, Fault> {
+pub(crate) fn open(keyframes: &KeyframeSettings, folder: &Path) -> Result<Option<PoseGraph>, Fault> {
     if keyframes.read.is_empty() {
         return Ok(None);
     }

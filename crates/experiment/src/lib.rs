@@ -2,7 +2,7 @@
 //!
 //! An [`Experiment`] states a question and the settings that vary. A [`Plan`] resolves it into trials. [`run`] opens
 //! the [`Source`](seafix_data::source::Source)s, processes every frame with each trial's
-//! [`Pipeline`](seafix::Pipeline), compares the result with the ground truth if there is one, and writes the log. Only
+//! [`PipelineSettings`](seafix::PipelineSettings), compares the result with the ground truth if there is one, and writes the log. Only
 //! `judge.rs` sees both results and ground truth, after the pipeline has finished.
 //!
 //! ```

@@ -1,6 +1,6 @@
 //! The `[navigation]` table of an experiment: the library's settings, and faults of the odometry.
 
-use seafix::{Keyframes, NavigationStack, PipelineError, invalid_setting};
+use seafix::{KeyframeSettings, NavigationStack, PipelineError, invalid_setting};
 use seafix_component::{Choice, Settings};
 use serde::{Deserialize, Serialize};
 
@@ -21,7 +21,7 @@ pub struct Navigation {
     pub faults: Vec<OdometryFault>,
     /// The key frames that support navigation where no object is in view; none if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose_graph: Option<Keyframes>,
+    pub pose_graph: Option<KeyframeSettings>,
 }
 
 impl Default for Navigation {

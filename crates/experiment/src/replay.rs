@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use seafix_component::{Choice, Fault, is_plain_name};
 use seafix_log::{Reader, unchanged};
 
-use seafix::Pipeline;
+use seafix::PipelineSettings;
 
 use crate::{
     experiment::{Experiment, Plan},
@@ -132,8 +132,8 @@ fn folder_of_pose_graph(experiment: &Experiment, log: &Path) -> PathBuf {
 }
 
 /// Whether all stages of the front end are the same.
-fn same_front_end(a: &Pipeline, b: &Pipeline) -> bool {
-    let frame_data = |p: &Pipeline| Pipeline {
+fn same_front_end(a: &PipelineSettings, b: &PipelineSettings) -> bool {
+    let frame_data = |p: &PipelineSettings| PipelineSettings {
         target: Default::default(),
         window: 1,
         gate: Default::default(),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use seafix::Keyframes;
+use seafix::KeyframeSettings;
 use seafix_component::{Field, Form, Settings, SettingsError, SettingsTable};
 
 use crate::{experiment::Experiment, navigation::Navigation};
@@ -21,7 +21,7 @@ fn defaults() -> toml::Table {
     let smallest: toml::Table = toml::from_str("question = 'why?'\nsource = 'virtual-points'\n").expect("two settings");
     let experiment: Experiment = smallest.try_into().expect("the required settings");
     let mut all = toml::Table::try_from(&experiment).expect("an experiment is a table of plain values");
-    let navigation = Navigation { pose_graph: Some(Keyframes::default()), ..Navigation::default() };
+    let navigation = Navigation { pose_graph: Some(KeyframeSettings::default()), ..Navigation::default() };
     let omitted = [
         ("repetitions", toml::Value::Integer(experiment.repetitions.into())),
         ("log", toml::Value::try_from(experiment.log).expect("a table")),

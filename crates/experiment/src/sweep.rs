@@ -2,7 +2,7 @@
 
 use std::{collections::HashSet, path::Path};
 
-use seafix::Pipeline;
+use seafix::PipelineSettings;
 use seafix_component::{Fault, Part, Settings};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -224,7 +224,7 @@ pub fn changed<T: Serialize + DeserializeOwned>(
 ///
 /// # Errors
 /// The invalid setting.
-pub fn changed_pipeline(pipeline: &Pipeline, settings: &[String]) -> Result<Pipeline, Vec<Fault>> {
+pub fn changed_pipeline(pipeline: &PipelineSettings, settings: &[String]) -> Result<PipelineSettings, Vec<Fault>> {
     changed(&pipeline.resolved().unwrap_or_else(|_| pipeline.clone()), "--set", settings, "detector.sigma=1.5")
 }
 

@@ -2,7 +2,7 @@
 
 use seafix_component::Fault;
 
-use crate::pipeline::PipelineError;
+use crate::pipeline_error::PipelineError;
 
 /// A request that cannot be carried out. A rejected fix is not an error but an [`Outcome`](crate::Outcome).
 #[derive(Debug, Clone, thiserror::Error)]

@@ -8,12 +8,9 @@ use seafix_referencing::{
     joint_fixes,
 };
 
-use crate::{
-    stages::{FrameResult, PipelineStages},
-    times::milliseconds,
-};
+use crate::{frame_result::FrameResult, pipeline::Pipeline, times::milliseconds};
 
-impl PipelineStages {
+impl Pipeline {
     /// The number of preceding frames that take part in a joint fix.
     pub fn window_length(&self) -> usize {
         match self.settings().target {

@@ -6,13 +6,14 @@ use seafix_navigation::{
     Displacement, Navigated, Navigator, PoseEstimate, PoseGraph, PoseGraphSettings, Recognition, RelativeMotion,
     StereoPair, Traverse,
 };
-use seafix_referencing::{SOLVERS, Target};
-use seafix_vision::{DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, Threads};
+use seafix_referencing::Target;
+use seafix_vision::Threads;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    choices,
     event::NavigationEvent,
-    pipeline::{PipelineError, faults, invalid_setting, resolve},
+    pipeline_error::{PipelineError, invalid_setting},
     places::places,
     sensor_frame::SensorFrame,
 };
@@ -20,7 +21,7 @@ use crate::{
 /// The settings of the key frames of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
-pub struct Keyframes {
+pub struct KeyframeSettings {
     /// Whether the session returns its pose graph at the end; a run writes it as `<trial>.pose-graph` into its folder.
     pub write_file: bool,
     /// The pose graph of an earlier run, relative to the experiment file; none if empty. A session of the library takes it
@@ -32,54 +33,25 @@ pub struct Keyframes {
     pub settings: PoseGraphSettings,
 }
 
-impl Keyframes {
+impl KeyframeSettings {
     /// The same settings with the defaults of all components written out.
     ///
     /// # Errors
     /// The first invalid setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
-        let r = &self.settings.recognition;
-        let recognition = Recognition {
-            filters: r.filters.iter().map(|filter| resolve(&FILTERS, filter)).collect::<Result<_, _>>()?,
-            detector: resolve(&DETECTORS, &r.detector)?,
-            locator: resolve(&LOCATORS, &r.locator)?,
-            descriptor: resolve(&DESCRIPTORS, &r.descriptor)?,
-            matcher: resolve(&MATCHERS, &r.matcher)?,
-            refinement: resolve(&REFINEMENTS, &r.refinement)?,
-            triangulator: resolve(&TRIANGULATORS, &r.triangulator)?,
-            between: resolve(&MATCHERS, &r.between)?,
-            minimal: resolve(&SOLVERS, &r.minimal)?,
-            solver: resolve(&SOLVERS, &r.solver)?,
-            ..r.clone()
-        };
+        let recognition = choices::resolved(&self.settings.recognition)?;
         Ok(Self { settings: PoseGraphSettings { recognition, ..self.settings.clone() }, ..self.clone() })
     }
 
     /// All invalid settings.
     pub fn invalid(&self) -> Vec<PipelineError> {
         let r = &self.settings.recognition;
-        let filters =
-            r.filters.iter().enumerate().map(|(k, filter)| (format!("filters.{k}"), faults(&FILTERS, filter)));
-        let stages = [
-            ("detector", faults(&DETECTORS, &r.detector)),
-            ("locator", faults(&LOCATORS, &r.locator)),
-            ("descriptor", faults(&DESCRIPTORS, &r.descriptor)),
-            ("matcher", faults(&MATCHERS, &r.matcher)),
-            ("refinement", faults(&REFINEMENTS, &r.refinement)),
-            ("triangulator", faults(&TRIANGULATORS, &r.triangulator)),
-            ("between", faults(&MATCHERS, &r.between)),
-            ("minimal", faults(&SOLVERS, &r.minimal)),
-            ("solver", faults(&SOLVERS, &r.solver)),
-        ];
-        let stages = filters.chain(stages.map(|(stage, errors)| (stage.to_owned(), errors)));
-        let below = |(stage, errors): (String, Vec<PipelineError>)| {
-            errors.into_iter().map(move |error| {
-                let key =
-                    error.key.iter().fold(format!("settings.recognition.{stage}"), |all, key| format!("{all}.{key}"));
-                PipelineError { setting: "pose-graph", key: Some(key), ..error }
-            })
+        let below = |error: PipelineError| {
+            let place = ["settings.recognition", error.setting].into_iter().chain(error.key.as_deref());
+            let key = Some(place.collect::<Vec<_>>().join("."));
+            PipelineError { setting: "pose-graph", key, ..error }
         };
-        let mut all: Vec<PipelineError> = stages.flat_map(below).collect();
+        let mut all: Vec<PipelineError> = choices::faults(r).into_iter().map(below).collect();
         let mut rest = self.settings.clone();
         if !all.is_empty() {
             let Recognition {
@@ -103,7 +75,7 @@ impl Keyframes {
 /// A pose graph that a run extends by key frames and in which it recognises them.
 #[derive(Debug)]
 pub struct KeyframeMapper<'a> {
-    keyframes: &'a Keyframes,
+    keyframes: &'a KeyframeSettings,
     traverse: Traverse<'a>,
     /// The object of the pose graph for each target, and the target for each object.
     objects: Vec<usize>,
@@ -113,7 +85,7 @@ pub struct KeyframeMapper<'a> {
 impl<'a> KeyframeMapper<'a> {
     /// Begins a map of key frames, from the `earlier` map of another session if there is one.
     pub fn begin(
-        keyframes: &'a Keyframes,
+        keyframes: &'a KeyframeSettings,
         targets: &[Target],
         rig: &'a StereoRig,
         earlier: Option<&PoseGraph>,

@@ -40,8 +40,10 @@
 //!
 //! The terms are those of the field; `GLOSSARY.md` at the root of the repository defines each with its literature.
 
+mod choices;
 mod error;
 mod event;
+mod frame_result;
 mod images;
 mod in_view;
 mod joint;
@@ -50,11 +52,12 @@ mod localizer;
 mod navigation_stack;
 mod odometry_session;
 mod pipeline;
+mod pipeline_error;
+mod pipeline_settings;
 mod places;
 mod random;
 mod sensor_frame;
 mod session;
-mod stages;
 mod times;
 
 pub use nalgebra;
@@ -64,20 +67,21 @@ pub use seafix_navigation as navigation;
 pub use seafix_referencing as referencing;
 pub use seafix_vision as vision;
 
+pub use choices::REGISTRIES;
 pub use error::Error;
 pub use event::NavigationEvent;
+pub use frame_result::{Cloud, FrameResult, SearchResult, TargetAttempt, View};
 pub use images::StereoImages;
-pub use keyframe_mapper::{KeyframeMapper, Keyframes};
+pub use keyframe_mapper::{KeyframeMapper, KeyframeSettings};
 pub use localizer::{Localizer, TargetOutcome};
 pub use navigation_stack::{Navigation, NavigationStack};
 pub use odometry_session::{FrameOdometry, OdometryResult, stereo_pair};
-pub use pipeline::{
-    Attempts, Pipeline, PipelineError, UseOfEdges, UseOfPoints, build, faults, invalid_setting, resolve,
-};
+pub use pipeline::Pipeline;
+pub use pipeline_error::{PipelineError, build, invalid_setting};
+pub use pipeline_settings::{Attempts, PipelineSettings, UseOfEdges, UseOfPoints};
 pub use places::places;
 pub use seafix_io::Rig;
 pub use seafix_referencing::{Outcome, Site};
 pub use sensor_frame::{FrameData, Hints, PosePrior, SensorFrame};
 pub use session::{Motion, MotionOverride, NavigationSession, NavigationState};
-pub use stages::{Cloud, FrameResult, PipelineStages, SearchResult, TargetAttempt, View};
 pub use times::{FrameTimes, TargetTimes};

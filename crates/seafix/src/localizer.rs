@@ -8,13 +8,15 @@ use seafix_vision::{Descriptor, Detector, Matcher};
 
 use crate::{
     error::Error,
+    frame_result::{FrameResult, View},
     images::{StereoImages, check_sizes},
     navigation_stack::NavigationStack,
-    pipeline::{Pipeline, invalid_setting},
+    pipeline::Pipeline,
+    pipeline_error::invalid_setting,
+    pipeline_settings::PipelineSettings,
     random,
     sensor_frame::{FrameData, Hints, PosePrior, SensorFrame},
     session::NavigationSession,
-    stages::{FrameResult, PipelineStages, View},
 };
 
 /// The outcome for one target.
@@ -51,7 +53,7 @@ pub struct TargetOutcome {
 /// ```
 #[derive(Debug)]
 pub struct Localizer {
-    stages: PipelineStages,
+    pipeline: Pipeline,
     targets: Vec<Target>,
     rig: Rig,
     seed: u64,
@@ -63,7 +65,7 @@ impl Localizer {
     /// # Errors
     /// Those of [`Localizer::with_pipeline`], which the default settings do not cause.
     pub fn new(site: &Site, rig: &Rig) -> Result<Self, Error> {
-        Self::with_pipeline(site, rig, &Pipeline::default())
+        Self::with_pipeline(site, rig, &PipelineSettings::default())
     }
 
     /// A localizer with the pipeline settings in `text`.
@@ -98,46 +100,46 @@ impl Localizer {
     /// # Errors
     /// [`Error::Setting`]: an unknown component or an invalid value. [`Error::NoWorld`]: an object without a pose in the
     /// world, if the pipeline's target needs one.
-    pub fn with_pipeline(site: &Site, rig: &Rig, pipeline: &Pipeline) -> Result<Self, Error> {
-        let stages = pipeline.build()?;
+    pub fn with_pipeline(site: &Site, rig: &Rig, settings: &PipelineSettings) -> Result<Self, Error> {
+        let pipeline = settings.build()?;
         let targets = site
-            .targets(pipeline.target)
+            .targets(settings.target)
             .map_err(|missing| Error::NoWorld { purpose: "search for the complete site", object: missing.object })?;
-        Ok(Self { stages, targets, rig: rig.clone(), seed: 0 })
+        Ok(Self { pipeline, targets, rig: rig.clone(), seed: 0 })
     }
 
     /// Replaces the solver of the rigid motion.
     #[must_use]
     pub fn with_solver(mut self, solver: Box<dyn Solver>) -> Self {
-        self.stages.solver = solver;
+        self.pipeline.solver = solver;
         self
     }
 
     /// Replaces the search of Stage 2.
     #[must_use]
     pub fn with_search(mut self, search: Box<dyn Search>) -> Self {
-        self.stages.search = search;
+        self.pipeline.search = search;
         self
     }
 
     /// Replaces the corner detector.
     #[must_use]
     pub fn with_detector(mut self, detector: Box<dyn Detector>) -> Self {
-        self.stages.front_end.detector = detector;
+        self.pipeline.front_end.detector = detector;
         self
     }
 
     /// Replaces the descriptor.
     #[must_use]
     pub fn with_descriptor(mut self, descriptor: Box<dyn Descriptor>) -> Self {
-        self.stages.front_end.descriptor = descriptor;
+        self.pipeline.front_end.descriptor = descriptor;
         self
     }
 
     /// Replaces the matcher.
     #[must_use]
     pub fn with_matcher(mut self, matcher: Box<dyn Matcher>) -> Self {
-        self.stages.front_end.matcher = matcher;
+        self.pipeline.front_end.matcher = matcher;
         self
     }
 
@@ -214,14 +216,14 @@ impl Localizer {
     pub fn process(&self, frame: &SensorFrame) -> FrameResult {
         let rig = &self.rig.stereo;
         let priors = frame.target_priors(&self.targets);
-        let regions = self.stages.regions(&self.targets, &[&priors], rig);
-        let cloud = self.stages.cloud(&frame.frame_data, rig, &self.targets, &regions);
+        let regions = self.pipeline.regions(&self.targets, &[&priors], rig);
+        let cloud = self.pipeline.cloud(&frame.frame_data, rig, &self.targets, &regions);
         let view = View { sensor_frame: frame, cloud: &cloud, targets: &self.targets, rig };
         let mut rng = random::of_frame(self.seed, frame.stamp_ns);
-        let mut result = self.stages.fix_from(view, &priors, None, &mut rng);
-        if self.stages.settings().target == TargetKind::Joint {
-            let own = self.stages.object_observations(&mut result, &self.targets, rig);
-            self.stages.join(&mut result, &[], &own, &self.targets, rig);
+        let mut result = self.pipeline.fix_from(view, &priors, None, &mut rng);
+        if self.pipeline.settings().target == TargetKind::Joint {
+            let own = self.pipeline.object_observations(&mut result, &self.targets, rig);
+            self.pipeline.join(&mut result, &[], &own, &self.targets, rig);
         }
         result
     }
@@ -237,7 +239,7 @@ impl Localizer {
         navigation_stack: &'a NavigationStack,
         map: Option<&PoseGraph>,
     ) -> Result<NavigationSession<'a>, Error> {
-        if self.stages.settings().target != TargetKind::Object {
+        if self.pipeline.settings().target != TargetKind::Object {
             let message = "navigation goes from object to object; use target = \"object\"".to_owned();
             return Err(invalid_setting("target", message).into());
         }
@@ -246,12 +248,12 @@ impl Localizer {
             return Err(Error::NoWorld { purpose: "navigate", object: target.name.clone() });
         }
         let (rig, mounting) = (&self.rig.stereo, self.rig.body_from_camera);
-        let session = NavigationSession::begin(navigation_stack, &self.stages, &self.targets, rig, mounting, map);
+        let session = NavigationSession::begin(navigation_stack, &self.pipeline, &self.targets, rig, mounting, map);
         Ok(session.with_seed(self.seed))
     }
 
     fn outcomes(&self, result: FrameResult) -> Vec<TargetOutcome> {
-        let outcome = |attempt: crate::stages::TargetAttempt| TargetOutcome {
+        let outcome = |attempt: crate::frame_result::TargetAttempt| TargetOutcome {
             name: self.targets[attempt.target].name.clone(),
             outcome: attempt.answer.outcome,
             p_absent: attempt.answer.p_absent,

@@ -6,9 +6,10 @@ use seafix_navigation::{FUSIONS, Fusion, ODOMETRIES, Odometry, POLICIES, Policy}
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    keyframe_mapper::Keyframes,
+    choices,
+    keyframe_mapper::KeyframeSettings,
     odometry_session::FrameOdometry,
-    pipeline::{PipelineError, build, faults, resolve},
+    pipeline_error::{PipelineError, build},
 };
 
 /// The settings of navigation from fix to fix.
@@ -23,7 +24,7 @@ pub struct Navigation {
     pub fusion: Choice,
     /// The key frames that support navigation where no object is in view; none if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pose_graph: Option<Keyframes>,
+    pub pose_graph: Option<KeyframeSettings>,
 }
 
 impl Default for Navigation {
@@ -44,19 +45,15 @@ impl Navigation {
     /// The first invalid setting.
     pub fn resolved(&self) -> Result<Self, PipelineError> {
         Ok(Self {
-            odometry: resolve(&ODOMETRIES, &self.odometry)?,
-            policy: resolve(&POLICIES, &self.policy)?,
-            fusion: resolve(&FUSIONS, &self.fusion)?,
-            pose_graph: self.pose_graph.as_ref().map(Keyframes::resolved).transpose()?,
+            pose_graph: self.pose_graph.as_ref().map(KeyframeSettings::resolved).transpose()?,
+            ..choices::resolved(self)?
         })
     }
 
     /// All faults that keep the navigation stack from being built.
     pub fn invalid(&self) -> Vec<PipelineError> {
-        let mut all = faults(&ODOMETRIES, &self.odometry);
-        all.extend(faults(&POLICIES, &self.policy));
-        all.extend(faults(&FUSIONS, &self.fusion));
-        all.extend(self.pose_graph.iter().flat_map(Keyframes::invalid));
+        let mut all = choices::faults(self);
+        all.extend(self.pose_graph.iter().flat_map(KeyframeSettings::invalid));
         all
     }
 
@@ -65,7 +62,7 @@ impl Navigation {
     /// # Errors
     /// The first invalid setting.
     pub fn build(&self) -> Result<NavigationStack, PipelineError> {
-        let invalid = self.pose_graph.iter().flat_map(Keyframes::invalid).next();
+        let invalid = self.pose_graph.iter().flat_map(KeyframeSettings::invalid).next();
         invalid.map_or(Ok(()), Err)?;
         Ok(NavigationStack {
             odometry: build(&ODOMETRIES, &self.odometry)?,
@@ -83,7 +80,7 @@ pub struct NavigationStack {
     pub(crate) policy: Box<dyn Policy>,
     pub(crate) fusion: Box<dyn Fusion>,
     /// The settings of the key frames, if there are any.
-    pub pose_graph: Option<Keyframes>,
+    pub pose_graph: Option<KeyframeSettings>,
 }
 
 impl NavigationStack {

@@ -1,355 +1,447 @@
-//! Settings of the pipeline from a sensor frame to fixes, and the components built from them.
+//! The pipeline from a sensor frame to fixes, one function a stage, in the paper's order.
 
-use seafix_component::{BuildError, Choice, Part, Registry, Settings, each_invalid, in_range, out_of_range};
-use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
-use seafix_vision::{
-    DESCRIPTORS, DETECTORS, EdgeCorners, FILTERS, Filter, FrontEnd, InvalidStage, LOCATORS, LineChoices, LineFrontEnd,
-    LineRules, MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, StageChoices, TRIANGULATORS,
-    read_refinement, read_triangulator,
+use std::{sync::Arc, time::Instant};
+
+use rand::Rng;
+use seafix_geometry::{MeasuredLine, MeasuredPoint, StereoRig};
+use seafix_navigation::Sensitivity;
+use seafix_referencing::{
+    Candidates, Correspondence, Degenerate, Edges, Fix, Gathered, Observations, Outcome, Prior, Problem, Search,
+    Solver, Target, Tolerance, candidates, edge_candidates, judge, judge_labelled, problem_file::CoherenceProblem,
+    search_with_expanding_gates,
 };
-use serde::{Deserialize, Serialize};
+use seafix_vision::{FrontEnd, FrontEndOutput, LineFrontEnd, LineOutput, Regions};
 
-use crate::stages::PipelineStages;
+use crate::{
+    frame_result::{Cloud, FrameResult, SearchResult, TargetAttempt, View},
+    in_view::{edges_in_view, in_view, regions, visible},
+    pipeline_settings::{Attempts, PipelineSettings, UseOfEdges, UseOfPoints},
+    sensor_frame::{FrameData, Hints, SensorFrame},
+    times::{FrameTimes, milliseconds, timed},
+};
 
-/// The settings of the pipeline from a sensor frame to a fix.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+/// A pipeline whose components are built and ready.
+#[derive(Debug)]
 pub struct Pipeline {
-    /// The target of a search: each object in view, each object followed by a joint fix, or the complete site.
-    pub target: TargetKind,
-    /// The number of frames of a joint fix, 1 to 1000: the current frame and those before it. A fix from a single pair has
-    /// only the current one.
-    pub window: usize,
-    /// The filters applied to each image, in order; none by default.
-    pub filters: Vec<Choice>,
-    /// The corner detector.
-    pub detector: Choice,
-    /// The locator that refines the position of a detected corner.
-    pub locator: Choice,
-    /// The descriptor of a corner's neighbourhood.
-    pub descriptor: Choice,
-    /// The matcher of left and right key points.
-    pub matcher: Choice,
-    /// The refinement of a match to a fraction of a pixel. A table without `name` has the settings of `direct`.
-    #[serde(deserialize_with = "read_refinement")]
-    pub refinement: Choice,
-    /// The triangulator of matched pairs. A table without `name` has the settings of `optimal`.
-    #[serde(deserialize_with = "read_triangulator")]
-    pub triangulator: Choice,
-    /// Whether points of the model are identified. Without them objects are attempted by their edges alone, and objects
-    /// without edges are not attempted.
-    pub points: UseOfPoints,
-    /// Whether straight edges of the model are identified beside its points; a site without edges has none.
-    pub edges: UseOfEdges,
-    /// The features that decide whether an object is attempted.
-    pub attempts: Attempts,
-    /// The detector of straight segments.
-    pub segment_detector: Choice,
-    /// The fit of a segment over its length.
-    pub segment_fit: SegmentFit,
-    /// The matcher of left and right segments.
-    pub segment_matcher: Choice,
-    /// The triangulation of matched segments.
-    pub lines: LineRules,
-    /// Corners that are intersections of edges. They become points of the cloud, unless the edges are identified
-    /// themselves.
-    pub edge_corners: EdgeCorners,
-    /// The gates of the candidate selection ("shells" in the paper).
-    pub gate: Gate,
-    /// Whether the search is repeated with larger gates, then without, when it finds nothing. A displaced object is
-    /// outside its gates.
-    pub expand_gates: bool,
-    /// The tolerance within which two distances agree.
-    pub tolerance: Tolerance,
-    /// The search of Stage 2. Labelled points need none.
-    pub search: Choice,
-    /// The solver of the rigid motion.
-    pub solver: Choice,
-    /// The acceptance tests of a fix.
-    pub acceptance: Acceptance,
-}
-
-impl Default for Pipeline {
-    fn default() -> Self {
-        Self {
-            target: TargetKind::Object,
-            window: 1,
-            filters: Vec::new(),
-            detector: Choice::named("harris"),
-            locator: Choice::named("corner-junction"),
-            descriptor: Choice::named("surf"),
-            matcher: Choice::named("epipolar-band"),
-            refinement: Choice::named("direct"),
-            triangulator: Choice::named("optimal"),
-            points: UseOfPoints::On,
-            edges: UseOfEdges::On,
-            attempts: Attempts::Identified,
-            segment_detector: Choice::named("a-contrario"),
-            segment_fit: SegmentFit::default(),
-            segment_matcher: Choice::named("overlap-profile"),
-            lines: LineRules::default(),
-            edge_corners: EdgeCorners::default(),
-            gate: Gate::default(),
-            expand_gates: false,
-            tolerance: Tolerance::Sigmas(3.0),
-            search: Choice::named("rigid-consensus"),
-            solver: Choice::named("stereo-reprojection"),
-            acceptance: Acceptance::default(),
-        }
-    }
-}
-
-/// The use of points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
-#[serde(rename_all = "kebab-case")]
-pub enum UseOfPoints {
-    /// Points are measured and identified.
-    #[default]
-    On,
-    /// Edges alone.
-    Off,
-}
-
-/// The use of straight edges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
-#[serde(rename_all = "kebab-case")]
-pub enum UseOfEdges {
-    /// Edges are measured and identified where the site has some.
-    #[default]
-    On,
-    /// Points alone.
-    Off,
-}
-
-/// The features of which three must be in view by the prior; without a prior every object is attempted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Settings)]
-#[serde(rename_all = "kebab-case")]
-pub enum Attempts {
-    /// The features that the pipeline identifies; edges count if the frame has measured lines, or without points.
-    #[default]
-    Identified,
-    /// All points and edges of the model: pipelines that identify different features make the same attempts.
-    Model,
-}
-
-/// An invalid setting of the pipeline or of navigation.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{message}")]
-pub struct PipelineError {
-    /// The key below `pipeline` or `navigation`.
-    pub setting: &'static str,
-    /// The key below `setting`, if known; `name` for an unknown component.
-    pub key: Option<String>,
-    /// The faulty part: key or value.
-    pub part: Part,
-    /// The existing component whose name is closest to an unknown name.
-    pub near: Option<&'static str>,
-    /// The fault and the closest valid setting.
-    pub message: String,
+    pub(crate) front_end: FrontEnd,
+    line_front_end: LineFrontEnd,
+    pub(crate) search: Box<dyn Search>,
+    pub(crate) solver: Box<dyn Solver>,
+    settings: PipelineSettings,
 }
 
 impl Pipeline {
-    /// The same pipeline with the defaults of all components written out.
+    /// A pipeline with these components.
+    pub fn new(
+        front_end: FrontEnd,
+        line_front_end: LineFrontEnd,
+        search: Box<dyn Search>,
+        solver: Box<dyn Solver>,
+        settings: PipelineSettings,
+    ) -> Self {
+        Self { front_end, line_front_end, search, solver, settings }
+    }
+
+    /// Whether the solver requires the points' pixels.
+    pub fn needs_pixels(&self) -> bool {
+        self.solver.needs_pixels()
+    }
+
+    /// The settings that it was built from.
+    pub fn settings(&self) -> &PipelineSettings {
+        &self.settings
+    }
+
+    /// Computes fixes from one sensor frame, in the paper's order: key points, matches, cloud; then for each target in
+    /// view the candidates (Stage 1), the search (Stage 2) and the solution.
+    pub fn run(
+        &self,
+        sensor_frame: &SensorFrame,
+        targets: &[Target],
+        rig: &StereoRig,
+        rng: &mut dyn Rng,
+    ) -> FrameResult {
+        let priors = sensor_frame.target_priors(targets);
+        let cloud = &self.cloud(&sensor_frame.frame_data, rig, targets, &self.regions(targets, &[&priors], rig));
+        self.fix_from(View { sensor_frame, cloud, targets, rig }, &priors, None, rng)
+    }
+
+    /// Computes fixes from a cloud and from a prior pose relative to each target.
     ///
-    /// # Errors
-    /// The first invalid setting.
-    pub fn resolved(&self) -> Result<Self, PipelineError> {
-        Ok(Self {
-            filters: each_filter(&self.filters, resolve)?,
-            detector: resolve(&DETECTORS, &self.detector)?,
-            descriptor: resolve(&DESCRIPTORS, &self.descriptor)?,
-            matcher: resolve(&MATCHERS, &self.matcher)?,
-            locator: resolve(&LOCATORS, &self.locator)?,
-            refinement: resolve(&REFINEMENTS, &self.refinement)?,
-            triangulator: resolve(&TRIANGULATORS, &self.triangulator)?,
-            segment_detector: resolve(&SEGMENT_DETECTORS, &self.segment_detector)?,
-            segment_matcher: resolve(&SEGMENT_MATCHERS, &self.segment_matcher)?,
-            search: resolve(&SEARCHES, &self.search)?,
-            solver: resolve(&SOLVERS, &self.solver)?,
-            ..self.clone()
-        })
+    /// `sought` are results of [`Pipeline::search_all`] for the same view; `None` searches here.
+    pub fn fix_from(
+        &self,
+        view: View<'_>,
+        priors: &[Option<Prior>],
+        sought: Option<&[Option<SearchResult>]>,
+        rng: &mut dyn Rng,
+    ) -> FrameResult {
+        let attempts = (0..view.targets.len())
+            .filter_map(|index| {
+                let sought = sought.map(|all| all[index].clone());
+                let mut attempt = self.attempt(view, index, priors[index].as_ref(), sought, rng)?;
+                attempt.times.total_ms = attempt.times.total_ms.map(|own| view.cloud.total_ms + own);
+                Some(attempt)
+            })
+            .collect();
+        let Cloud { keypoints, points, lines, times, .. } = view.cloud;
+        let (keypoints, cloud, lines) = (Arc::clone(keypoints), Arc::clone(points), Arc::clone(lines));
+        FrameResult { keypoints, cloud, lines, attempts, gathered: Gathered::default(), times: *times }
     }
 
-    /// All faults that keep the pipeline from being built.
-    pub fn invalid(&self) -> Vec<PipelineError> {
-        let filters = self.filters.iter().enumerate().flat_map(|(place, choice)| {
-            let of = move |error: PipelineError| in_list(place, error);
-            faults(&FILTERS, choice).into_iter().map(of)
-        });
-        let mut all: Vec<PipelineError> = filters.collect();
-        all.extend(faults(&DETECTORS, &self.detector));
-        all.extend(faults(&LOCATORS, &self.locator));
-        all.extend(faults(&DESCRIPTORS, &self.descriptor));
-        all.extend(faults(&MATCHERS, &self.matcher));
-        all.extend(faults(&REFINEMENTS, &self.refinement));
-        all.extend(faults(&TRIANGULATORS, &self.triangulator));
-        all.extend(faults(&SEGMENT_DETECTORS, &self.segment_detector));
-        all.extend(faults(&SEGMENT_MATCHERS, &self.segment_matcher));
-        let fit = each_invalid(&self.segment_fit, SegmentFit::check);
-        all.extend(fit.into_iter().map(|message| invalid_setting("segment-fit", message)));
-        let lines = each_invalid(&self.lines, LineRules::check);
-        all.extend(lines.into_iter().map(|message| invalid_setting("lines", message)));
-        let corners = each_invalid(&self.edge_corners, EdgeCorners::check);
-        all.extend(corners.into_iter().map(|message| invalid_setting("edge-corners", message)));
-        all.extend(faults(&SEARCHES, &self.search));
-        all.extend(faults(&SOLVERS, &self.solver));
-        all.extend(each_invalid(&self.gate, Gate::check).into_iter().map(|message| invalid_setting("gate", message)));
-        all.extend(
-            each_invalid(&self.tolerance, Tolerance::check)
-                .into_iter()
-                .map(|message| invalid_setting("tolerance", message)),
-        );
-        let acceptance = each_invalid(&self.acceptance, Acceptance::check);
-        all.extend(acceptance.into_iter().map(|message| invalid_setting("acceptance", message)));
-        all.extend(self.window_fits().err());
-        all.extend(self.has_features().err());
-        all
-    }
-
-    /// Checks that a pipeline without points identifies edges.
-    fn has_features(&self) -> Result<(), PipelineError> {
-        let fault = |cause: &str| Err(invalid_setting("points", format!("points = off; {cause}")));
-        if self.points == UseOfPoints::On {
-            return Ok(());
-        }
-        if self.edges == UseOfEdges::Off {
-            return fault("`edges` is off too; switch one of them on");
-        }
-        // An unknown component is a fault of its own.
-        if build(&SEARCHES, &self.search).is_ok_and(|search| !search.takes_edges()) {
-            return fault(&format!("the search `{}` takes no edges; choose rigid-consensus", self.search.name));
-        }
-        if build(&SOLVERS, &self.solver).is_ok_and(|solver| !solver.takes_edges()) {
-            return fault(&format!("the solver `{}` takes no edges; choose stereo-reprojection", self.solver.name));
-        }
-        Ok(())
-    }
-
-    fn window_fits(&self) -> Result<(), PipelineError> {
-        let fits = in_range((1..=1000).contains(&self.window), "window", self.window, "1 to 1000");
-        fits.map_err(|message| invalid_setting("window", message))
-    }
-
-    /// The standard deviation of a key point's coordinates without a corner fit (px); `None` for an invalid
-    /// triangulator.
-    pub fn pixel_sigma(&self) -> Option<f64> {
-        build(&TRIANGULATORS, &self.triangulator).ok().map(|triangulator| triangulator.rules().sigma_px)
-    }
-
-    /// The front end: the stages from two images to a cloud.
-    ///
-    /// # Errors
-    /// The first invalid setting.
-    pub fn front_end(&self) -> Result<FrontEnd, PipelineError> {
-        let choices = StageChoices {
-            filters: &self.filters,
-            detector: &self.detector,
-            locator: &self.locator,
-            descriptor: &self.descriptor,
-            matcher: &self.matcher,
-            refinement: &self.refinement,
-            triangulator: &self.triangulator,
-        };
-        FrontEnd::build(&choices).map_err(|InvalidStage { stage, place, error }| {
-            let error = invalid(stage, &error);
-            match place {
-                Some(place) => in_list(place, error),
-                None => error,
+    /// Repeats the search, with other priors, for the targets without a fix.
+    pub fn retry_without_fix(
+        &self,
+        frame_result: &mut FrameResult,
+        view: View<'_>,
+        priors: &[Option<Prior>],
+        rng: &mut dyn Rng,
+    ) {
+        for attempt in &mut frame_result.attempts {
+            let (index, prior) = (attempt.target, priors[attempt.target].as_ref());
+            if matches!(attempt.answer.outcome, Outcome::Fix(_)) || prior.is_none() {
+                continue;
             }
-        })
+            let Some(mut other) = self.attempt(view, index, prior, None, rng) else { continue };
+            if matches!(other.answer.outcome, Outcome::Fix(_)) {
+                other.times.total_ms = attempt.times.total_ms.zip(other.times.total_ms).map(|(a, b)| a + b);
+                *attempt = other;
+            }
+        }
     }
 
-    /// The stages from two images to measured lines.
+    /// The sensitivity of a fix to its model errors, for each model point by its index.
+    pub fn model_sensitivities(
+        &self,
+        fix: &Fix,
+        target: &Target,
+        (cloud, lines): (&[MeasuredPoint], &[MeasuredLine]),
+        rig: &StereoRig,
+    ) -> Result<Vec<(usize, Sensitivity)>, Degenerate> {
+        let data = Observations::of(&fix.pairs, &target.points, cloud, Some(rig));
+        let data = data.with_edges(&fix.edges, &target.edges, &target.points, lines);
+        let sensitivities = self.solver.model_errors(&data, &fix.object_from_camera)?;
+        Ok(fix.pairs.iter().map(|pair| pair.model).zip(sensitivities).collect())
+    }
+
+    /// Whether enough of `target` may be in view for a fix; true without a prior.
+    pub fn shows(&self, target: &Target, prior: &Option<Prior>, rig: &StereoRig) -> bool {
+        self.features(target, prior.as_ref(), rig, false).is_some()
+    }
+
+    /// The points and the edges of a target that may be in view; `None` if they are too few for an attempt.
     ///
-    /// # Errors
-    /// The first invalid setting.
-    pub fn line_front_end(&self) -> Result<LineFrontEnd, PipelineError> {
-        self.segment_fit.check().map_err(|message| invalid_setting("segment-fit", message))?;
-        self.lines.check().map_err(|message| invalid_setting("lines", message))?;
-        self.edge_corners.check().map_err(|message| invalid_setting("edge-corners", message))?;
-        let choices = LineChoices {
-            segment_detector: &self.segment_detector,
-            segment_fit: &self.segment_fit,
-            segment_matcher: &self.segment_matcher,
-            lines: &self.lines,
-            // One error of the camera model affects points and lines.
-            calibration_px: build(&TRIANGULATORS, &self.triangulator)?.rules().calibration_px,
+    /// `has_lines` states whether lines were measured. Edges that do not count are omitted.
+    fn features(
+        &self,
+        target: &Target,
+        prior: Option<&Prior>,
+        rig: &StereoRig,
+        has_lines: bool,
+    ) -> Option<[Vec<bool>; 2]> {
+        let PipelineSettings { points: uses_points, attempts, .. } = self.settings;
+        let points = &target.points;
+        let by_model = attempts == Attempts::Model;
+        let counts_edges = has_lines || by_model || uses_points == UseOfPoints::Off;
+        let edges = if counts_edges { edges_in_view(target, prior, rig) } else { Vec::new() };
+        let shown = count(&edges);
+        let counts_points = by_model || uses_points == UseOfPoints::On;
+        let mask = match in_view(points, prior, rig) {
+            Some(mask) if counts_points => mask,
+            _ => {
+                let mask = prior.map_or_else(|| vec![true; points.len()], |prior| visible(points, prior, rig));
+                let seen = if counts_points { count(&mask) } else { 0 };
+                // Three edges can show that two of them are right.
+                (shown >= 3 || (seen > 0 && shown >= 2)).then_some(mask)?
+            }
         };
-        LineFrontEnd::build(&choices).map_err(|InvalidStage { stage, error, .. }| invalid(stage, &error))
+        Some([mask, edges])
     }
 
-    /// Builds all components.
+    /// Whether the cloud depends on where the targets are expected.
+    pub fn is_guided(&self) -> bool {
+        self.front_end.detector.is_guided()
+    }
+
+    /// The regions of both images where the points of the targets are expected.
     ///
-    /// # Errors
-    /// The first invalid setting.
-    pub fn build(&self) -> Result<PipelineStages, PipelineError> {
-        self.gate.check().map_err(|message| invalid_setting("gate", message))?;
-        self.tolerance.check().map_err(|message| invalid_setting("tolerance", message))?;
-        self.acceptance.check().map_err(|message| invalid_setting("acceptance", message))?;
-        self.window_fits()?;
-        self.has_features()?;
-        let (search, solver) = (build(&SEARCHES, &self.search)?, build(&SOLVERS, &self.solver)?);
-        Ok(PipelineStages::new(self.front_end()?, self.line_front_end()?, search, solver, self.clone()))
+    /// `priors` holds lists with one prior of each target; the regions of all lists are joined.
+    ///
+    /// They are empty for a front end that does not use them, and for targets without a prior.
+    pub fn regions(&self, targets: &[Target], priors: &[&[Option<Prior>]], rig: &StereoRig) -> [Regions; 2] {
+        if !self.is_guided() {
+            return [Regions::NONE; 2];
+        }
+        let known = priors.iter().flat_map(|priors| targets.iter().zip(priors.iter()));
+        regions(known.filter_map(|(target, prior)| Some((&target.points[..], prior.as_ref()?))), rig)
+    }
+
+    /// The cloud of a frame's measurements: the front end's result, or the given points.
+    ///
+    /// The `regions` are those where the targets are expected ([`Pipeline::regions`]).
+    ///
+    /// Straight edges are measured if a target has some, or if corners are made of them (`edge-corners`). A pipeline
+    /// without points has no points in its cloud.
+    pub fn cloud(&self, frame_data: &FrameData, rig: &StereoRig, targets: &[Target], regions: &[Regions; 2]) -> Cloud {
+        let uses_points = self.settings.points == UseOfPoints::On;
+        let given = |cloud: &[MeasuredPoint], lines: &[MeasuredLine]| {
+            let lines = if self.settings.edges == UseOfEdges::On { lines } else { &[] };
+            Cloud::given(if uses_points { cloud } else { &[] }, lines)
+        };
+        let (left, right) = match frame_data {
+            FrameData::Points(cloud) => return given(cloud, &[]),
+            FrameData::Features(cloud, lines) => return given(cloud, lines),
+            FrameData::Stereo(left, right) => (left, right),
+        };
+        let start = Instant::now();
+        // Frames are processed in parallel. A single thread within a frame keeps the durations comparable.
+        let mut output = FrontEndOutput::default();
+        match uses_points {
+            true => self.front_end.run_guided([left, right], rig, regions, &mut output),
+            false => self.front_end.filter_pair([left, right], &mut output),
+        }
+        let times = FrameTimes {
+            detect_ms: Some(output.times.filter_ms + output.times.detect_ms),
+            locate_ms: Some(output.times.locate_ms),
+            describe_ms: Some(output.times.describe_ms),
+            match_ms: Some(output.times.match_ms),
+            refine_ms: Some(output.times.refine_ms),
+            triangulate_ms: Some(output.times.triangulate_ms),
+        };
+        let keypoints = output.keypoints()[0].into();
+        let [l, r] = output.filtered();
+        let identified = self.settings.edges == UseOfEdges::On && targets.iter().any(|target| !target.edges.is_empty());
+        let corners = &self.settings.edge_corners;
+        let mut measured = LineOutput::default();
+        if identified || (corners.enabled && uses_points) {
+            self.line_front_end.run([l.unwrap_or(left), r.unwrap_or(right)], rig, &mut measured);
+        }
+        // An edge serves as itself or by its corners: as both, its errors would count twice.
+        if !identified && uses_points {
+            let triangulator = &*self.front_end.triangulator;
+            corners.add_to(&mut output.cloud, measured.segments(), &measured.matches, rig, triangulator);
+            measured.lines.clear();
+        }
+        let lines = measured.lines.into();
+        let points = output.cloud[..].into();
+        Cloud { keypoints, points, lines, times, total_ms: milliseconds(start) }
+    }
+
+    /// Stages 1 and 2 for every target in view, in order.
+    pub fn search_all(&self, view: View<'_>, priors: &[Option<Prior>], rng: &mut dyn Rng) -> Vec<Option<SearchResult>> {
+        (0..view.targets.len()).map(|index| self.seek(view, index, priors[index].as_ref(), rng)).collect()
+    }
+
+    /// Stages 1 and 2 for one target; `None` if it is out of view or if its points are labelled.
+    fn seek(&self, view: View<'_>, index: usize, prior: Option<&Prior>, rng: &mut dyn Rng) -> Option<SearchResult> {
+        let target = &view.targets[index];
+        match &view.sensor_frame.hints {
+            Hints::Labels(_) => None,
+            Hints::Problem(problem) => Some(self.seek_posed(target, problem, rng)),
+            Hints::Nothing => self.seek_near(target, view, prior, false, rng),
+        }
+    }
+
+    /// The candidates for the points and edges that may be in view, and the search among them.
+    ///
+    /// `None` if too few may be in view, unless the attempt is `forced`.
+    fn seek_near(
+        &self,
+        target: &Target,
+        view: View<'_>,
+        prior: Option<&Prior>,
+        forced: bool,
+        rng: &mut dyn Rng,
+    ) -> Option<SearchResult> {
+        let PipelineSettings { gate, tolerance, .. } = &self.settings;
+        let Cloud { points: cloud, lines, .. } = view.cloud;
+        let (points, started) = (&target.points, Instant::now());
+        let uses_lines = !lines.is_empty() && !target.edges.is_empty();
+        let all = || [vec![true; points.len()], edges_in_view(target, prior, view.rig)];
+        let [of_points, of_edges] = match forced && in_view(points, prior, view.rig).is_none() {
+            true => all(),
+            false => self.features(target, prior, view.rig, uses_lines).or_else(|| forced.then(all))?,
+        };
+        // Points that the pipeline does not identify have no candidates.
+        let of_points = match self.settings.points {
+            UseOfPoints::On => of_points,
+            UseOfPoints::Off => vec![false; points.len()],
+        };
+        let candidates = candidates(points, cloud, prior, gate, Some(&of_points));
+        let edges = match uses_lines {
+            true => edge_candidates(&target.edges, points, lines, prior, gate, Some(&of_edges)),
+            false => Vec::new(),
+        };
+        let stage1 = milliseconds(started);
+        let problem = Problem {
+            model: points,
+            cloud,
+            candidates: &candidates,
+            tolerance: *tolerance,
+            prior,
+            edges: edges_of(target, lines, &edges),
+        };
+        let (found, stage2) = timed(|| self.search.search(&problem, rng));
+        Some(SearchResult { candidates, edges, found, spent: [stage1, stage2] })
+    }
+
+    /// Stages 1 and 2 of a problem with candidates, tolerance and prior pose of its own.
+    fn seek_posed(&self, target: &Target, problem: &CoherenceProblem, rng: &mut dyn Rng) -> SearchResult {
+        let none = || Candidates::from_pairs(target.points.len(), []);
+        let (listed, stage1) = timed(|| match self.settings.points {
+            UseOfPoints::On => problem.candidates(),
+            UseOfPoints::Off => Ok(none()),
+        });
+        let (candidates, refused) = match listed {
+            Ok(candidates) => (candidates, None),
+            Err(refused) => (none(), Some(refused)),
+        };
+        let edges = match self.settings.edges {
+            UseOfEdges::On => problem.edges.candidates(&target.points, problem.prior.as_ref()),
+            UseOfEdges::Off => Vec::new(),
+        };
+        let posed = self.posed(target, problem, &candidates, &edges);
+        let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
+        SearchResult { candidates, edges, found, spent: [stage1, stage2] }
+    }
+
+    /// The attempt on one target; `None` if it is out of view. `sought` is an earlier result of Stages 1 and 2.
+    fn attempt(
+        &self,
+        view: View<'_>,
+        index: usize,
+        prior: Option<&Prior>,
+        sought: Option<Option<SearchResult>>,
+        rng: &mut dyn Rng,
+    ) -> Option<TargetAttempt> {
+        if let Hints::Labels(names) = &view.sensor_frame.hints {
+            return self.labelled(view, index, names, prior);
+        }
+        let sought = sought.unwrap_or_else(|| self.seek(view, index, prior, rng))?;
+        match &view.sensor_frame.hints {
+            Hints::Problem(problem) => Some(self.answer(index, &view.targets[index], problem, sought)),
+            _ => Some(self.solve(view, index, prior, sought, rng)),
+        }
+    }
+
+    /// Solves and tests the result of a search. If it found no pose and `expand-gates` is set, the search is repeated with
+    /// larger gates.
+    fn solve(
+        &self,
+        view: View<'_>,
+        index: usize,
+        prior: Option<&Prior>,
+        sought: SearchResult,
+        rng: &mut dyn Rng,
+    ) -> TargetAttempt {
+        let started = Instant::now();
+        let View { cloud, targets, rig, .. } = view;
+        let (target, lines, cloud) = (&targets[index], &cloud.lines, &cloud.points);
+        let PipelineSettings { tolerance, acceptance, expand_gates, .. } = &self.settings;
+        let points = &target.points;
+        let before: f64 = sought.spent.iter().sum();
+        let mut times = [0.0; 3];
+        let mut judged = |sought: SearchResult, prior: Option<&Prior>| {
+            let SearchResult { candidates, edges, found, spent: [stage1, stage2] } = sought;
+            let edges = edges_of(target, lines, &edges);
+            let problem =
+                Problem { model: points, cloud, candidates: &candidates, tolerance: *tolerance, prior, edges };
+            let (answer, solution) = timed(|| judge(&problem, found, &*self.solver, acceptance, Some(rig)));
+            times.iter_mut().zip([stage1, stage2, solution]).for_each(|(sum, spent)| *sum += spent);
+            (candidates, answer)
+        };
+        let (mut candidates, mut answer) = judged(sought, prior);
+        if *expand_gates {
+            let mut wider = Candidates::default();
+            answer = search_with_expanding_gates(answer, prior, |prior| {
+                let sought = self.seek_near(target, view, prior, true, rng).expect("a forced attempt");
+                let (listed, answer) = judged(sought, prior);
+                wider = listed;
+                answer
+            });
+            if !matches!(answer.outcome, Outcome::Rejected(_)) && !wider.lists.is_empty() {
+                candidates = wider;
+            }
+        }
+        TargetAttempt::new(index, candidates, answer, times.map(Some), before + milliseconds(started))
+    }
+
+    /// The answer for labelled points; `None` for a target without any, and for a pipeline without points.
+    fn labelled(
+        &self,
+        view: View<'_>,
+        index: usize,
+        names: &[(usize, usize)],
+        prior: Option<&Prior>,
+    ) -> Option<TargetAttempt> {
+        let started = Instant::now();
+        let target = &view.targets[index];
+        let (pairs, stage1) = timed(|| labelled(names, index, target));
+        if pairs.is_empty() || self.settings.points == UseOfPoints::Off {
+            return None;
+        }
+        let places = pairs.iter().map(|pair| (pair.model, pair.cloud));
+        let candidates = Candidates::from_pairs(target.points.len(), places);
+        let PipelineSettings { tolerance, acceptance, .. } = &self.settings;
+        let cloud = &view.cloud.points;
+        let problem = Problem {
+            model: &target.points,
+            cloud,
+            candidates: &candidates,
+            tolerance: *tolerance,
+            prior,
+            edges: Default::default(),
+        };
+        let (answer, solution) = timed(|| judge_labelled(&problem, pairs, &*self.solver, acceptance, Some(view.rig)));
+        Some(TargetAttempt::new(index, candidates, answer, [Some(stage1), None, Some(solution)], milliseconds(started)))
+    }
+
+    /// The answer to a problem with candidates, tolerance and prior pose of its own.
+    fn answer(&self, index: usize, target: &Target, problem: &CoherenceProblem, sought: SearchResult) -> TargetAttempt {
+        let SearchResult { candidates, edges, found, spent: [stage1, stage2] } = sought;
+        let posed = self.posed(target, problem, &candidates, &edges);
+        let (answer, solution) = timed(|| judge(&posed, found, &*self.solver, &self.settings.acceptance, None));
+        let times = [stage1, stage2, solution];
+        TargetAttempt::new(index, candidates, answer, times.map(Some), times.iter().sum())
+    }
+
+    /// The input of the search for a problem with tolerance and prior pose of its own.
+    fn posed<'a>(
+        &self,
+        target: &'a Target,
+        problem: &'a CoherenceProblem,
+        candidates: &'a Candidates,
+        edges: &'a [Vec<usize>],
+    ) -> Problem<'a> {
+        let cloud: &[MeasuredPoint] = match self.settings.points {
+            UseOfPoints::On => &problem.cloud,
+            UseOfPoints::Off => &[],
+        };
+        let (tolerance, prior) = (Tolerance::Fixed(problem.delta), problem.prior.as_ref());
+        let edges = edges_of(target, &problem.edges.lines, edges);
+        Problem { model: &target.points, cloud, candidates, tolerance, prior, edges }
     }
 }
 
-/// The error of a setting without component, such as `gate` or `acceptance`.
-pub fn invalid_setting(setting: &'static str, message: String) -> PipelineError {
-    // Some messages begin with the name of the setting.
-    let own = message.strip_prefix(&format!("{setting}: ")).unwrap_or(&message);
-    // The keys of a list's entries have indices, as in `faults[0].to`.
-    let (key, message) = match out_of_range(own) {
-        Some(key) => match key.strip_prefix(setting) {
-            Some(below) => (Some(below.to_owned()).filter(|below| !below.is_empty()), own.to_owned()),
-            None => (Some(key), format!("{setting}: {own}")),
-        },
-        None => (None, format!("{setting}: {own}")),
-    };
-    PipelineError { setting, key, part: Part::Value, near: None, message }
+fn count(mask: &[bool]) -> usize {
+    mask.iter().filter(|shown| **shown).count()
 }
 
-/// The choice with all defaults of its component written out.
-///
-/// # Errors
-/// An unknown component or an invalid value.
-pub fn resolve<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Choice, PipelineError> {
-    registry.resolve(choice).map_err(|error| in_pipeline(registry, &error))
+/// The edges of a problem; none without candidates.
+fn edges_of<'a>(target: &'a Target, lines: &'a [MeasuredLine], candidates: &'a [Vec<usize>]) -> Edges<'a> {
+    match candidates.is_empty() {
+        true => Edges::default(),
+        false => Edges { model: &target.edges, lines, candidates },
+    }
 }
 
-/// Builds the chosen component.
-///
-/// # Errors
-/// An unknown component or an invalid value.
-pub fn build<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Result<Box<T>, PipelineError> {
-    registry.build(choice).map_err(|error| in_pipeline(registry, &error))
-}
-
-/// All faults that keep a component from being built.
-pub fn faults<T: ?Sized>(registry: &Registry<T>, choice: &Choice) -> Vec<PipelineError> {
-    registry.faults(choice).iter().map(|error| in_pipeline(registry, error)).collect()
-}
-
-/// The fault of the filter at index `place` of the list.
-fn in_list(place: usize, error: PipelineError) -> PipelineError {
-    let below = error.key.map_or_else(String::new, |key| format!(".{key}"));
-    PipelineError { setting: "filters", key: Some(format!("{place}{below}")), ..error }
-}
-
-/// Applies `make` to each filter; an error names the filter's index.
-fn each_filter<T>(
-    choices: &[Choice],
-    make: fn(&Registry<dyn Filter>, &Choice) -> Result<T, PipelineError>,
-) -> Result<Vec<T>, PipelineError> {
-    let one = |(place, choice)| make(&FILTERS, choice).map_err(|error| in_list(place, error));
-    choices.iter().enumerate().map(one).collect()
-}
-
-fn in_pipeline<T: ?Sized>(registry: &Registry<T>, error: &BuildError) -> PipelineError {
-    invalid(registry.kind(), error)
-}
-
-/// The fault of a component as the fault of its setting.
-fn invalid(setting: &'static str, error: &BuildError) -> PipelineError {
-    let key = error.key().map(str::to_owned);
-    PipelineError { setting, key, part: error.part(), near: error.near(), message: error.to_string() }
+/// The pairs that the labels of the cloud points state, in the order of the model. A target of one object takes the
+/// labels of that object, a target of the site those of all its objects.
+fn labelled(names: &[(usize, usize)], index: usize, target: &Target) -> Vec<Correspondence> {
+    let pair = |(cloud, &name)| Some(Correspondence { model: target.place_of(index, name)?, cloud });
+    let mut pairs: Vec<Correspondence> = names.iter().enumerate().filter_map(pair).collect();
+    pairs.sort_unstable();
+    // The first of two points with the same label is taken.
+    pairs.dedup_by_key(|pair| pair.model);
+    pairs
 }

@@ -15,13 +15,14 @@ use crate::places::places;
 use crate::{
     error::Error,
     event::NavigationEvent,
+    frame_result::{Cloud, FrameResult, View},
     images::check_sizes,
     keyframe_mapper::KeyframeMapper,
     navigation_stack::NavigationStack,
     odometry_session::{FrameOdometry, OdometryResult, stereo_pair},
+    pipeline::Pipeline,
     random,
     sensor_frame::{FrameData, SensorFrame},
-    stages::{Cloud, FrameResult, PipelineStages, View},
 };
 
 /// A function that replaces the motion of the odometry. It is called with the time since the first frame (s) and the
@@ -61,7 +62,7 @@ pub type MotionOverride<'a> = Box<dyn FnMut(f64, Option<RelativeMotion>) -> Opti
 /// ```
 pub struct NavigationSession<'a> {
     navigation_stack: &'a NavigationStack,
-    stages: &'a PipelineStages,
+    pipeline: &'a Pipeline,
     targets: &'a [Target],
     rig: &'a StereoRig,
     navigator: Navigator<'a>,
@@ -137,7 +138,7 @@ impl<'a> NavigationSession<'a> {
     /// world.
     pub fn begin(
         navigation_stack: &'a NavigationStack,
-        stages: &'a PipelineStages,
+        pipeline: &'a Pipeline,
         targets: &'a [Target],
         rig: &'a StereoRig,
         body_from_camera: Transform<Body, Camera>,
@@ -148,7 +149,7 @@ impl<'a> NavigationSession<'a> {
             Navigator::new(places(targets), &*navigation_stack.policy, &*navigation_stack.fusion).with_names(names);
         Self {
             navigation_stack,
-            stages,
+            pipeline,
             targets,
             rig,
             navigator,
@@ -208,7 +209,7 @@ impl<'a> NavigationSession<'a> {
         self.frames += 1;
         let cloud = OnceCell::new();
         let make = |regions: &[Regions; 2]| {
-            cloud.get_or_init(|| self.stages.cloud(&frame.frame_data, rig, self.targets, regions))
+            cloud.get_or_init(|| self.pipeline.cloud(&frame.frame_data, rig, self.targets, regions))
         };
         let (result, state) = self.advance(frame, &moved, make, &mut rng).map_err(invalid)?;
         self.latest = result;
@@ -252,7 +253,7 @@ impl<'a> NavigationSession<'a> {
         let prior_pose = sensor_frame.target_priors(self.targets);
         let priors = self.priors(&prior_pose);
         let in_view =
-            || self.targets.iter().zip(&priors).any(|(target, prior)| self.stages.shows(target, prior, self.rig));
+            || self.targets.iter().zip(&priors).any(|(target, prior)| self.pipeline.shows(target, prior, self.rig));
         let due = match accepted {
             true => self.navigator.due(in_view()),
             false => {
@@ -262,7 +263,7 @@ impl<'a> NavigationSession<'a> {
         };
         let frame_result = match accepted && due {
             true => {
-                let regions = self.stages.regions(self.targets, &[&priors, &prior_pose], self.rig);
+                let regions = self.pipeline.regions(self.targets, &[&priors, &prior_pose], self.rig);
                 self.search_targets(sensor_frame, cloud(&regions), &priors, &prior_pose, rng)
             }
             false => FrameResult::default(),
@@ -334,9 +335,9 @@ impl<'a> NavigationSession<'a> {
         rng: &mut dyn Rng,
     ) -> FrameResult {
         let view = View { sensor_frame, cloud, targets: self.targets, rig: self.rig };
-        let mut frame_result = self.stages.fix_from(view, priors, None, rng);
+        let mut frame_result = self.pipeline.fix_from(view, priors, None, rng);
         if self.navigator.pose().is_some() {
-            self.stages.retry_without_fix(&mut frame_result, view, prior_pose, rng);
+            self.pipeline.retry_without_fix(&mut frame_result, view, prior_pose, rng);
         }
         frame_result
     }
@@ -348,7 +349,7 @@ impl<'a> NavigationSession<'a> {
             let Outcome::Fix(fix) = &attempt.answer.outcome else { continue };
             let target = &self.targets[attempt.target];
             let object = target.name.clone();
-            let sensitivities = match self.stages.model_sensitivities(
+            let sensitivities = match self.pipeline.model_sensitivities(
                 fix,
                 target,
                 (&frame_result.cloud, &frame_result.lines),

@@ -18,7 +18,9 @@
 //! use nalgebra::{UnitQuaternion, Vector3};
 //! use seafix_component::Choice;
 //! use seafix_geometry::{Pinhole, StereoRig, Transform};
-//! use seafix_vision::{FrontEnd, FrontEndOutput, Image, StageChoices};
+//! use seafix_vision::{
+//!     DESCRIPTORS, DETECTORS, FrontEnd, FrontEndOutput, Image, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS,
+//! };
 //!
 //! // Two cameras side by side, 0.25 m apart, with a focal length of 500 px.
 //! let camera = Pinhole::new([320, 240], [500.0, 500.0], [159.5, 119.5], &[]).unwrap();
@@ -37,16 +39,15 @@
 //! };
 //! let (left, right) = (view(0), view(20));
 //!
-//! let front_end = FrontEnd::build(&StageChoices {
-//!     filters: &[],
-//!     detector: &Choice::named("harris"),
-//!     locator: &Choice::named("corner"),
-//!     descriptor: &Choice::named("surf"),
-//!     matcher: &Choice::named("epipolar-band"),
-//!     refinement: &Choice::named("direct"),
-//!     triangulator: &Choice::named("optimal"),
-//! })
-//! .unwrap();
+//! let front_end = FrontEnd {
+//!     filters: Vec::new(),
+//!     detector: DETECTORS.build(&Choice::named("harris")).unwrap(),
+//!     locator: LOCATORS.build(&Choice::named("corner")).unwrap(),
+//!     descriptor: DESCRIPTORS.build(&Choice::named("surf")).unwrap(),
+//!     matcher: MATCHERS.build(&Choice::named("epipolar-band")).unwrap(),
+//!     refinement: REFINEMENTS.build(&Choice::named("direct")).unwrap(),
+//!     triangulator: TRIANGULATORS.build(&Choice::named("optimal")).unwrap(),
+//! };
 //! let mut output = FrontEndOutput::default();
 //! front_end.run(&left, &right, &rig, &mut output);
 //!
@@ -70,7 +71,6 @@ mod regions;
 mod right_camera_rotation;
 mod scale_space;
 mod segment;
-mod stages;
 mod swap_check;
 mod track;
 mod triangulate;
@@ -88,7 +88,7 @@ pub use epipolar_check::{EpipolarCheck, matches_by_appearance};
 pub use filter::{Clahe, FILTERS, Filter, Guided, Illumination, Median, Operation};
 pub use front_end::{FrontEnd, FrontEndOutput, StageTimes};
 pub use image::{BadImage, Image};
-pub use line_front_end::{LineChoices, LineFrontEnd, LineOutput};
+pub use line_front_end::{LineFrontEnd, LineOutput};
 pub use locate::{
     Corner, CornerFit, CornerJunction, Junction, LCorner, LOCATORS, Locator, Pair, Peak, UncertainPixel, XCorner,
 };
@@ -100,7 +100,6 @@ pub use segment::{
     SEGMENT_DETECTORS, SEGMENT_MATCHERS, Segment, SegmentDetector, SegmentFit, SegmentMatch, SegmentMatcher,
     SegmentView,
 };
-pub use stages::{InvalidStage, StageChoices};
 pub use swap_check::Sides;
 pub use track::{Pyramid, Track, Tracker};
 pub use triangulate::{Linear, Midpoint, Optimal, PointRules, TRIANGULATORS, Triangulator, read_triangulator};

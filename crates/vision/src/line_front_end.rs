@@ -2,16 +2,14 @@
 
 use std::time::Instant;
 
-use seafix_component::{Choice, Registry};
 use seafix_geometry::{MeasuredLine, NormalOffset, Pinhole, StereoRig};
 
 use crate::{
     image::Image,
     segment::{
-        FitScratch, FittedSegment, LineRules, SEGMENT_DETECTORS, SEGMENT_MATCHERS, Segment, SegmentDetector,
-        SegmentFit, SegmentMatch, SegmentMatcher, SegmentView, keep_distinct,
+        FitScratch, FittedSegment, LineRules, Segment, SegmentDetector, SegmentFit, SegmentMatch, SegmentMatcher,
+        SegmentView, keep_distinct,
     },
-    stages::InvalidStage,
     workspace::{Threads, Workspace},
 };
 
@@ -26,22 +24,8 @@ pub struct LineFrontEnd {
     pub matcher: Box<dyn SegmentMatcher>,
     /// The triangulation of matched segments.
     pub rules: LineRules,
-    /// Standard deviation (px) of the camera model's own error, added to every offset as to the pixels of points.
-    pub calibration_px: f64,
-}
-
-/// The chosen component or settings of each stage; the fields have the names of the settings.
-#[derive(Debug, Clone, Copy)]
-pub struct LineChoices<'a> {
-    /// The detector of segments.
-    pub segment_detector: &'a Choice,
-    /// The fit of each segment.
-    pub segment_fit: &'a SegmentFit,
-    /// The matcher of left and right segments.
-    pub segment_matcher: &'a Choice,
-    /// The triangulation of matched segments.
-    pub lines: &'a LineRules,
-    /// Standard deviation (px) of the camera model's own error: that of [`PointRules`](crate::PointRules).
+    /// Standard deviation (px) of the camera model's own error, added to every offset as to the pixels of points: that of
+    /// [`PointRules`](crate::PointRules).
     pub calibration_px: f64,
 }
 
@@ -80,20 +64,6 @@ impl LineOutput {
 }
 
 impl LineFrontEnd {
-    /// The stages of these choices.
-    ///
-    /// # Errors
-    /// [`InvalidStage`]: the first stage with an invalid choice.
-    pub fn build(choices: &LineChoices<'_>) -> Result<Self, InvalidStage> {
-        Ok(Self {
-            detector: stage("segment-detector", &SEGMENT_DETECTORS, choices.segment_detector)?,
-            fit: choices.segment_fit.clone(),
-            matcher: stage("segment-matcher", &SEGMENT_MATCHERS, choices.segment_matcher)?,
-            rules: choices.lines.clone(),
-            calibration_px: choices.calibration_px,
-        })
-    }
-
     /// Replaces the contents of `output` by the lines of the left and the right image of a pair.
     pub fn run(&self, [left, right]: [&Image; 2], rig: &StereoRig, output: &mut LineOutput) {
         let start = Instant::now();
@@ -124,8 +94,4 @@ impl LineFrontEnd {
         segments.extend(found.iter().filter_map(|segment| self.fit.fit(image, camera, segment, scratch)));
         keep_distinct(segments);
     }
-}
-
-fn stage<T: ?Sized>(stage: &'static str, of: &Registry<T>, choice: &Choice) -> Result<Box<T>, InvalidStage> {
-    of.build(choice).map_err(|error| InvalidStage { stage, place: None, error })
 }

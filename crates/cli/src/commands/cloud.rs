@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
-use seafix::Pipeline;
+use seafix::PipelineSettings;
 use seafix_component::{Choice, Fault};
 use seafix_data::dataset::{partners_remedy, strangers, swap_fault};
 use seafix_experiment::changed_pipeline;
@@ -61,7 +61,7 @@ pub(crate) struct Cloud {
 impl Cloud {
     pub(crate) fn execute(&self) -> Ended {
         let base = self.base()?;
-        let (pipeline, front_end) = built(&self.set, |set| changed_pipeline(&base, set), Pipeline::front_end)?;
+        let (pipeline, front_end) = built(&self.set, |set| changed_pipeline(&base, set), PipelineSettings::front_end)?;
         let CloudPair { images: [left, right], names, rig, rig_file, warnings } = self.input.read()?;
         let sides = Sides::of_images(&left, &right, &rig);
         if let Some(fault) = swap_fault(sides, &names[0]) {
@@ -93,8 +93,8 @@ impl Cloud {
     }
 
     /// The default pipeline with the components that flags name.
-    fn base(&self) -> Result<Pipeline, Failure> {
-        let mut pipeline = Pipeline::default();
+    fn base(&self) -> Result<PipelineSettings, Failure> {
+        let mut pipeline = PipelineSettings::default();
         let choose = |choice: &mut Choice, name: &Option<String>| {
             if let Some(name) = name {
                 *choice = Choice::named(name);
@@ -154,7 +154,7 @@ impl Cloud {
         names: &[PathBuf; 2],
         look: &FrontEndOutput,
         times: &[StageTimes],
-        pipeline: &Pipeline,
+        pipeline: &PipelineSettings,
         warnings: &[Fault],
     ) -> String {
         let points: Vec<Value> = look.cloud.iter().map(point).collect();

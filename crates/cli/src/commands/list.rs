@@ -11,8 +11,7 @@ use crate::{
 
 #[derive(Debug, Args)]
 pub(crate) struct List {
-    /// List this kind only: sources, filters, detectors, locators, descriptors, matchers, refinements, triangulators,
-    /// segment-detectors, segment-matchers, searches, solvers, odometries, policies or fusions.
+    /// List this kind only, as `solvers`; the complete list names all kinds.
     kind: Option<String>,
     /// Print the tables of docs/components.md.
     #[arg(long, conflicts_with = "kind")]
@@ -26,13 +25,13 @@ impl List {
             return Ok(DONE);
         }
         let kinds = kinds();
-        let wanted = |word: &str| kinds.iter().position(|kind| [kind.singular, kind.plural].contains(&word));
+        let wanted = |word: &str| kinds.iter().position(|kind| [kind.singular, &kind.plural].contains(&word));
         let chosen = match &self.kind {
             None => &kinds[..],
             Some(word) => match wanted(word) {
                 Some(index) => &kinds[index..=index],
                 None => {
-                    let names: Vec<&str> = kinds.iter().map(|kind| kind.plural).collect();
+                    let names: Vec<&str> = kinds.iter().map(|kind| &*kind.plural).collect();
                     return Err(Failure::new(USAGE, format!("there is no kind `{word}`{}", unknown(word, &names))));
                 }
             },

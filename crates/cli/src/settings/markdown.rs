@@ -23,7 +23,7 @@ pub(crate) fn markdown() -> String {
         text += &format!("## `{name}`\n\nThe settings of {}.\n\n{}\n", about.trim_end_matches('.'), table(own));
     }
     for kind in kinds() {
-        text += &format!("## {}\n\n", capital(kind.plural));
+        text += &format!("## {}\n\n", capital(&kind.plural));
         for listing in kind.listings {
             text += &format!("### {} `{}`\n\n{}.\n\n", listing.kind, listing.name, capital(listing.summary));
             let settings = listing.table.settings();

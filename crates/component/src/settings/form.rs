@@ -1,5 +1,7 @@
 //! The form of a value in a file.
 
+use crate::choice::Choice;
+
 /// A type whose form in files is known. `#[derive(Settings)]` implements it for structs and enums of serde.
 ///
 /// The sentence of a setting is the documentation comment of its field; a field without one does not compile.
@@ -30,6 +32,24 @@
 pub trait Settings {
     /// The form of a value of this type.
     fn form() -> Form;
+
+    /// The choices of components in the table's own settings, in the order of its fields.
+    fn choices(&mut self) -> Vec<Chosen<'_>> {
+        Vec::new()
+    }
+}
+
+/// A choice of a component in a table of settings.
+#[derive(Debug)]
+pub struct Chosen<'a> {
+    /// The key of the setting.
+    pub key: &'static str,
+    /// The kind of the component.
+    pub kind: &'static str,
+    /// The index in a list of choices.
+    pub place: Option<usize>,
+    /// The choice.
+    pub choice: &'a mut Choice,
 }
 
 /// The form of a value in a file.

@@ -8,7 +8,7 @@ mod setting;
 mod unit;
 
 pub use error::{Refusals, SettingsError};
-pub use form::{Field, Form, Settings};
+pub use form::{Chosen, Field, Form, Settings};
 pub use range::{Bound, Range};
 pub use setting::{Setting, SettingsTable};
 

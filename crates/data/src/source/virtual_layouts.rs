@@ -339,12 +339,14 @@ mod tests {
     fn of_all_layouts_that_is_attempted_whose_points_are_there() {
         let settings = VirtualLayouts { layouts: 20, frames: 20, ..VirtualLayouts::default() };
         let sequence = settings.open(1, Path::new(".")).unwrap();
-        let pipeline =
-            seafix::Pipeline { solver: seafix_component::Choice::named("kabsch"), ..seafix::Pipeline::default() };
+        let pipeline = seafix::PipelineSettings {
+            solver: seafix_component::Choice::named("kabsch"),
+            ..seafix::PipelineSettings::default()
+        };
         let (stages, targets) = (pipeline.build().unwrap(), sequence.site().targets(pipeline.target).unwrap());
         let mut rng = Stream::new(1, 0, 0, Purpose::Search);
         for index in 0..20 {
-            let found = stages.compute_fix(&sequence.sensor_frame(index).unwrap(), &targets, sequence.rig(), rng.rng());
+            let found = stages.run(&sequence.sensor_frame(index).unwrap(), &targets, sequence.rig(), rng.rng());
             let attempted: Vec<usize> = found.attempts.iter().map(|attempt| attempt.target).collect();
             assert_eq!(attempted, [index % 20]);
         }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use seafix::{FrameData, Pipeline};
+use seafix::{FrameData, PipelineSettings};
 use seafix_component::Choice;
 use seafix_data::{
     HandModel, ModelByHand,
@@ -40,7 +40,7 @@ fn marks(sequence: &dyn Sequence, frame: usize, off: f64, both: bool) -> (usize,
 }
 
 fn model(sequence: &dyn Sequence, frame: usize, text: &str, base: Option<[String; 3]>) -> Result<HandModel, String> {
-    let front_end = Pipeline::default().front_end().unwrap();
+    let front_end = PipelineSettings::default().front_end().unwrap();
     let by_hand =
         ModelByHand { front_end: &front_end, reach: 4.0, mark_sigma: 1.0, object: "by hand".to_owned(), base };
     let FrameData::Stereo(left, right) = sequence.sensor_frame(frame).unwrap().frame_data else { panic!("a pair") };

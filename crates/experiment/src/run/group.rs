@@ -4,7 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 use seafix::{
-    FrameData, FrameOdometry, FrameResult, Keyframes, NavigationSession, NavigationStack, NavigationState,
+    FrameData, FrameOdometry, FrameResult, KeyframeSettings, NavigationSession, NavigationStack, NavigationState,
     OdometryResult, SensorFrame, View,
 };
 use seafix_component::{Fault, decoded, undecodable};
@@ -141,7 +141,7 @@ pub(crate) fn open(plan: &Plan, separate: bool) -> Result<Vec<Group<'_>>, RunErr
 }
 
 /// The settings of a trial's key frames, if there are any.
-fn keyframes(trial: &Trial) -> Option<&Keyframes> {
+fn keyframes(trial: &Trial) -> Option<&KeyframeSettings> {
     trial.navigation_stack.as_ref()?.pose_graph.as_ref()
 }
 

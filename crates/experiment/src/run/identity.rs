@@ -7,14 +7,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use hmac_sha256::Hash as Sha256;
-use seafix_component::{Listing, Registry};
+use seafix::REGISTRIES;
+use seafix_component::Listing;
 use seafix_log::TrialHeader;
-use seafix_navigation::{FUSIONS, ODOMETRIES, POLICIES};
-use seafix_referencing::{SEARCHES, SOLVERS};
-use seafix_vision::{
-    DESCRIPTORS, DETECTORS, FILTERS, LOCATORS, MATCHERS, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS,
-    TRIANGULATORS,
-};
 use serde::{Deserialize, Serialize};
 
 use seafix_data::{dataset::hex, source::SOURCES};
@@ -35,8 +30,8 @@ pub const SHARED: [SharedPart; 8] = [
     SharedPart { name: "evaluation", version: 1, used: |_| true },
     // The logged quantities and the choice of logged frames.
     SharedPart { name: "log", version: 3, used: |_| true },
-    // The order of the stages on a stereo pair.
-    SharedPart { name: "front-end", version: 2, used: |used| used.images },
+    // The order of the stages on a stereo pair, and the trials that share them.
+    SharedPart { name: "front-end", version: 3, used: |used| used.images },
     // The navigator, the pose graph and key frames.
     SharedPart { name: "navigation", version: 2, used: |used| used.navigates },
     // Sites, dives, sensors, noisy points, problems and random streams.
@@ -65,26 +60,8 @@ struct Used {
 
 /// All components, one list for each kind, in the order of the pipeline.
 pub fn components() -> Vec<Vec<Listing>> {
-    fn of<T: ?Sized>(registry: &Registry<T>) -> Vec<Listing> {
-        registry.listings()
-    }
-    vec![
-        of(&SOURCES),
-        of(&FILTERS),
-        of(&DETECTORS),
-        of(&LOCATORS),
-        of(&DESCRIPTORS),
-        of(&MATCHERS),
-        of(&REFINEMENTS),
-        of(&TRIANGULATORS),
-        of(&SEGMENT_DETECTORS),
-        of(&SEGMENT_MATCHERS),
-        of(&SEARCHES),
-        of(&SOLVERS),
-        of(&ODOMETRIES),
-        of(&POLICIES),
-        of(&FUSIONS),
-    ]
+    let others = REGISTRIES.iter().map(|registry| registry.listings());
+    std::iter::once(SOURCES.listings()).chain(others).collect()
 }
 
 /// The inputs of one source.
@@ -121,22 +98,15 @@ pub(crate) fn versions(groups: &[Group<'_>], inputs: &[Input]) -> Versions {
 }
 
 fn of_trial(trial: &Trial, used: &Used, all: &[Listing]) -> Versions {
-    /// The stages between images and a cloud.
-    const FRONT_END: [&str; 9] = [
-        "filters",
-        "detector",
-        "locator",
-        "descriptor",
-        "matcher",
-        "refinement",
-        "triangulator",
-        "segment-detector",
-        "segment-matcher",
-    ];
     let mut settings =
         toml::Table::try_from(&trial.resolved).expect("a resolved experiment is a table of plain values");
     if let Some(pipeline) = settings.get_mut("pipeline").and_then(toml::Value::as_table_mut) {
-        let idle = |stage: &str| !used.images && FRONT_END.contains(&stage) || used.labelled && stage == "search";
+        // All chosen stages before the search work on images.
+        let front_end = |stage: &str| {
+            let mut stages = REGISTRIES.iter().map(|registry| registry.kind()).take_while(|kind| *kind != "search");
+            stage == "filters" || stages.any(|kind| kind == stage)
+        };
+        let idle = |stage: &str| !used.images && front_end(stage) || used.labelled && stage == "search";
         pipeline.retain(|stage, _| !idle(stage));
     }
     let mut found = Found { all, versions: Versions::new(), defaults: BTreeSet::new() };

@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use seafix::{Cloud, FrameResult, Pipeline, SearchResult};
+use seafix::{Cloud, FrameResult, PipelineSettings, SearchResult};
 use seafix_log::SharedStages;
 
 use crate::experiment::Trial;
@@ -58,24 +58,23 @@ fn same_front_end(a: &Trial, b: &Trial) -> bool {
     let target = |trial: &Trial| trial.resolved.pipeline.target;
     let alone = |trial: &Trial| trial.navigation_stack.is_none();
     let same_priors = !a.stages.is_guided() || alone(a) && alone(b) && target(a) == target(b);
-    let stages = |trial: &Trial| {
-        let Pipeline { filters, points, detector, locator, descriptor, matcher, refinement, triangulator, .. } =
-            trial.resolved.pipeline.clone();
-        (filters, points, detector, locator, descriptor, matcher, refinement, triangulator)
-    };
-    let lines = |trial: &Trial| {
-        let Pipeline { edges, segment_detector, segment_fit, segment_matcher, lines, .. } =
-            trial.resolved.pipeline.clone();
-        (edges, segment_detector, segment_fit, segment_matcher, lines)
-    };
-    same_priors && stages(a) == stages(b) && lines(a) == lines(b)
+    same_priors && front_end(a) == front_end(b)
+}
+
+/// The pipeline with the defaults of all settings that act after the cloud and its lines.
+fn front_end(trial: &Trial) -> PipelineSettings {
+    let PipelineSettings {
+        target, window, attempts, gate, expand_gates, tolerance, search, solver, acceptance, ..
+    } = PipelineSettings::default();
+    let own = trial.resolved.pipeline.clone();
+    PipelineSettings { target, window, attempts, gate, expand_gates, tolerance, search, solver, acceptance, ..own }
 }
 
 /// Searches are shared only without navigation, because they then start from the same priors. With expanding gates the
 /// random numbers of one target depend on the solver's result for the previous one.
 fn same_search(a: &Trial, b: &Trial) -> bool {
     let searched = |trial: &Trial| {
-        let Pipeline { target, attempts, gate, tolerance, search, .. } = trial.resolved.pipeline.clone();
+        let PipelineSettings { target, attempts, gate, tolerance, search, .. } = trial.resolved.pipeline.clone();
         (target, attempts, gate, tolerance, search)
     };
     let alone = |trial: &Trial| trial.navigation_stack.is_none() && !trial.resolved.pipeline.expand_gates;

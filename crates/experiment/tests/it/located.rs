@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use seafix::{FrameData, Pipeline};
+use seafix::{FrameData, PipelineSettings};
 use seafix_data::source::Sequence;
 use seafix_experiment::{Plan, changed_pipeline};
 use seafix_geometry::StereoPixels;
@@ -20,7 +20,7 @@ struct Corner {
 /// such a pair is given too.
 fn corners(sequence: &dyn Sequence, settings: &[&str]) -> (Vec<Corner>, usize) {
     let settings: Vec<String> = settings.iter().map(|&setting| setting.to_owned()).collect();
-    let front_end = changed_pipeline(&Pipeline::default(), &settings).unwrap().front_end().unwrap();
+    let front_end = changed_pipeline(&PipelineSettings::default(), &settings).unwrap().front_end().unwrap();
     let (mut output, mut found, mut missed) = (FrontEndOutput::new(Threads::Pool), Vec::new(), 0);
     for index in 0..sequence.frames() {
         let FrameData::Stereo(left, right) = sequence.sensor_frame(index).unwrap().frame_data else { continue };

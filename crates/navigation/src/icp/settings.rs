@@ -1,7 +1,10 @@
 //! Settings of the registration of clouds.
 
 use seafix_component::{Choice, Component, Settings, in_range};
-use seafix_vision::{FrontEnd, StageChoices, read_refinement, read_triangulator};
+use seafix_vision::{
+    DESCRIPTORS, DETECTORS, FILTERS, FrontEnd, LOCATORS, MATCHERS, REFINEMENTS, TRIANGULATORS, read_refinement,
+    read_triangulator,
+};
 use serde::{Deserialize, Serialize};
 
 /// The distance measure between two points.
@@ -128,15 +131,16 @@ impl Component for Icp {
 
 impl Icp {
     pub(super) fn front_end(&self) -> Result<FrontEnd, String> {
-        let choices = StageChoices {
-            filters: &self.filters,
-            detector: &self.detector,
-            locator: &self.locator,
-            descriptor: &self.descriptor,
-            matcher: &self.matcher,
-            refinement: &self.refinement,
-            triangulator: &self.triangulator,
-        };
-        FrontEnd::build(&choices).map_err(|invalid| invalid.to_string())
+        let message = |error: seafix_component::BuildError| error.to_string();
+        let filters = self.filters.iter().map(|filter| FILTERS.build(filter));
+        Ok(FrontEnd {
+            filters: filters.collect::<Result<_, _>>().map_err(message)?,
+            detector: DETECTORS.build(&self.detector).map_err(message)?,
+            locator: LOCATORS.build(&self.locator).map_err(message)?,
+            descriptor: DESCRIPTORS.build(&self.descriptor).map_err(message)?,
+            matcher: MATCHERS.build(&self.matcher).map_err(message)?,
+            refinement: REFINEMENTS.build(&self.refinement).map_err(message)?,
+            triangulator: TRIANGULATORS.build(&self.triangulator).map_err(message)?,
+        })
     }
 }

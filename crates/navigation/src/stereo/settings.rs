@@ -3,8 +3,8 @@
 use seafix_component::{Choice, Component, Settings, in_range};
 use seafix_referencing::{SOLVERS, Solver};
 use seafix_vision::{
-    DESCRIPTORS, Descriptor, Direct, FrontEnd, MATCHERS, Matcher, StageChoices, Warp, read_refinement,
-    read_triangulator,
+    DESCRIPTORS, DETECTORS, Descriptor, Direct, FILTERS, FrontEnd, LOCATORS, MATCHERS, Matcher, REFINEMENTS,
+    TRIANGULATORS, Warp, read_refinement, read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -168,17 +168,18 @@ pub(crate) struct StereoStages {
 impl Stereo {
     pub(crate) fn stages(&self) -> Result<StereoStages, String> {
         let message = |error: seafix_component::BuildError| error.to_string();
-        let choices = StageChoices {
-            filters: &self.filters,
-            detector: &self.detector,
-            locator: &self.locator,
-            descriptor: &self.descriptor,
-            matcher: &self.matcher,
-            refinement: &self.refinement,
-            triangulator: &self.triangulator,
+        let filters = self.filters.iter().map(|filter| FILTERS.build(filter));
+        let front_end = FrontEnd {
+            filters: filters.collect::<Result<_, _>>().map_err(message)?,
+            detector: DETECTORS.build(&self.detector).map_err(message)?,
+            locator: LOCATORS.build(&self.locator).map_err(message)?,
+            descriptor: DESCRIPTORS.build(&self.descriptor).map_err(message)?,
+            matcher: MATCHERS.build(&self.matcher).map_err(message)?,
+            refinement: REFINEMENTS.build(&self.refinement).map_err(message)?,
+            triangulator: TRIANGULATORS.build(&self.triangulator).map_err(message)?,
         };
         Ok(StereoStages {
-            front_end: FrontEnd::build(&choices).map_err(|invalid| invalid.to_string())?,
+            front_end,
             descriptor: DESCRIPTORS.build(&self.descriptor).map_err(message)?,
             between: MATCHERS.build(&self.between).map_err(message)?,
             minimal: SOLVERS.build(&self.minimal).map_err(message)?,

@@ -3,7 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use seafix_component::Choice;
 use seafix_geometry::{Camera, MeasuredLine, Pinhole, Pixel, Point, StereoRig, Transform};
-use seafix_vision::{Image, LineChoices, LineFrontEnd, LineOutput, LineRules, SEGMENT_MATCHERS, SegmentFit};
+use seafix_vision::{Image, LineFrontEnd, LineOutput, LineRules, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit};
 
 const SIZE: [usize; 2] = [480, 360];
 /// The depth of the wall (m).
@@ -62,16 +62,19 @@ fn lines(rig: &StereoRig, matcher: &str, calibration_px: f64) -> Vec<MeasuredLin
 }
 
 pub(crate) fn measured([left, right]: &[Image; 2], rig: &StereoRig, matcher: &str, calibration_px: f64) -> LineOutput {
-    let choices = LineChoices {
-        segment_detector: &Choice::named("a-contrario"),
-        segment_fit: &SegmentFit::default(),
-        segment_matcher: &Choice::named(matcher),
-        lines: &LineRules::default(),
-        calibration_px,
-    };
     let mut output = LineOutput::default();
-    LineFrontEnd::build(&choices).expect("valid choices").run([left, right], rig, &mut output);
+    front_end(matcher, calibration_px).run([left, right], rig, &mut output);
     output
+}
+
+fn front_end(matcher: &str, calibration_px: f64) -> LineFrontEnd {
+    LineFrontEnd {
+        detector: SEGMENT_DETECTORS.build(&Choice::named("a-contrario")).expect("a component"),
+        fit: SegmentFit::default(),
+        matcher: SEGMENT_MATCHERS.build(&Choice::named(matcher)).expect("a component"),
+        rules: LineRules::default(),
+        calibration_px,
+    }
 }
 
 /// The distance (m) of a point of the wall from the nearest true edge.
@@ -124,14 +127,7 @@ fn the_error_of_the_camera_model_widens_lines_alone() {
 fn lines_do_not_depend_on_threads() {
     let rig = rig([0.25, 0.0, 0.0], &[]);
     let [left, right] = images(&rig);
-    let choices = LineChoices {
-        segment_detector: &Choice::named("a-contrario"),
-        segment_fit: &SegmentFit::default(),
-        segment_matcher: &Choice::named("overlap-profile"),
-        lines: &LineRules::default(),
-        calibration_px: 0.0,
-    };
-    let front_end = LineFrontEnd::build(&choices).expect("valid choices");
+    let front_end = front_end("overlap-profile", 0.0);
     let run = |threads| {
         let mut output = LineOutput::new(threads);
         front_end.run([&left, &right], &rig, &mut output);

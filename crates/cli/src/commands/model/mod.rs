@@ -8,7 +8,7 @@ mod pair;
 mod propose;
 mod true_marks;
 
-use seafix::Pipeline;
+use seafix::PipelineSettings;
 use seafix_data::ModelByHand;
 use seafix_experiment::changed_pipeline;
 
@@ -38,8 +38,8 @@ impl Model {
             }
         };
         let calibration = self.dive.calibration()?;
-        let change = |set: &[String]| changed_pipeline(&Pipeline::default(), set);
-        let (_, front_end) = built(&self.set, change, Pipeline::front_end)?;
+        let change = |set: &[String]| changed_pipeline(&PipelineSettings::default(), set);
+        let (_, front_end) = built(&self.set, change, PipelineSettings::front_end)?;
         let (reach, mark_sigma, object) = (self.reach, self.mark_sigma, self.id.clone());
         let by_hand = ModelByHand { front_end: &front_end, reach, mark_sigma, object, base };
         if let Some(error) = self.dive.true_marks {
@@ -50,7 +50,7 @@ impl Model {
         }
         match (&self.marks, &self.right, &self.rig, &self.points) {
             (Some(marks), ..) => {
-                let mut lines = built(&self.set, change, Pipeline::line_front_end)?.1;
+                let mut lines = built(&self.set, change, PipelineSettings::line_front_end)?.1;
                 // The points of a dive do not contain the calibration's error, which all pairs have in common.
                 lines.calibration_px = 0.0;
                 dive::execute(self, marks, by_hand, calibration, self.dive.edges.then_some(&lines))
