@@ -152,12 +152,12 @@ impl Pattern {
 
     /// Adds to each mode the evidence of the pattern around the object; the best mode is then the first.
     ///
-    /// Detectors and matchers lose a pattern in blocks, such as a row. If the pattern continues beyond the object,
-    /// unseen points therefore do not distinguish the shifts within it: a shift has at least the evidence of the best
-    /// mode, changed by the prior, by the residuals and by the points and edges outside the pattern alone. Poses that
-    /// identify no such point are compared by the prior and these edges: a few corners with larger errors than stated
-    /// decide their residuals. A complete identification with few of the places beyond it seen shows that the pattern
-    /// ends there, and evidence decides.
+    /// Detectors and matchers lose a pattern in blocks, such as a row. If the pattern goes on to one side of the object
+    /// ([`Self::goes_on_to`]), unseen points therefore do not distinguish the shifts to this side: such a shift has at
+    /// least the evidence of the best mode, changed by the prior, by the residuals and by the points and edges outside
+    /// the pattern alone, and may become the best. Poses that identify no such point are compared by the prior and these
+    /// edges: a few corners with larger errors than stated decide their residuals. Where the pattern ends, evidence
+    /// decides.
     ///
     /// Returns the evidence of the pattern at the best mode; `None` without modes.
     pub(in crate::search) fn weigh(
