@@ -130,7 +130,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 12;
+    const VERSION: u32 = 13;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -331,6 +331,9 @@ impl Search for RigidConsensus {
                     .then(|| occupied.mistaken(problem, (&terms, &graph), &others.modes))
                     .flatten();
                 others.modes.retain(elsewhere);
+                // A shift of the object within its pattern is a hypothesis of its own.
+                let shift = |mode: &Mode| pattern.as_ref().is_some_and(|of| of.shift_between(best, mode).is_some());
+                others.modes.retain(|mode| !shift(mode));
                 let clutter_patterns = others
                     .modes
                     .iter()

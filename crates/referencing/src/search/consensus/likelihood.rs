@@ -194,12 +194,18 @@ fn inside((x, y, z): (&[f64], &[f64], &[f64]), place: &Vector3<f64>, half: &Vect
     count
 }
 
-/// ln of the density of a measurement given its true place; `None` beyond the gate.
-pub(in crate::search) fn ln_measured(seen: &UncertainPoint<Camera>, place: &Vector3<f64>) -> Option<f64> {
+/// ln of the density of a measurement given its place in the model, whose coordinates have a variance (m²); `None`
+/// beyond the gate.
+pub(in crate::search) fn ln_measured(
+    seen: &UncertainPoint<Camera>,
+    variance: f64,
+    place: &Vector3<f64>,
+) -> Option<f64> {
     let r = seen.at.coords - place;
-    let far = FAR * seen.covariance.trace();
+    let noise = seen.covariance + Matrix3::identity() * variance;
+    let far = FAR * noise.trace();
     // χ² is at least r²/tr Σ.
-    let (weight, ln_peak) = (r.norm_squared() <= far).then(|| peak(&seen.covariance))?;
+    let (weight, ln_peak) = (r.norm_squared() <= far).then(|| peak(&noise))?;
     let d2 = r.dot(&(weight * r));
     (d2 <= FAR).then_some(ln_peak - 0.5 * d2)
 }

@@ -50,6 +50,8 @@ pub(in crate::search) struct Pattern {
     pub(super) beyond: Vec<Vector3<f64>>,
     /// Tolerance of a place (m).
     off: f64,
+    /// Mean variance of a coordinate of the points of the pattern (m²).
+    variance: f64,
     /// The steps of the pattern, one to three (object frame).
     pub(super) basis: Vec<Vector3<f64>>,
 }
@@ -115,8 +117,15 @@ impl Pattern {
             return None;
         }
         let edges_repeat = repeated_edges(edges, model, &basis, off);
-        let mut pattern =
-            Self { repeats: vec![false; n], edges_repeat, at: Vec::new(), beyond: Vec::new(), off, basis };
+        let mut pattern = Self {
+            repeats: vec![false; n],
+            edges_repeat,
+            at: Vec::new(),
+            beyond: Vec::new(),
+            off,
+            variance: 0.0,
+            basis,
+        };
         let basis = pattern.basis.clone();
         let next = |i: usize| basis.iter().flat_map(|step| [*step, -step]).map(move |step| (i, step));
         for (i, step) in (0..n).flat_map(next) {
@@ -140,7 +149,9 @@ impl Pattern {
                 pattern.beyond.push(place);
             }
         }
-        pattern.at = (0..n).filter(|&i| pattern.repeats[i]).map(|i| at[i]).collect();
+        let of_it: Vec<usize> = (0..n).filter(|&i| pattern.repeats[i]).collect();
+        pattern.at = of_it.iter().map(|&i| at[i]).collect();
+        pattern.variance = of_it.iter().map(|&i| model[i].sigma.powi(2)).sum::<f64>() / of_it.len().max(1) as f64;
         Some(pattern)
     }
 
@@ -234,7 +245,7 @@ impl Pattern {
         for place in places.iter().map(|place| mode.motion.apply(place)) {
             let free = problem.cloud.iter().zip(&taken).filter(|(_, taken)| !**taken);
             let gain = free
-                .filter_map(|(point, _)| ln_measured(&point.position, &place))
+                .filter_map(|(point, _)| ln_measured(&point.position, self.variance, &place))
                 .map(|ln_density| ln_density - ln_clutter)
                 .fold(0.0, f64::max);
             gains += gain;
@@ -243,18 +254,20 @@ impl Pattern {
         (further, gains)
     }
 
-    /// The shift of each mode from the first, if it is one: the same attitude, and a step onto the pattern itself.
+    /// The shift of each mode from the first, if it is one.
     fn shifts_from_first(&self, modes: &[Mode]) -> Vec<Option<Vector3<f64>>> {
+        modes.iter().map(|mode| self.shift_between(&modes[0], mode)).collect()
+    }
+
+    /// The shift from one mode to another (object frame), if it is one: the same attitude, and a step of the pattern.
+    pub(in crate::search) fn shift_between(&self, from: &Mode, to: &Mode) -> Option<Vector3<f64>> {
         let lattice = Lattice::of(&self.basis, 1.0);
         let reach = self.at.iter().map(|p| p.norm()).fold(0.0, f64::max);
-        let shift = |mode: &Mode| {
-            let first = &modes[0].motion;
-            let turned = (mode.motion.rotation - first.rotation).norm() * reach;
-            let centroid = self.at.iter().sum::<Vector3<f64>>() / self.at.len() as f64;
-            let step = first.rotation.transpose() * (mode.motion.apply(&centroid) - first.apply(&centroid));
-            (turned <= MIN_STEP * self.off && lattice.off(&step) <= MIN_STEP * self.off).then(|| lattice.nearest(&step))
-        };
-        modes.iter().map(shift).collect()
+        let (from, to) = (&from.motion, &to.motion);
+        let turned = (to.rotation - from.rotation).norm() * reach;
+        let centroid = self.at.iter().sum::<Vector3<f64>>() / self.at.len() as f64;
+        let step = from.rotation.transpose() * (to.apply(&centroid) - from.apply(&centroid));
+        (turned <= MIN_STEP * self.off && lattice.off(&step) <= MIN_STEP * self.off).then(|| lattice.nearest(&step))
     }
 
     /// The places beyond the object at which the pattern may continue, if the object may also be at these shifts.
