@@ -10,7 +10,7 @@ use seafix_referencing::{
     Solver, Target, Tolerance, candidates, edge_candidates, judge, judge_labelled, problem_file::CoherenceProblem,
     search_with_expanding_gates,
 };
-use seafix_vision::{FrontEnd, FrontEndOutput, LineFrontEnd, LineOutput, Regions};
+use seafix_vision::{CornerView, FrontEnd, FrontEndOutput, LineFrontEnd, LineOutput, Regions};
 
 use crate::{
     frame_result::{Cloud, FrameResult, SearchResult, TargetAttempt, View},
@@ -200,30 +200,39 @@ impl Pipeline {
             true => self.front_end.run_guided([left, right], rig, regions, &mut output),
             false => self.front_end.filter_pair([left, right], &mut output),
         }
+        let keypoints = output.keypoints()[0].into();
+        let mut points = std::mem::take(&mut output.cloud);
+        let [l, r] = output.filtered();
+        let images = [l.unwrap_or(left), r.unwrap_or(right)];
+        let outlines_from = Instant::now();
+        if uses_points && self.settings.outline_corners.enabled {
+            let ([l, r], [of_l, of_r]) = (output.keypoints(), output.located());
+            let view = |image, keypoints, located| CornerView { image, keypoints, located };
+            let views = [view(images[0], l, of_l), view(images[1], r, of_r)];
+            self.settings.outline_corners.add_to(&mut points, &views, rig, &*self.front_end.triangulator);
+        }
         let times = FrameTimes {
             detect_ms: Some(output.times.filter_ms + output.times.detect_ms),
             locate_ms: Some(output.times.locate_ms),
             describe_ms: Some(output.times.describe_ms),
-            match_ms: Some(output.times.match_ms),
+            match_ms: Some(output.times.match_ms + milliseconds(outlines_from)),
             refine_ms: Some(output.times.refine_ms),
             triangulate_ms: Some(output.times.triangulate_ms),
         };
-        let keypoints = output.keypoints()[0].into();
-        let [l, r] = output.filtered();
         let identified = self.settings.edges == UseOfEdges::On && targets.iter().any(|target| !target.edges.is_empty());
         let corners = &self.settings.edge_corners;
         let mut measured = LineOutput::default();
         if identified || (corners.enabled && uses_points) {
-            self.line_front_end.run([l.unwrap_or(left), r.unwrap_or(right)], rig, &mut measured);
+            self.line_front_end.run(images, rig, &mut measured);
         }
         // An edge serves as itself or by its corners: as both, its errors would count twice.
         if !identified && uses_points {
             let triangulator = &*self.front_end.triangulator;
-            corners.add_to(&mut output.cloud, measured.segments(), &measured.matches, rig, triangulator);
+            corners.add_to(&mut points, measured.segments(), &measured.matches, rig, triangulator);
             measured.lines.clear();
         }
         let lines = measured.lines.into();
-        let points = output.cloud[..].into();
+        let points = points.into();
         Cloud { keypoints, points, lines, times, total_ms: milliseconds(start) }
     }
 

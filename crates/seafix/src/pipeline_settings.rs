@@ -3,8 +3,9 @@
 use seafix_component::{Choice, Settings, each_invalid, in_range};
 use seafix_referencing::{Acceptance, Gate, SEARCHES, SOLVERS, TargetKind, Tolerance};
 use seafix_vision::{
-    DESCRIPTORS, DETECTORS, EdgeCorners, FILTERS, FrontEnd, LOCATORS, LineFrontEnd, LineRules, MATCHERS, REFINEMENTS,
-    SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, TRIANGULATORS, read_refinement, read_triangulator,
+    DESCRIPTORS, DETECTORS, EdgeCorners, FILTERS, FrontEnd, LOCATORS, LineFrontEnd, LineRules, MATCHERS,
+    OutlineCorners, REFINEMENTS, SEGMENT_DETECTORS, SEGMENT_MATCHERS, SegmentFit, TRIANGULATORS, read_refinement,
+    read_triangulator,
 };
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +47,8 @@ pub struct PipelineSettings {
     pub edges: UseOfEdges,
     /// The features that decide whether an object is attempted.
     pub attempts: Attempts,
+    /// Corners of outlines, which have another background in each image. They become points of the cloud.
+    pub outline_corners: OutlineCorners,
     /// The detector of straight segments.
     pub segment_detector: Choice,
     /// The fit of a segment over its length.
@@ -87,6 +90,7 @@ impl Default for PipelineSettings {
             points: UseOfPoints::On,
             edges: UseOfEdges::On,
             attempts: Attempts::Identified,
+            outline_corners: OutlineCorners::default(),
             segment_detector: Choice::named("a-contrario"),
             segment_fit: SegmentFit::default(),
             segment_matcher: Choice::named("overlap-profile"),
@@ -147,6 +151,8 @@ impl PipelineSettings {
     /// All faults that keep the pipeline from being built.
     pub fn invalid(&self) -> Vec<PipelineError> {
         let mut all = choices::faults(self);
+        let outlines = each_invalid(&self.outline_corners, OutlineCorners::check);
+        all.extend(outlines.into_iter().map(|message| invalid_setting("outline-corners", message)));
         let fit = each_invalid(&self.segment_fit, SegmentFit::check);
         all.extend(fit.into_iter().map(|message| invalid_setting("segment-fit", message)));
         let lines = each_invalid(&self.lines, LineRules::check);
@@ -238,6 +244,7 @@ impl PipelineSettings {
     /// # Errors
     /// The first invalid setting.
     pub fn build(&self) -> Result<Pipeline, PipelineError> {
+        self.outline_corners.check().map_err(|message| invalid_setting("outline-corners", message))?;
         self.gate.check().map_err(|message| invalid_setting("gate", message))?;
         self.tolerance.check().map_err(|message| invalid_setting("tolerance", message))?;
         self.acceptance.check().map_err(|message| invalid_setting("acceptance", message))?;

@@ -114,6 +114,11 @@ impl FrontEndOutput {
         [&self.sides[0].keypoints, &self.sides[1].keypoints]
     }
 
+    /// The corners that the locator found, in the order of the key points.
+    pub fn located(&self) -> [&[Option<UncertainPixel>]; 2] {
+        [&self.sides[0].located, &self.sides[1].located]
+    }
+
     /// The descriptors in the order of the key points; meaningless if the matcher compares none.
     pub fn descriptors(&self) -> [&Descriptors; 2] {
         [&self.sides[0].descriptors, &self.sides[1].descriptors]

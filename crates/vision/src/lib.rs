@@ -92,7 +92,9 @@ pub use line_front_end::{LineFrontEnd, LineOutput};
 pub use locate::{
     Corner, CornerFit, CornerJunction, Junction, LCorner, LOCATORS, Locator, Pair, Peak, UncertainPixel, XCorner,
 };
-pub use matching::{EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, View, ZnccBand};
+pub use matching::{
+    CornerView, EpipolarBand, LucasKanade, MATCHERS, Match, Matcher, MutualRatio, OutlineCorners, View, ZnccBand,
+};
 pub use regions::{Disc, Regions};
 pub use right_camera_rotation::RightCameraRotation;
 pub use segment::{

@@ -31,7 +31,7 @@ pub const SHARED: [SharedPart; 8] = [
     // The logged quantities and the choice of logged frames.
     SharedPart { name: "log", version: 3, used: |_| true },
     // The order of the stages on a stereo pair, and the trials that share them.
-    SharedPart { name: "front-end", version: 3, used: |used| used.images },
+    SharedPart { name: "front-end", version: 4, used: |used| used.images },
     // The navigator, the pose graph and key frames.
     SharedPart { name: "navigation", version: 2, used: |used| used.navigates },
     // Sites, dives, sensors, noisy points, problems and random streams.

@@ -16,6 +16,7 @@ mod zncc_patch;
 pub use brief::Brief;
 pub use descriptor::{Descriptor, Descriptors, Table};
 pub use orb::Orb;
+pub(crate) use sample::bilinear;
 use seafix_component::{Registry, entry};
 pub use sift::Sift;
 pub use surf::Surf;

@@ -4,7 +4,7 @@
 ///
 /// The nearest pixel is repeated beyond the border.
 #[inline(always)]
-pub(super) fn bilinear(pixels: &[f32], width: usize, u: f32, v: f32) -> f32 {
+pub(crate) fn bilinear(pixels: &[f32], width: usize, u: f32, v: f32) -> f32 {
     let height = pixels.len() / width;
     let (left, right, across) = around(u, width);
     let (above, below, down) = around(v, height);

@@ -14,6 +14,7 @@ mod matcher;
 mod metric;
 mod mutual_ratio;
 mod nearest;
+mod outline_corners;
 mod sought;
 mod support;
 #[cfg(test)]
@@ -24,6 +25,7 @@ pub use epipolar_band::EpipolarBand;
 pub use lucas_kanade::LucasKanade;
 pub use matcher::{Match, Matcher, View};
 pub use mutual_ratio::MutualRatio;
+pub use outline_corners::{CornerView, OutlineCorners};
 use seafix_component::{Registry, entry};
 pub use zncc_band::ZnccBand;
 

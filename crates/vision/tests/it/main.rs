@@ -11,6 +11,7 @@ mod front_end;
 mod lines;
 mod locators;
 mod matchers;
+mod outline_corners;
 mod scenes;
 mod segments;
 mod settings;
