@@ -47,7 +47,8 @@ pub struct PipelineSettings {
     pub edges: UseOfEdges,
     /// The features that decide whether an object is attempted.
     pub attempts: Attempts,
-    /// Corners of outlines, which have another background in each image. They become points of the cloud.
+    /// Corners of outlines (occluding contours), which have another background in each image. They become points of the
+    /// cloud.
     pub outline_corners: OutlineCorners,
     /// The detector of straight segments.
     pub segment_detector: Choice,
@@ -207,6 +208,7 @@ impl PipelineSettings {
     /// # Errors
     /// The first invalid setting.
     pub fn front_end(&self) -> Result<FrontEnd, PipelineError> {
+        self.outline_corners.check().map_err(|message| invalid_setting("outline-corners", message))?;
         let filter = |(place, choice): (usize, &Choice)| {
             FILTERS.build(choice).map_err(|error| PipelineError::of_component("filters", Some(place), &error))
         };
@@ -244,7 +246,6 @@ impl PipelineSettings {
     /// # Errors
     /// The first invalid setting.
     pub fn build(&self) -> Result<Pipeline, PipelineError> {
-        self.outline_corners.check().map_err(|message| invalid_setting("outline-corners", message))?;
         self.gate.check().map_err(|message| invalid_setting("gate", message))?;
         self.tolerance.check().map_err(|message| invalid_setting("tolerance", message))?;
         self.acceptance.check().map_err(|message| invalid_setting("acceptance", message))?;

@@ -11,8 +11,9 @@
 //! 7. A [`Triangulator`] turns the pairs that pass the epipolar test into
 //!    [`MeasuredPoint`](seafix_geometry::MeasuredPoint)s.
 //!
-//! [`FrontEnd`] runs them all. The centre of the first pixel is (0, 0). Brightness is linear in the stored values: 0 is
-//! black and 255 is the white of an 8-bit image.
+//! [`FrontEnd`] runs them all. [`OutlineCorners`] and [`EdgeCorners`] add corners that descriptors do not match. The
+//! centre of the first pixel is (0, 0). Brightness is linear in the stored values: 0 is black and 255 is the white of an
+//! 8-bit image.
 //!
 //! ```
 //! use nalgebra::{UnitQuaternion, Vector3};

@@ -332,12 +332,11 @@ impl Search for RigidConsensus {
                     .flatten();
                 others.modes.retain(elsewhere);
                 // A shift of the object within its pattern is a hypothesis of its own.
-                let shift = |mode: &Mode| pattern.as_ref().is_some_and(|of| of.shift_between(best, mode).is_some());
-                others.modes.retain(|mode| !shift(mode));
+                let is_shift = |mode: &Mode| pattern.as_ref().is_some_and(|of| of.is_shift(&best.motion, &mode.motion));
                 let clutter_patterns = others
                     .modes
                     .iter()
-                    .filter(|_| structured)
+                    .filter(|other| structured && !is_shift(other))
                     .map(|other| occupied.structured_clutter(problem, parts, other));
                 let weight = |of: &StructuredClutter| of.ln_evidence + of.ln_alone;
                 structured_clutter = clutter_patterns.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));

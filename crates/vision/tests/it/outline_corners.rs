@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use seafix_component::Choice;
 use seafix_geometry::{MeasuredPoint, Pixel, StereoPixels};
 use seafix_vision::{
-    CornerView, DESCRIPTORS, DETECTORS, Direct, FrontEnd, FrontEndOutput, Image, LOCATORS, MATCHERS, Optimal,
+    CornerView, DESCRIPTORS, DETECTORS, Direct, FrontEnd, FrontEndOutput, Image, Keypoint, LOCATORS, MATCHERS, Optimal,
     OutlineCorners, PointRules,
 };
 
@@ -109,4 +109,24 @@ fn unlike_plates_have_few_corners_in_common() {
     };
     let added = (0..24).map(added).sum::<usize>();
     assert!(added <= 12, "{added}");
+}
+
+/// Neither an image of one pixel nor a key point without a position gives a corner, and invalid settings are named.
+#[test]
+fn degenerate_input_gives_no_corner() {
+    let rig = rig([0.25, 0.0, 0.0], [0.0; 3], &[]);
+    let image = Image::new(1, 1, vec![7.0]).expect("one pixel");
+    let nowhere = Keypoint { at: Pixel { u: f64::NAN, v: 0.0 }, response: 1.0, scale: 1.0 };
+    let corner = Keypoint { at: Pixel { u: 0.0, v: 0.0 }, ..nowhere };
+    for keypoints in [&[][..], &[nowhere, corner]] {
+        let located = vec![None; keypoints.len()];
+        let view = CornerView { image: &image, keypoints, located: &located };
+        let mut cloud = Vec::new();
+        OutlineCorners::default().add_to(&mut cloud, &[view; 2], &rig, &Optimal::default());
+        assert_eq!(cloud.len(), 0);
+    }
+    let wrong = OutlineCorners { junction_sigma: -1.0, ..OutlineCorners::default() };
+    assert!(wrong.check().unwrap_err().contains("junction-sigma"), "{:?}", wrong.check());
+    let wrong = OutlineCorners { ratio: 0.0, ..OutlineCorners::default() };
+    assert!(wrong.check().unwrap_err().contains("ratio"), "{:?}", wrong.check());
 }

@@ -7,6 +7,7 @@ use super::{
     fractions::ln_fraction,
     graph::ConsistencyGraph,
     likelihood::{Mode, Terms, ln_measured},
+    motion::Motion,
     pattern_edges::{EdgeEvidence, repeated_edges},
     pattern_shifts::{ln_phase, ln_shifted},
     prior_terms::PriorTerms,
@@ -33,6 +34,8 @@ const MAX_REGION: usize = 64;
 /// Evidence (nats) that a pattern ends at one side of the object, above which a complete identification decides against
 /// the shifts to this side; the margin of the search.
 const ENDS: f64 = 10.0;
+/// Tolerance of a shift, as a fraction of the shortest step.
+const SHIFT_FRACTION: f64 = 0.25;
 /// Sine of the angle between two steps below which they are one direction.
 const SAME: f64 = 0.3;
 
@@ -149,9 +152,9 @@ impl Pattern {
                 pattern.beyond.push(place);
             }
         }
-        let of_it: Vec<usize> = (0..n).filter(|&i| pattern.repeats[i]).collect();
-        pattern.at = of_it.iter().map(|&i| at[i]).collect();
-        pattern.variance = of_it.iter().map(|&i| model[i].sigma.powi(2)).sum::<f64>() / of_it.len().max(1) as f64;
+        let members: Vec<usize> = (0..n).filter(|&i| pattern.repeats[i]).collect();
+        pattern.at = members.iter().map(|&i| at[i]).collect();
+        pattern.variance = members.iter().map(|&i| model[i].sigma.powi(2)).sum::<f64>() / members.len().max(1) as f64;
         Some(pattern)
     }
 
@@ -256,18 +259,26 @@ impl Pattern {
 
     /// The shift of each mode from the first, if it is one.
     fn shifts_from_first(&self, modes: &[Mode]) -> Vec<Option<Vector3<f64>>> {
-        modes.iter().map(|mode| self.shift_between(&modes[0], mode)).collect()
+        modes.iter().map(|mode| self.shift_between(&modes[0].motion, &mode.motion, MIN_STEP * self.off)).collect()
     }
 
-    /// The shift from one mode to another (object frame), if it is one: the same attitude, and a step of the pattern.
-    pub(in crate::search) fn shift_between(&self, from: &Mode, to: &Mode) -> Option<Vector3<f64>> {
+    /// Whether one pose is another one shifted within the pattern: points of one lie on points of the other.
+    pub(in crate::search) fn is_shift(&self, from: &Motion, to: &Motion) -> bool {
+        let shortest = self.basis.iter().map(|step| step.norm()).fold(f64::INFINITY, f64::min);
+        let shift = self.shift_between(from, to, SHIFT_FRACTION * shortest).filter(|shift| *shift != Vector3::zeros());
+        let own = |place: &Vector3<f64>| self.at.iter().any(|known| (known - place).norm() <= 2.0 * self.off);
+        shift.is_some_and(|shift| self.at.iter().any(|place| own(&(place + shift))))
+    }
+
+    /// The shift from one pose to another (object frame): the same attitude, and a step onto the pattern itself, both up
+    /// to `off` (m); `None` if it is none.
+    fn shift_between(&self, from: &Motion, to: &Motion, off: f64) -> Option<Vector3<f64>> {
         let lattice = Lattice::of(&self.basis, 1.0);
         let reach = self.at.iter().map(|p| p.norm()).fold(0.0, f64::max);
-        let (from, to) = (&from.motion, &to.motion);
         let turned = (to.rotation - from.rotation).norm() * reach;
         let centroid = self.at.iter().sum::<Vector3<f64>>() / self.at.len() as f64;
         let step = from.rotation.transpose() * (to.apply(&centroid) - from.apply(&centroid));
-        (turned <= MIN_STEP * self.off && lattice.off(&step) <= MIN_STEP * self.off).then(|| lattice.nearest(&step))
+        (turned <= off && lattice.off(&step) <= off).then(|| lattice.nearest(&step))
     }
 
     /// The places beyond the object at which the pattern may continue, if the object may also be at these shifts.
@@ -444,6 +455,20 @@ mod tests {
         };
         assert_eq!(distinctive(0.0), None);
         assert_eq!(distinctive(0.2), Some(3));
+    }
+
+    /// A step is a shift; four tenths of a step, a step out of the plane, and a pose beyond the pattern are none.
+    #[test]
+    fn a_shift_moves_the_pattern_onto_itself() {
+        let points: Vec<ModelPoint> =
+            lattice(6, 5).into_iter().map(|at| ModelPoint::exact("", Point::from(at))).collect();
+        let pattern = Pattern::of(&points, &[]).expect("a lattice");
+        let moved = |by: [f64; 3]| {
+            let of = |at: Vector3<f64>| Motion { rotation: nalgebra::Matrix3::identity(), translation: at };
+            pattern.is_shift(&of(Vector3::zeros()), &of(0.25 * Vector3::from(by)))
+        };
+        let cases = [[1.0, 0.0, 0.0], [-2.1, 1.1, 0.0], [0.0; 3], [0.4, 0.4, 0.0], [1.0, 0.0, 1.0], [7.0, 0.0, 0.0]];
+        assert_eq!(cases.map(moved), [true, true, false, false, false, false]);
     }
 
     #[test]

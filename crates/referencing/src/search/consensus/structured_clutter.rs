@@ -14,7 +14,7 @@ use crate::{problem::Problem, search::alike::slack};
 ///
 /// Uniform clutter shows a pose of evidence Λ in about one of Λ frames. A pose *elsewhere* of that evidence, in places
 /// where the best pose has no point of the object, shows that clutter is not uniform: it repeats the object's own
-/// distances (as a grating that continues beyond a part of it). The best pose may then be such clutter too.
+/// distances (as several structures of its kind). The best pose may then be such clutter too.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StructuredClutter {
     /// ln evidence that clutter resembles the object (nats): that of the pose elsewhere, given its pairs that the best

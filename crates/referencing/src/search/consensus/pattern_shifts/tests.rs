@@ -101,8 +101,7 @@ fn a_shift_of_the_pattern_is_no_structured_clutter() {
     assert_eq!(shifts, [0, 1, 2, 3]);
 }
 
-/// To which of the shifts by one step (right, left, up, down) a grid goes on, from the pose of a mode `from` steps away
-/// in x.
+/// The sides (right, left, up, down) to which a grid goes on, seen from the pose of a mode `from` steps away in x.
 ///
 /// The model has 9 × 6 points of a standard deviation `sigma` (m), the cloud one column more, each point at `place`.
 fn sides_of_a_grid(from: f64, sigma: f64, place: impl Fn(usize, Vector3<f64>) -> Vector3<f64>) -> [bool; 4] {
