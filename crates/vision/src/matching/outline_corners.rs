@@ -28,8 +28,8 @@ use crate::{
 /// Each corner is the fit of the locator or a junction of edges ([`Junction`]), and has its position and covariance in
 /// each image: an alignment of the neighbourhoods would follow the backgrounds.
 ///
-/// Limits: the directions are those of the images, so the cameras must not be rolled against each other by more than a
-/// few degrees.
+/// Limits: the directions are those of the images. Cameras that are rolled against each other show the same side in other
+/// directions.
 ///
 /// Source: Fusiello, Roberto and Trucco, *Efficient stereo with multiple windowing*, CVPR 1997 (windows on one side of
 /// an occlusion).
