@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use seafix_evaluation::{Solved, clopper_pearson};
+use seafix_evaluation::{Solved, alert_limit, clopper_pearson, transfer_rms};
 use seafix_geometry::{Camera, MeasuredPoint, Object, Point, Transform, UncertainPoint, so3};
 use seafix_proptests::{
     clutter_patterns::{ClutterPattern, scene},
@@ -43,21 +43,28 @@ impl Source {
                 let presence = if present { Presence::Present } else { Presence::Absent };
                 let generated = Generated::new(family, 31, k, presence);
                 let listed = Listed::new(generated.problem.problem());
-                if listed.candidates.pairs() > MAX_PAIRS {
+                if listed.candidates.pairs() > max_pairs() {
                     return None;
                 }
                 let truth = Transform::<Camera, Object>::from_rows(&generated.truth.t_cam_obj).unwrap().inverse();
                 let rule =
                     Solved { ideal_rms: generated.truth.ideal_tre_rms, putative: listed.file.putative.is_some() };
                 let at: Vec<Point<Object>> = listed.file.model.iter().map(|point| point.at).collect();
-                let right = |pose: &Transform<Object, Camera>| present && rule.holds(pose, &truth, &at);
+                let distances = at.iter().flat_map(|a| at.iter().map(|b| a.distance(b)));
+                let limit = alert_limit(distances.fold(0.0, f64::max));
+                let near =
+                    |pose: &Transform<Object, Camera>| transfer_rms(pose, &truth, &at).is_some_and(|rms| rms <= limit);
+                let right = |pose: &Transform<Object, Camera>| {
+                    (present && rule.holds(pose, &truth, &at), !(present && near(pose)))
+                };
                 Some(tried(&listed.problem(), variants, present && generated.truth.pose_defined, &right))
             }
             Self::Clutter(pattern) => {
                 let scene = scene(pattern, if present { 8 } else { 0 }, k);
                 let problem = scene.problem();
                 let right = |pose: &Transform<Object, Camera>| {
-                    present && rms_apart(problem.model, pose, &scene.planted.pose) <= 0.05
+                    let right = present && rms_apart(problem.model, pose, &scene.planted.pose) <= 0.05;
+                    (right, !right)
                 };
                 Some(tried(&problem, variants, present, &right))
             }
@@ -68,6 +75,11 @@ impl Source {
 
 /// Maximum number of candidate pairs of a generated problem.
 const MAX_PAIRS: usize = 4000;
+
+/// The maximum, or `ABLATION_PAIRS`.
+fn max_pairs() -> usize {
+    std::env::var("ABLATION_PAIRS").map_or(MAX_PAIRS, |number| number.parse().expect("a number"))
+}
 
 /// A board (m, noise 1 mm) among a hundred points of clutter; a third of the places beyond its border are seen.
 fn board(k: u64, present: bool, variants: &[Variant]) -> Vec<Tried> {
@@ -112,7 +124,10 @@ fn board(k: u64, present: bool, variants: &[Variant]) -> Vec<Tried> {
         edges: Default::default(),
     };
     let truth = camera_from_object.inverse();
-    let right = |pose: &Transform<Object, Camera>| present && rms_apart(&model, pose, &truth) <= 0.005;
+    let right = |pose: &Transform<Object, Camera>| {
+        let right = present && rms_apart(&model, pose, &truth) <= 0.005;
+        (right, !right)
+    };
     tried(&problem, variants, present, &right)
 }
 
@@ -176,6 +191,8 @@ struct Tried {
     /// The probability that the pose of a fix is wrong; 1 of any other answer.
     p_wrong: f64,
     right: bool,
+    /// Whether the pose is off by more than the alert limit, or the object absent.
+    wrong: bool,
     /// Whether the answer is a fix at `balanced`.
     balanced: bool,
 }
@@ -187,14 +204,14 @@ fn tried(
     problem: &Problem<'_>,
     variants: &[Variant],
     defined: bool,
-    right: &dyn Fn(&Transform<Object, Camera>) -> bool,
+    right: &dyn Fn(&Transform<Object, Camera>) -> (bool, bool),
 ) -> Vec<Tried> {
     let search = |without: Vec<SearchMechanism>| {
         let search = RigidConsensus { without, ..RigidConsensus::default() };
         search.search(problem, &mut ChaCha8Rng::seed_from_u64(0))
     };
     let judged = |found: &Result<Identification, Rejected>, without: Vec<AcceptanceTest>| {
-        let none = Tried { defined, p_wrong: 1.0, right: false, balanced: false };
+        let none = Tried { defined, p_wrong: 1.0, right: false, wrong: true, balanced: false };
         let mut lowest = 0.0;
         for limit in LIMITS {
             if limit < lowest || found.is_err() {
@@ -205,8 +222,8 @@ fn tried(
             let attempt = judge(problem, found.clone(), &Mahalanobis::default(), &acceptance, None);
             let p_wrong = attempt.p_wrong.unwrap_or(1.0);
             if let Outcome::Fix(fix) = attempt.outcome {
-                let right = right(&fix.object_from_camera);
-                return Tried { defined, p_wrong, right, balanced: limit == LIMITS[0] };
+                let (right, wrong) = right(&fix.object_from_camera);
+                return Tried { defined, p_wrong, right, wrong, balanced: limit == LIMITS[0] };
             }
             lowest = p_wrong.min(1.0);
         }
@@ -245,14 +262,19 @@ fn lost(full: &[bool], variant: &[bool]) -> (f64, f64, f64) {
 /// What each mechanism gains: found frames at equal rates of false answers, answers at `balanced`, and calibration.
 ///
 /// `cargo test --release -p seafix-proptests ablation:: -- --ignored --nocapture`; `ABLATION_SOURCES` (names with
-/// commas; all) and `ABLATION_FRAMES` (600 with and 600 without the object for each source, half as many in clumped clutter).
+/// commas; all), `ABLATION_WITHOUT` (mechanisms with commas; all), `ABLATION_FRAMES` (600 with and 600 without the object
+/// for each source, half as many in clumped clutter), and `ABLATION_PAIRS`, the maximum number of candidate pairs (4000,
+/// and b, f and g of 500 points; otherwise of any number).
 #[test]
 #[ignore = "table"]
 fn what_each_mechanism_gains() {
     let variable = |name: &str, default: &str| std::env::var(name).unwrap_or_else(|_| default.to_owned());
     let frames: usize = variable("ABLATION_FRAMES", "600").parse().expect("a number");
     let names = variable("ABLATION_SOURCES", "");
-    let variants = Variant::all();
+    let only = variable("ABLATION_WITHOUT", "");
+    let chosen =
+        |of: &Variant| *of == Variant::Nothing || only.is_empty() || only.split(',').any(|name| name == of.name());
+    let variants: Vec<Variant> = Variant::all().into_iter().filter(chosen).collect();
     let mut summary: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for (name, source) in Source::all() {
         if !names.is_empty() && !names.split(',').any(|of| of == name) {
@@ -262,7 +284,7 @@ fn what_each_mechanism_gains() {
         // A frame of clumped clutter takes ten times as long as others.
         let frames = if name == "clumped" { frames / 2 } else { frames };
         let all = |present: bool| -> Vec<Vec<Tried>> {
-            let step = if ["b", "f", "g"].contains(&name.as_str()) { 3 } else { 1 };
+            let step = if ["b", "f", "g"].contains(&name.as_str()) && max_pairs() == MAX_PAIRS { 3 } else { 1 };
             let some = (0..).step_by(step).take(20 * frames);
             some.filter_map(|k| source.tried(k, present, &variants)).take(frames).collect()
         };
@@ -271,14 +293,14 @@ fn what_each_mechanism_gains() {
         let (n, m) = (with.len(), without.len());
         println!("\n{name}: {n} frames with and {m} without the object, {:.0} s", started.elapsed().as_secs_f64());
         println!(
-            "| without | found % at 0 / 1 / 5 % false | lost at 0 / 1 / 5 % | found % / wrong of answers / absent answered at balanced | wrong (expected) of answers at p < 1e-3 / 1e-2 / 1e-1 / 0.5 |\n|---|---|---|---|---|"
+            "| without | found % at 0 / 0.1 / 1 / 5 % false | lost at 0 / 0.1 / 1 / 5 % | found % / wrong of answers / absent answered at balanced | wrong (expected) of answers at p < 1e-3 / 1e-2 / 1e-1 / 0.5 |\n|---|---|---|---|---|"
         );
         let mut same = Vec::new();
         let mut rows: Vec<String> = Vec::new();
         for (v, variant) in variants.iter().enumerate() {
             let (present, absent) = (of(&with, v), of(&without, v));
             let (full, empty) = (of(&with, 0), of(&without, 0));
-            let rates = [0.0, 0.01, 0.05];
+            let rates = [0.0, 0.001, 0.01, 0.05];
             let by = rates.map(|rate| found(&present, &absent, rate));
             let percent = |of: &[bool]| 100.0 * of.iter().filter(|one| **one).count() as f64 / of.len().max(1) as f64;
             let less: Vec<(f64, f64, f64)> =
@@ -286,7 +308,7 @@ fn what_each_mechanism_gains() {
             let balanced: Vec<bool> =
                 present.iter().filter(|one| one.defined).map(|one| one.balanced && one.right).collect();
             let answers = present.iter().filter(|one| one.balanced).count();
-            let wrong = present.iter().filter(|one| one.balanced && !one.right).count();
+            let wrong = present.iter().filter(|one| one.balanced && one.wrong).count();
             let false_answers = absent.iter().filter(|one| one.balanced).count();
             let mut from = 0.0;
             let bins = [1e-3, 1e-2, 0.1, 0.5].map(|to| {
@@ -297,18 +319,20 @@ fn what_each_mechanism_gains() {
                     .collect();
                 let expected: f64 = bin.iter().map(|one| one.p_wrong).sum();
                 from = to;
-                format!("{} ({expected:.1}) of {}", bin.iter().filter(|one| !one.right).count(), bin.len())
+                format!("{} ({expected:.1}) of {}", bin.iter().filter(|one| one.wrong).count(), bin.len())
             });
             let lost_at = |k: usize| format!("{:+.1} [{:.1}, {:.1}]", less[k].0, less[k].1, less[k].2);
             let (_, high) = clopper_pearson(false_answers, m, 0.95);
             let row = format!(
-                "| {:.1} / {:.1} / {:.1} | {} / {} / {} | {:.1} / {wrong} of {answers} / {false_answers} (≤ {:.1} %) | {} |",
+                "| {:.1} / {:.1} / {:.1} / {:.1} | {} / {} / {} / {} | {:.1} / {wrong} of {answers} / {false_answers} (≤ {:.1} %) | {} |",
                 percent(&by[0]),
                 percent(&by[1]),
                 percent(&by[2]),
+                percent(&by[3]),
                 lost_at(0),
                 lost_at(1),
                 lost_at(2),
+                lost_at(3),
                 percent(&balanced),
                 100.0 * high,
                 bins.join(" / ")
@@ -325,7 +349,7 @@ fn what_each_mechanism_gains() {
         }
         println!("no effect: {}", same.join(", "));
     }
-    println!("\nLargest loss (points) at 0, 1 and 5 % false answers:");
+    println!("\nLargest loss (points) at 0, 0.1, 1 and 5 % false answers:");
     summary.iter().for_each(|(variant, cells)| println!("| {variant} | {} |", cells.join(" | ")));
 }
 

@@ -21,7 +21,7 @@ use crate::{
     chi_square::chi_square,
     observations::Observations,
     problem::{Correspondence, Prior, PriorBound, Problem},
-    search::{feature_sets, features::FeatureSet, grow::elsewhere, identification::Identification},
+    search::{consensus::Support, feature_sets, features::FeatureSet, grow::elsewhere, identification::Identification},
     site::model::ModelPoint,
     solve::{
         covariance::association::association,
@@ -45,8 +45,8 @@ pub(super) struct Judge<'a> {
     /// Whether a search selected the sets, so that false alarms are possible.
     pub(super) searched: bool,
     pub(super) rig: Option<&'a StereoRig>,
-    /// Whether the independent pairs of a large putative set support the pose ([`Support`](crate::Support)).
-    pub(super) supported: bool,
+    /// What the independent pairs of a large putative set say of the pose.
+    pub(super) support: Option<&'a Support>,
     /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
     pub(super) near: Option<Transform<Object, Camera>>,
 }
@@ -279,21 +279,25 @@ impl Judge<'_> {
 
     /// The limit of χ² with these degrees of freedom.
     fn chi2_limit(&self, dof: usize) -> f64 {
-        let variance_factor = if self.supported { VARIANCE_FACTOR } else { 1.0 };
+        let variance_factor = if self.support.is_some() { VARIANCE_FACTOR } else { 1.0 };
         variance_factor * chi_square(dof, self.acceptance.confidence)
     }
 
     /// Whether the pose passes the tests of precision and prior.
+    ///
+    /// The predicted error must be within the limits with two standard deviations; with one for a large putative set,
+    /// whose covariance allows for common errors of neighbouring pairs.
     pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let covariance = self.covariance(hypothesis)?;
         let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
+        let sigmas = if self.support.is_some() { 1.0 } else { 2.0 };
         // A NaN is rejected as well.
-        if !(2.0 * rms <= limit) {
+        if !(sigmas * rms <= limit) {
             return Err(Fallen::Refused(RejectionReason::Imprecise { rms, limit }));
         }
         let ((_, sigma), limit) = (semi_axes(&covariance), self.acceptance.attitude_limit);
-        if !(2.0 * sigma <= limit) {
+        if !(sigmas * sigma <= limit) {
             return Err(Fallen::Refused(RejectionReason::Attitude { sigma, limit }));
         }
         self.near(hypothesis)
@@ -314,11 +318,12 @@ impl Judge<'_> {
         let Hypothesis { pairs, edges, pose, .. } = hypothesis;
         let data = self.observations(pairs, edges);
         let covariance = self.solver.covariance(&data, pose)?;
-        let covariance = match self.supported {
-            true => {
-                Covariance6::new(covariance.matrix * (hypothesis.likelihood.cost / hypothesis.dof() as f64).max(1.0))
+        let covariance = match self.support {
+            Some(support) => {
+                let variance_factor = (hypothesis.likelihood.cost / hypothesis.dof() as f64).max(1.0);
+                Covariance6::new(covariance.matrix * (variance_factor * support.pairs_a_place))
             }
-            false => covariance,
+            None => covariance,
         };
         if !self.searched || pairs.is_empty() || !self.acceptance.with(AcceptanceTest::Association) {
             return Ok(covariance);
@@ -352,13 +357,23 @@ impl Judge<'_> {
         likely.for_each(|(_, other)| level.cover(&quiet, &fix.object_from_camera, other));
     }
 
+    /// The limits with the faults that are tested.
+    ///
+    /// The errors of a large putative set are alike among neighbours, so that they look like displaced parts.
+    fn faults(&self) -> Cow<'_, Acceptance> {
+        match self.support {
+            Some(_) => Cow::Owned(Acceptance { moved_part_rate: 0.0, ..self.acceptance.clone() }),
+            None => Cow::Borrowed(self.acceptance),
+        }
+    }
+
     /// Raises the protection levels to this probability of misidentification; levels raised before are kept.
     pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
         let data = self.observations(&fix.pairs, &fix.edges);
         let pose = &fix.object_from_camera;
         let transfer = Transfer::of(&self.anchors, pose);
         let level =
-            protection(&data, pose, &fix.covariance, self.acceptance, &transfer, self.alert_limit, misidentified)
+            protection(&data, pose, &fix.covariance, &self.faults(), &transfer, self.alert_limit, misidentified)
                 .protection;
         let known = fix.integrity.protection.take();
         fix.integrity.protection = known.zip(level).map(|(known, level)| known.max(&level));
@@ -375,7 +390,7 @@ impl Judge<'_> {
         let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let mistaken = misidentified.unwrap_or(0.0);
         let left_out =
-            protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, self.alert_limit, mistaken);
+            protection(&data, &hypothesis.pose, &covariance, &self.faults(), &transfer, self.alert_limit, mistaken);
         let covariance = left_out.spread.map_or(covariance, |spread| Covariance6::new(covariance.matrix + spread));
         let dof = hypothesis.dof();
         let integrity = Integrity {

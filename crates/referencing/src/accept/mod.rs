@@ -89,9 +89,9 @@ pub fn judge(
     let largest = if found.posterior.is_none() { largest.max(found.pairs.len() + found.edges.len()) } else { largest };
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
-    let supported = found.posterior.as_ref().is_some_and(|posterior| posterior.support.is_some());
+    let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
     let judge =
-        Judge { problem, solver, acceptance, anchors, alert_limit, largest, searched: true, rig, supported, near };
+        Judge { problem, solver, acceptance, anchors, alert_limit, largest, searched: true, rig, support, near };
     let a_contrario = AContrario::of(problem, &found.pairs);
     let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario, &acceptance.without);
     let mut probability = evidence.probability();
@@ -182,7 +182,7 @@ pub fn judge_labelled(
         largest: pairs.len(),
         searched: false,
         rig,
-        supported: false,
+        support: None,
         near: None,
     };
     let consensus_bound = pairs.len();

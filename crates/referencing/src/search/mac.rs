@@ -50,6 +50,7 @@ impl Default for Mac {
 
 impl Component for Mac {
     const NAME: &'static str = "mac";
+    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "the best of the poses of the heaviest maximal cliques";
     const SOURCE: &'static str = "Zhang, Yang, Zhang, Zhang, 3D registration with maximal cliques, 2023; the \
                                   enumeration: Bron, Kerbosch, 1973, with the pivot of Tomita, Tanaka, Takahashi, 2006";

@@ -130,7 +130,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 13;
+    const VERSION: u32 = 14;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -269,7 +269,10 @@ impl Search for RigidConsensus {
         } else {
             None
         };
-        if let Some(image) = image {
+        // Neighbouring pairs of a large set have common errors: the places that the pose explains alone decide.
+        let independent = large.then(|| IndependentPairs::of(parts));
+        let refutes = |image: &Mode| independent.as_ref().is_none_or(|of| of.explains(&image.motion, &best.motion));
+        if let Some(image) = image.filter(refutes) {
             return Err(Rejected::Mirrored { best: image.members.len(), proved: false });
         }
         // A second copy of the object in the rest of the cloud, and a pose to compare the best with.
@@ -352,7 +355,7 @@ impl Search for RigidConsensus {
             }
         }
         let complete = swept.complete && beside.complete;
-        let support = if large { IndependentPairs::of(parts).support(&swept.modes) } else { None };
+        let support = independent.and_then(|of| of.support(&swept.modes));
         let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
         let evidence_gap = proved.map(gap);
         // The returned set is coherent throughout: among twenty true points some two usually differ by more than the

@@ -7,8 +7,9 @@ use crate::problem::Problem;
 const FEW: usize = 50;
 /// Mean weight above which a graph is dense.
 const DENSE: f64 = 3.0;
-/// Factors of the threshold of the clustering coefficients, tried from the greatest.
-const FACTORS: usize = 10;
+/// Factors of the threshold of the clustering coefficients, tried from ten down to the step.
+const FACTORS: usize = 200;
+const STEP: f64 = 0.05;
 /// Number of bins of Otsu's histogram.
 const BINS: usize = 100;
 
@@ -122,7 +123,7 @@ impl SecondOrder {
         if each.len() <= FEW || !(otsu.min(mean).min(total) > DENSE) {
             return vec![true; each.len()];
         }
-        let threshold = |factor: usize| factor as f64 * otsu.max(total);
+        let threshold = |factor: usize| STEP * factor as f64 * otsu.max(total);
         let factor = (1..=FACTORS).rev().find(|&factor| threshold(factor) <= sorted[FEW - 1]);
         each.iter().map(|&one| factor.is_none_or(|factor| one > threshold(factor))).collect()
     }

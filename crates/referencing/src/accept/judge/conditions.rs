@@ -74,12 +74,12 @@ impl Judge<'_> {
 
     /// Whether the pose stays within the alert limit despite any single wrong match.
     ///
-    /// It applies to sets that a search selected. If the visible points of a large model are few, close together or in
+    /// It applies to sets that a search counted. If the visible points of a large model are few, close together or in
     /// a row, many wrong poses are possible; a clutter point near one of them makes a wrong pose look precise. Three
     /// points cannot be tested: each is needed.
     ///
-    /// A pose that a large putative set supports has more pairs than any wrong pose of the same frame: it does not hang
-    /// on one.
+    /// A search with a posterior has weighed this: the worse the other points determine the place of a point, the more
+    /// clutter may lie there, and the smaller is the evidence of the pose.
     ///
     /// `all` is the predicted error of the complete set, whose own test it passed. A pose does not depend on a point
     /// whose exclusion changes the predicted error by less than [`CARRIED`]: otherwise a pose of hundreds of points that
@@ -91,7 +91,7 @@ impl Judge<'_> {
         all: f64,
     ) -> Result<(), RejectionReason> {
         let Some((place, rms)) =
-            hinge.filter(|_| self.searched && !self.supported && self.acceptance.with(AcceptanceTest::Hinge))
+            hinge.filter(|_| self.searched && self.near.is_none() && self.acceptance.with(AcceptanceTest::Hinge))
         else {
             return Ok(());
         };

@@ -103,7 +103,7 @@ impl Scene {
             largest,
             searched,
             rig: None,
-            supported: false,
+            support: None,
             near: None,
         })
     }

@@ -9,7 +9,7 @@ use super::{
 use crate::lanes::{LANES, packed};
 
 /// Gate about a motion from a few noisy points (χ²₃).
-const LOOSE: f64 = 50.0;
+pub(super) const LOOSE: f64 = 50.0;
 
 /// The pairs' coordinates in model and cloud by axis, with their squared gates (m²) about a motion.
 ///

@@ -8,7 +8,7 @@ use super::{
     graph::ConsistencyGraph,
     likelihood::{Mode, Term, Terms},
     motion::Motion,
-    places::Places,
+    places::{LOOSE, Places},
     prior_terms::PriorTerms,
     seeds::guided::{beginning, fitted, stride, symmetric},
 };
@@ -21,6 +21,12 @@ const ONE_PLACE: f64 = 5.0;
 ///
 /// Pairs that are one place off support neighbouring poses, which are no sample of wrong ones.
 const WITHHELD: f64 = 2.0 * ONE_PLACE;
+/// Distance (standard deviations of a measurement) below which the errors of two pairs are correlated.
+///
+/// Descriptors of overlapping neighbourhoods are matched with a common error.
+const CORRELATED: f64 = 2.0 * ONE_PLACE;
+/// Number of standard deviations that are significant.
+const SIGNIFICANT: f64 = 3.0;
 /// Number of seeds of wrong poses: the largest of 256 is exceeded by one wrong pose in 256.
 const WRONG_POSES: usize = 256;
 /// Number of wrong poses of most places that are compared, since support grows with the number of places.
@@ -37,6 +43,8 @@ pub struct Support {
     pub ln_odds: Vec<f64>,
     /// ln of the odds of the best wrong pose of other pairs against the best pose.
     pub ln_odds_elsewhere: f64,
+    /// The number of pairs of the best pose for each place, one at least: neighbouring pairs have common errors.
+    pub pairs_a_place: f64,
 }
 
 /// The independent pairs of a large putative set.
@@ -78,7 +86,7 @@ impl<'a> IndependentPairs<'a> {
     pub(in crate::search) fn of(
         (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
     ) -> Self {
-        let mut kept = apart(terms, 0..terms.pairs.len(), |pair| [pair.cloud, pair.model]);
+        let mut kept = apart(terms, 0..terms.pairs.len(), ONE_PLACE, |pair| [pair.cloud, pair.model]);
         kept.sort_by(|&a, &b| terms.pairs[a].cloud.x.total_cmp(&terms.pairs[b].cloud.x).then(a.cmp(&b)));
         let count = terms.pairs.len() as f64;
         let edges: usize = (0..terms.pairs.len()).map(|v| shared(graph.row(v), graph.row(v), 0)).sum();
@@ -92,28 +100,57 @@ impl<'a> IndependentPairs<'a> {
     /// The support of the best pose, of other explanations, and of wrong poses.
     pub(in crate::search) fn support(&self, modes: &[Mode]) -> Option<Support> {
         let best = modes.first()?;
-        let (wrong, ln_sampled) = self.wrong(best);
+        let places = Places::of(self.terms);
+        let (wrong, ln_sampled) = self.wrong(best, &places);
         let scale = ((self.ln_poses - ln_sampled).max(1.0) / wrong).min(1.0);
-        let own = self.of_pose(&best.members, &best.motion);
+        let own = self.of_motion(&best.motion, &places);
         let ln_odds = |other: &Mode| {
             let common = other.members.iter().filter(|&&v| best.holds(v)).count();
             match 2 * common > other.members.len() {
                 true => other.ln_even - best.ln_even,
-                false => scale * (self.of_pose(&other.members, &other.motion) - own),
+                false => scale * (self.of_motion(&other.motion, &places) - own),
             }
         };
+        let apart = self.places(&best.members, CORRELATED).max(1);
         Some(Support {
             ln_nfa: self.ln_poses - scale * own,
             ln_odds: modes.iter().map(ln_odds).collect(),
             ln_odds_elsewhere: scale * (wrong - own),
+            pairs_a_place: (best.members.len() as f64 / apart as f64).max(1.0),
         })
+    }
+
+    /// Whether the mirror image of a pose explains it away: the pose is the part of the image that lies in a plane.
+    ///
+    /// Then nothing but chance fits the pose alone. An object with a plane of symmetry has a mirror image too, by
+    /// descriptors that do not tell left from right, but its pose explains places that the image does not.
+    pub(in crate::search) fn explains(&self, image: &Motion, pose: &Motion) -> bool {
+        let places = Places::of(self.terms);
+        let near = places.near(self.terms, self.graph, pose, 0).unwrap_or_default();
+        let alone = near.into_iter().filter(|&v| self.d2(v, pose) <= far() && !(self.d2(v, image) <= LOOSE));
+        let alone = self.places(&alone.collect::<Vec<_>>(), ONE_PLACE) as f64;
+        let expected = self.expected(pose);
+        alone <= expected + SIGNIFICANT * expected.sqrt().max(1.0)
+    }
+
+    /// The support (nats) of a motion by all pairs that fit it, counted as for wrong poses.
+    ///
+    /// The pairs of a mode are fewer: each of their cloud points has one partner.
+    fn of_motion(&self, motion: &Motion, places: &Places) -> f64 {
+        let of = || {
+            let near = places.near(self.terms, self.graph, motion, NEEDED)?;
+            let (motion, _) = fit(self.terms, self.prior_terms, &near, motion, 2)?;
+            let near = places.near(self.terms, self.graph, &motion, NEEDED)?;
+            Some(self.of_pose(&near, &motion))
+        };
+        of().unwrap_or(0.0)
     }
 
     /// The support of a pose with these pairs (nats).
     fn of_pose(&self, members: &[usize], motion: &Motion) -> f64 {
         let far = far();
         let near: Vec<usize> = members.iter().copied().filter(|&v| self.d2(v, motion) <= far).collect();
-        let more = self.places(&near) as f64 - NEEDED as f64;
+        let more = self.places(&near, ONE_PLACE) as f64 - NEEDED as f64;
         let expected = self.expected(motion);
         if more > expected { more * libm::log(more / expected) - (more - expected) } else { 0.0 }
     }
@@ -125,10 +162,12 @@ impl<'a> IndependentPairs<'a> {
     }
 
     /// The number of places of some pairs, the smaller of those in the model and in the cloud.
-    fn places(&self, members: &[usize]) -> usize {
+    ///
+    /// Ends up to `wide` standard deviations apart are one place.
+    fn places(&self, members: &[usize], wide: f64) -> usize {
         let of = || members.iter().copied();
-        let (model, cloud) =
-            (apart(self.terms, of(), |pair| [pair.model]), apart(self.terms, of(), |pair| [pair.cloud]));
+        let model = apart(self.terms, of(), wide, |pair| [pair.model]);
+        let cloud = apart(self.terms, of(), wide, |pair| [pair.cloud]);
         model.len().min(cloud.len())
     }
 
@@ -152,10 +191,9 @@ impl<'a> IndependentPairs<'a> {
 
     /// The greatest support among sampled poses of the pairs that a pose does not explain, and −ln of the fraction of
     /// these pairs that were seeds.
-    fn wrong(&self, best: &Mode) -> (f64, f64) {
+    fn wrong(&self, best: &Mode, places: &Places) -> (f64, f64) {
         let (terms, graph) = (self.terms, self.graph);
         let adjacency = symmetric(graph);
-        let places = Places::of(terms);
         let others: Vec<usize> =
             (0..terms.pairs.len()).filter(|&v| !(self.d2(v, &best.motion) <= WITHHELD * WITHHELD)).collect();
         let mut free = vec![0; terms.pairs.len().div_ceil(64)];
@@ -173,7 +211,7 @@ impl<'a> IndependentPairs<'a> {
             let start = fitted(terms, &beginning(&adjacency, seed, ranked)?)?;
             let (motion, _) = fit(terms, self.prior_terms, &near(&start)?, &start, 2)?;
             let members = near(&motion)?;
-            Some((self.places(&members), members, motion))
+            Some((self.places(&members, ONE_PLACE), members, motion))
         };
         let mut sampled: Vec<_> = (0..WRONG_POSES.min(others.len())).filter_map(seeded).collect();
         sampled.sort_by_key(|(places, ..)| std::cmp::Reverse(*places));
@@ -189,15 +227,16 @@ fn far() -> f64 {
 
 /// Some of these pairs of which no two are together at all `ends`, in their order.
 ///
-/// Ends are together if they may be one place ([`ONE_PLACE`]).
+/// Ends are together up to `wide` standard deviations.
 fn apart<const N: usize>(
     terms: &Terms,
     of: impl Iterator<Item = usize>,
+    wide: f64,
     ends: impl Fn(&Term) -> [Vector3<f64>; N],
 ) -> Vec<usize> {
     let (mut kept, mut places): (Vec<usize>, Vec<[Vector3<f64>; N]>) = (Vec::new(), Vec::new());
     for v in of {
-        let (own, reach2) = (ends(&terms.pairs[v]), ONE_PLACE * ONE_PLACE * terms.pairs[v].variance);
+        let (own, reach2) = (ends(&terms.pairs[v]), wide * wide * terms.pairs[v].variance);
         let together = |known: &[Vector3<f64>; N]| own.iter().zip(known).all(|(a, b)| (a - b).norm_squared() <= reach2);
         if !places.iter().any(together) {
             places.push(own);
@@ -289,6 +328,42 @@ mod tests {
         assert!(matches!(attempt.outcome, Outcome::Rejected(_)), "{}", attempt.outcome);
         assert!(attempt.identified.len() > 20, "{} pairs", attempt.identified.len());
         assert!(attempt.p_absent > Some(0.1), "{:?}", attempt.p_absent);
+    }
+
+    /// Pairs in groups of three, six standard deviations wide, are a third of the independent pairs.
+    ///
+    /// Fails if the covariance counts every pair.
+    #[test]
+    fn pairs_side_by_side_have_a_common_error() {
+        let centre =
+            |i: usize| Vector3::new((i % 5) as f64, (i / 5 % 5) as f64, (i / 25) as f64) * 0.4 - Vector3::repeat(0.8);
+        let variance = |groups: usize| {
+            let attempt = answer(120, (1.0, 4.0), |i, at| [centre(i % groups) + at * (3.0 * SIGMA); 2]);
+            let Outcome::Fix(fix) = attempt.outcome else { panic!("{}", attempt.outcome) };
+            fix.covariance.matrix.trace()
+        };
+        let ratio = variance(40) / variance(120);
+        assert!((2.0..5.0).contains(&ratio), "{ratio}");
+    }
+
+    /// Descriptors of an object with a plane of symmetry match most points to their mirror images.
+    ///
+    /// Fails if the larger mirror image refutes the pose.
+    #[test]
+    fn an_object_with_a_plane_of_symmetry_is_found() {
+        let mirrored = |at: Vector3<f64>| Vector3::new(-at.x, at.y, at.z);
+        let attempt = answer(180, (1.0, 4.0), |i, at| [at, if i % 3 == 0 { at } else { mirrored(at) }]);
+        let Outcome::Fix(fix) = attempt.outcome else { panic!("{}", attempt.outcome) };
+        assert!(truth().error_to(&fix.object_from_camera).norm() < 0.02, "{:?}", fix.object_from_camera);
+    }
+
+    /// A mirrored cloud whose pose is the half of the points that lie in a plane.
+    #[test]
+    fn the_plane_of_a_mirrored_cloud_is_no_pose() {
+        let flat = |i: usize, at: Vector3<f64>| Vector3::new(at.x * (i % 2) as f64, at.y, at.z);
+        let mirrored = |at: Vector3<f64>| Vector3::new(-at.x, at.y, at.z);
+        let attempt = answer(200, (1.0, 4.0), |i, at| [flat(i, at), mirrored(flat(i, at))]);
+        assert_eq!(attempt.outcome.reason(), Some("mirrored"), "{}", attempt.outcome);
     }
 
     /// Half of the true pairs show the object at one place, half at another.
