@@ -79,7 +79,7 @@ pub enum AcceptanceTest {
     Prior,
     /// The test that the camera sees the identified points from their visible sides.
     Visibility,
-    /// The test that the pose of counted pairs depends on no single point.
+    /// The probability that the pose depends on a wrong match, or the test that it depends on no single point.
     Hinge,
     /// The test of the scale.
     Scale,

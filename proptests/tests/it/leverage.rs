@@ -31,10 +31,14 @@ fn panel(number: u64, far: usize, prior: bool) -> View {
     if prior { view.before(GATE, error) } else { view }
 }
 
-/// A panel alone does not determine the far points of its object, nor does clutter near one of them: no pose with an
-/// error above the alert limit is accepted, with a prior pose and without.
+/// A panel alone does not determine the far points of its object, nor does clutter near one of them: wrong matches put no
+/// pose off, with a prior pose and without.
 ///
-/// Seen to fail when the covariance of all points decides: 12 of 107 fixes with a prior pose exceed the limit.
+/// The test of precision takes two standard deviations, so that a right pose of a panel may exceed the alert limit in one
+/// case of twenty, and half as much again in one of four hundred.
+///
+/// Seen to fail when the covariance of all points decides: 12 of 107 fixes with a prior pose exceed the limit, by up to
+/// 0.13 m.
 #[test]
 fn one_accidental_far_point_makes_no_pose() {
     for (prior, frames) in [(true, cases(512)), (false, cases(192))] {
@@ -44,8 +48,10 @@ fn one_accidental_far_point_makes_no_pose() {
             match view.outcome(DELTA, &Acceptance::default()) {
                 Outcome::Fix(fix) => {
                     answered += 1;
+                    let limit = Acceptance::default().alert_limit;
                     let off = rms_apart(&view.model, &fix.object_from_camera, &view.truth);
-                    beyond += u64::from(off > Acceptance::default().alert_limit);
+                    beyond += u64::from(off > limit);
+                    assert!(off < 1.5 * limit, "frame {number}: {off}");
                 }
                 Outcome::Rejected(RejectionReason::Hinge { .. }) => hinges += 1,
                 _ => {}
@@ -53,7 +59,7 @@ fn one_accidental_far_point_makes_no_pose() {
         }
         println!("prior {prior}: {answered} of {frames} answered, {beyond} beyond the limit, {hinges} hang on a point");
         assert!(10 * hinges > frames, "too few to tell");
-        assert_eq!(beyond, 0);
+        assert!(20 * beyond <= answered, "{beyond} of {answered}");
     }
 }
 

@@ -23,8 +23,8 @@ pub struct Acceptance {
     /// Alert limit: the distance (m, RMS over the model points) beyond which two poses are different answers.
     ///
     /// A pose whose error may exceed the limit by its covariance (two sigma) is rejected. So is a pose of four points
-    /// or more that one wrong match could move beyond it ([`RejectionReason::Hinge`](super::RejectionReason::Hinge)), if
-    /// the search counts pairs; a posterior weighs such matches.
+    /// or more that one wrong match could move beyond it ([`RejectionReason::Hinge`](super::RejectionReason::Hinge));
+    /// a posterior of points weighs such matches instead.
     /// The fraction [`alert_fraction`](Self::alert_fraction) of the model's diameter replaces the limit if that is
     /// smaller.
     pub alert_limit: f64,

@@ -45,8 +45,10 @@ pub(super) struct Judge<'a> {
     /// Whether a search selected the sets, so that false alarms are possible.
     pub(super) searched: bool,
     pub(super) rig: Option<&'a StereoRig>,
-    /// What the independent pairs of a large putative set say of the pose.
+    /// The support of the pose by the independent pairs of a large putative set.
     pub(super) support: Option<&'a Support>,
+    /// Whether a posterior has weighed that single pairs are wrong matches, or need not.
+    pub(super) weighed: bool,
     /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
     pub(super) near: Option<Transform<Object, Camera>>,
 }
@@ -285,13 +287,13 @@ impl Judge<'_> {
 
     /// Whether the pose passes the tests of precision and prior.
     ///
-    /// The predicted error must be within the limits with two standard deviations; with one for a large putative set,
-    /// whose covariance allows for common errors of neighbouring pairs.
+    /// The predicted error must be within the limits with two standard deviations. The common errors of neighbouring
+    /// pairs, which enlarge the covariance of a large putative set, count with one at least.
     pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
         let covariance = self.covariance(hypothesis)?;
         let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
-        let sigmas = if self.support.is_some() { 1.0 } else { 2.0 };
+        let sigmas = self.support.map_or(2.0, |support| (2.0 / support.pairs_per_place.sqrt()).clamp(1.0, 2.0));
         // A NaN is rejected as well.
         if !(sigmas * rms <= limit) {
             return Err(Fallen::Refused(RejectionReason::Imprecise { rms, limit }));
@@ -321,7 +323,7 @@ impl Judge<'_> {
         let covariance = match self.support {
             Some(support) => {
                 let variance_factor = (hypothesis.likelihood.cost / hypothesis.dof() as f64).max(1.0);
-                Covariance6::new(covariance.matrix * (variance_factor * support.pairs_a_place))
+                Covariance6::new(covariance.matrix * (variance_factor * support.pairs_per_place))
             }
             None => covariance,
         };
@@ -357,23 +359,13 @@ impl Judge<'_> {
         likely.for_each(|(_, other)| level.cover(&quiet, &fix.object_from_camera, other));
     }
 
-    /// The limits with the faults that are tested.
-    ///
-    /// The errors of a large putative set are alike among neighbours, so that they look like displaced parts.
-    fn faults(&self) -> Cow<'_, Acceptance> {
-        match self.support {
-            Some(_) => Cow::Owned(Acceptance { moved_part_rate: 0.0, ..self.acceptance.clone() }),
-            None => Cow::Borrowed(self.acceptance),
-        }
-    }
-
     /// Raises the protection levels to this probability of misidentification; levels raised before are kept.
     pub(super) fn protected(&self, fix: &mut Fix, misidentified: f64) {
         let data = self.observations(&fix.pairs, &fix.edges);
         let pose = &fix.object_from_camera;
         let transfer = Transfer::of(&self.anchors, pose);
         let level =
-            protection(&data, pose, &fix.covariance, &self.faults(), &transfer, self.alert_limit, misidentified)
+            protection(&data, pose, &fix.covariance, self.acceptance, &transfer, self.alert_limit, misidentified)
                 .protection;
         let known = fix.integrity.protection.take();
         fix.integrity.protection = known.zip(level).map(|(known, level)| known.max(&level));
@@ -390,7 +382,7 @@ impl Judge<'_> {
         let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let mistaken = misidentified.unwrap_or(0.0);
         let left_out =
-            protection(&data, &hypothesis.pose, &covariance, &self.faults(), &transfer, self.alert_limit, mistaken);
+            protection(&data, &hypothesis.pose, &covariance, self.acceptance, &transfer, self.alert_limit, mistaken);
         let covariance = left_out.spread.map_or(covariance, |spread| Covariance6::new(covariance.matrix + spread));
         let dof = hypothesis.dof();
         let integrity = Integrity {

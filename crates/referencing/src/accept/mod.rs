@@ -90,8 +90,20 @@ pub fn judge(
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
     let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
-    let judge =
-        Judge { problem, solver, acceptance, anchors, alert_limit, largest, searched: true, rig, support, near };
+    let weighed = support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.hinges.is_empty());
+    let judge = Judge {
+        problem,
+        solver,
+        acceptance,
+        anchors,
+        alert_limit,
+        largest,
+        searched: true,
+        rig,
+        support,
+        weighed,
+        near,
+    };
     let a_contrario = AContrario::of(problem, &found.pairs);
     let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario, &acceptance.without);
     let mut probability = evidence.probability();
@@ -183,6 +195,7 @@ pub fn judge_labelled(
         searched: false,
         rig,
         support: None,
+        weighed: false,
         near: None,
     };
     let consensus_bound = pairs.len();

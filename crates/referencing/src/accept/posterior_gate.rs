@@ -11,6 +11,7 @@ use crate::{
     alternative::Alternative,
     problem::Correspondence,
     search::{
+        consensus::hinges::misled,
         identification::Identification,
         posterior::{Explanation, Posterior},
     },
@@ -42,6 +43,12 @@ impl Judge<'_> {
         if let Err(rejection) = self.present(probability.absent, [&found.pairs, &found.edges]) {
             return (Outcome::Rejected(rejection), runner_up, probability);
         }
+        if !max.allows(probability.wrong)
+            && max.allows(evidence.unmisled().wrong)
+            && let Some(rejection) = self.hanging(posterior)
+        {
+            return (Outcome::Rejected(rejection), runner_up, probability);
+        }
         if !max.allows(probability.wrong) {
             let elsewhere = posterior.elsewhere(&self.anchors, self.alert_limit);
             if elsewhere.is_empty() {
@@ -51,7 +58,8 @@ impl Judge<'_> {
             let all = posterior.explanations.first().into_iter().chain(elsewhere);
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None, probability);
         }
-        let (mut outcome, _) = self.poses(found, Some(probability.wrong));
+        // The protection levels cover single wrong matches by themselves.
+        let (mut outcome, _) = self.poses(found, Some(evidence.unmisled().wrong));
         if let Outcome::Ambiguous(all) = &outcome {
             let probability = probability.among(all.len());
             return (outcome, runner_up, probability);
@@ -78,6 +86,13 @@ impl Judge<'_> {
             true => Ok(()),
             false => Err(self.improbable(probability, identified)),
         }
+    }
+
+    /// The rejection of a pose by the pairs that most probably mislead it.
+    fn hanging(&self, posterior: &Posterior) -> Option<RejectionReason> {
+        let worst = misled(&posterior.hinges, self.alert_limit).1?;
+        let points = worst.pairs.iter().map(|pair| self.problem.model[pair.model].id.clone()).collect();
+        Some(RejectionReason::Hinge { points, rms: worst.error(), limit: self.alert_limit })
     }
 
     fn improbable(&self, p_wrong: f64, [pairs, edges]: [&[Correspondence]; 2]) -> RejectionReason {

@@ -102,6 +102,8 @@ pub(super) struct Evidence<'a> {
     nfa_independent: Option<f64>,
     /// The posterior of the search; `None` for a search that counts pairs.
     posterior: Option<PosteriorProbabilities>,
+    /// The probability that a wrong match misleads the pose.
+    misled: f64,
     /// The numbers of false alarms, computed on demand.
     a_contrario: &'a AContrario<'a>,
     /// The tests left out.
@@ -118,6 +120,8 @@ impl<'a> Evidence<'a> {
         without: &'a [AcceptanceTest],
     ) -> Self {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(&problem.anchors(), limit));
+        let misled = found.posterior.as_ref().map_or(0.0, |posterior| posterior.misled(limit));
+        let misled = if without.contains(&AcceptanceTest::Hinge) { 0.0 } else { misled };
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
         let counted = match &found.posterior {
             Some(_) => None,
@@ -134,6 +138,7 @@ impl<'a> Evidence<'a> {
             nfa_with_edges: ln_nfa.map(libm::exp),
             nfa_independent,
             posterior,
+            misled,
             a_contrario,
             without,
         }
@@ -152,8 +157,13 @@ impl<'a> Evidence<'a> {
     pub(super) fn probability(&self) -> Probability {
         match self.posterior {
             None => Probability::by_count(self.problem, self.pairs, self.counted),
-            Some(posterior) => self.weighted(&posterior),
+            Some(posterior) => self.weighted(&posterior).beside(self.misled),
         }
+    }
+
+    /// The probabilities if every pair is the object's or all are clutter.
+    pub(super) fn unmisled(&self) -> Probability {
+        self.posterior.map_or_else(|| self.probability(), |posterior| self.weighted(&posterior))
     }
 
     /// The probabilities if a second copy of the object is no clutter.

@@ -63,12 +63,12 @@ pub enum RejectionReason {
         /// The alert limit (m).
         limit: f64,
     },
-    /// One wrong match could move the pose beyond the alert limit.
-    #[error("{}", hinge(.point, .rms, .limit))]
+    /// One wrong match, or two, could move the pose beyond the alert limit.
+    #[error("{}", hinge(.points, .rms, .limit))]
     Hinge {
-        /// The identifier of the model point.
-        point: String,
-        /// The error of the model points for this wrong match (m, RMS, one sigma).
+        /// The identifiers of the model points, one or two.
+        points: Vec<String>,
+        /// The error of the model points for these wrong matches (m, RMS, one sigma).
         ///
         /// Infinite if the other points determine no pose.
         rms: f64,
@@ -218,13 +218,18 @@ fn absent(p_wrong: &f64, max: &MaxPWrong, [identified, model]: [usize; 2], edges
 }
 
 /// The message of [`RejectionReason::Hinge`].
-fn hinge(point: &str, rms: &f64, limit: &f64) -> String {
+fn hinge(points: &[String], rms: &f64, limit: &f64) -> String {
+    let named = points.join("` and `");
+    let (number, noun, wrong) = match points.len() {
+        1 => ("one point", "point", "is a wrong match"),
+        _ => ("two points", "points", "are wrong matches"),
+    };
     if !rms.is_finite() {
-        return format!("pose depends on one point: without model point `{point}` the others determine no pose");
+        return format!("pose depends on {number}: without model {noun} `{named}` the others determine no pose");
     }
     format!(
-        "pose depends on one point: if model point `{point}` is a wrong match, the model points have an error of \
-         {rms:.3} m (RMS, one sigma), twice that exceeds the alert limit of {limit:.3} m"
+        "pose depends on {number}: if model {noun} `{named}` {wrong}, the model points have an error of {rms:.3} m \
+         (RMS, one sigma); the alert limit is {limit:.3} m"
     )
 }
 

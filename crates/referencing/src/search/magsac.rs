@@ -56,7 +56,6 @@ impl Default for Magsac {
 
 impl Component for Magsac {
     const NAME: &'static str = "magsac";
-    const VERSION: u32 = 2;
     const SUMMARY: &'static str = "random triples, scored over all noise scales and optimised locally";
     const SOURCE: &'static str = "Barath, Noskova, Ivashechkin, Matas, MAGSAC++, a fast, reliable and accurate robust \
                                   estimator, 2020";
@@ -106,18 +105,14 @@ impl Search for Magsac {
                 continue;
             }
             let Some(mut pose) = fitted(problem, &[a, b, c]) else { continue };
-            for step in 0..=self.steps {
+            for _ in 0..=self.steps {
                 pair_tests += count as u64;
                 let (score, inliers) = scored(problem, &vertices, &pose, worth);
                 if !best.offer(score, pose) {
                     break;
                 }
-                // A reweighted pose has more inliers than its triple finds: the triple states how soon another may.
-                if step == 0 {
-                    let fraction = inliers as f64 / count as f64;
-                    let of_triple = libm::log(1.0 - self.confidence) / libm::log1p(-fraction.powi(3).min(1.0 - 1e-12));
-                    needed = needed.min(of_triple);
-                }
+                let fraction = inliers as f64 / count as f64;
+                needed = libm::log(1.0 - self.confidence) / libm::log1p(-fraction.powi(3).min(1.0 - 1e-12));
                 pose = reweighted(problem, &vertices, &pose);
             }
         }

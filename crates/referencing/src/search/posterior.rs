@@ -2,7 +2,11 @@
 
 use seafix_geometry::{Camera, Object, Transform};
 
-use super::consensus::{structured_clutter::StructuredClutter, support::Support};
+use super::consensus::{
+    hinges::{Hinge, misled},
+    structured_clutter::StructuredClutter,
+    support::Support,
+};
 use crate::{
     a_contrario::absence::by_nfa, accept::apart::rms_apart, alternative::Alternative, problem::Correspondence,
     site::model::ModelPoint,
@@ -77,6 +81,9 @@ pub struct Posterior {
     pub resembling: Option<f64>,
     /// The support of independent pairs, in place of all evidence of clutter; `None` but for a large putative set.
     pub support: Option<Support>,
+    /// The pairs of the best pose, one or two of which may be wrong matches; empty unless the pose has four points or more and no
+    /// edges, may be accepted, and is no large putative set.
+    pub hinges: Vec<Hinge>,
 }
 
 /// Evidence (nats) that makes a pose beside the best a second copy of the object in any case, complete or partial.
@@ -204,6 +211,11 @@ impl Posterior {
             alike: alike / all,
             clutter: more / all,
         }
+    }
+
+    /// The probability that a wrong match puts the best pose off by more than `limit` (m), if it is near the true one.
+    pub fn misled(&self, limit: f64) -> f64 {
+        misled(&self.hinges, limit).0
     }
 
     /// The probabilities of a large putative set, from the support of independent pairs.

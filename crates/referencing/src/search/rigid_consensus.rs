@@ -13,6 +13,7 @@ use super::{
         edge_seeds::{edge_modes, lines_of},
         edge_terms::EdgeTerms,
         graph::ConsistencyGraph,
+        hinges::hinges,
         joined::Joined,
         likelihood::{Mode, Terms},
         local_maxima::Climb,
@@ -374,6 +375,8 @@ impl Search for RigidConsensus {
             ln_evidence: mode.ln_evidence,
             ln_clutter_density: mode.ln_clutter_density,
         };
+        let weighed = !large && best.edges.is_empty() && best.ln_evidence >= STRONG && best.members.len() > NEEDED;
+        let hinges = if weighed { hinges(problem, parts, &mut clutter_density, best) } else { Vec::new() };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         let climb = Climb::new(problem.model, parts, &none);
         let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());
@@ -403,6 +406,7 @@ impl Search for RigidConsensus {
                 ln_nfa,
                 resembling,
                 support,
+                hinges,
             }),
             pairs,
         })

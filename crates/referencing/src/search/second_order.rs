@@ -7,7 +7,7 @@ use crate::problem::Problem;
 const FEW: usize = 50;
 /// Mean weight above which a graph is dense.
 const DENSE: f64 = 3.0;
-/// Factors of the threshold of the clustering coefficients, tried from ten down to the step.
+/// Number of factors of the threshold of the clustering coefficients, tried from the greatest, and the step between them.
 const FACTORS: usize = 200;
 const STEP: f64 = 0.05;
 /// Number of bins of Otsu's histogram.

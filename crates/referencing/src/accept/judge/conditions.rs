@@ -74,12 +74,12 @@ impl Judge<'_> {
 
     /// Whether the pose stays within the alert limit despite any single wrong match.
     ///
-    /// It applies to sets that a search counted. If the visible points of a large model are few, close together or in
+    /// It applies to sets that a search selected. If the visible points of a large model are few, close together or in
     /// a row, many wrong poses are possible; a clutter point near one of them makes a wrong pose look precise. Three
     /// points cannot be tested: each is needed.
     ///
-    /// A search with a posterior has weighed this: the worse the other points determine the place of a point, the more
-    /// clutter may lie there, and the smaller is the evidence of the pose.
+    /// A posterior of points states the probability of such a match ([`Posterior::misled`](crate::Posterior::misled)).
+    /// A pose that a large putative set supports has more pairs than any wrong pose of the same frame.
     ///
     /// `all` is the predicted error of the complete set, whose own test it passed. A pose does not depend on a point
     /// whose exclusion changes the predicted error by less than [`CARRIED`]: otherwise a pose of hundreds of points that
@@ -91,7 +91,7 @@ impl Judge<'_> {
         all: f64,
     ) -> Result<(), RejectionReason> {
         let Some((place, rms)) =
-            hinge.filter(|_| self.searched && self.near.is_none() && self.acceptance.with(AcceptanceTest::Hinge))
+            hinge.filter(|_| self.searched && !self.weighed && self.acceptance.with(AcceptanceTest::Hinge))
         else {
             return Ok(());
         };
@@ -103,7 +103,7 @@ impl Judge<'_> {
             None => self.problem.model[hypothesis.pairs[place].model].id.clone(),
             Some(edge) => self.problem.edges.model[hypothesis.edges[edge].model].id.clone(),
         };
-        Err(RejectionReason::Hinge { point, rms, limit: self.alert_limit })
+        Err(RejectionReason::Hinge { points: vec![point], rms, limit: self.alert_limit })
     }
 
     /// Whether the scale error is insignificant, or its effect within the alert limit.
@@ -137,11 +137,14 @@ impl Judge<'_> {
     /// Whether no part of the object is significantly displaced, or the effect on the pose within the alert limit.
     ///
     /// `rms` is the predicted error of the model points, which includes the displacement.
+    ///
+    /// The errors of neighbouring pairs of a large putative set are alike and look like displaced parts: they reject none.
     pub(super) fn consistent(&self, integrity: &Integrity, points: usize, rms: f64) -> Result<(), RejectionReason> {
         let limit = self.acceptance.max_bayes_factor();
         let significant = integrity
             .consistency
-            .filter(|found| found.bayes_factor > limit && self.acceptance.with(AcceptanceTest::Consistency));
+            .filter(|found| found.bayes_factor > limit && self.acceptance.with(AcceptanceTest::Consistency))
+            .filter(|_| self.support.is_none());
         let Some(consistency) = significant.filter(|_| !(2.0 * rms <= self.alert_limit)) else { return Ok(()) };
         Err(RejectionReason::Inconsistent { consistency, points, limit, rms, alert_limit: self.alert_limit })
     }

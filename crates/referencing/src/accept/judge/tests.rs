@@ -104,6 +104,7 @@ impl Scene {
             searched,
             rig: None,
             support: None,
+            weighed: false,
             near: None,
         })
     }
@@ -378,7 +379,7 @@ fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
         scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, hinge, all))
     };
     assert_eq!((of(&scene, None, 0.04), of(&scene, Some((2, 0.05)), 0.04)), (Ok(()), Ok(())));
-    let rejection = |rms| RejectionReason::Hinge { point: "V2".into(), rms, limit: 0.10 };
+    let rejection = |rms| RejectionReason::Hinge { points: vec!["V2".into()], rms, limit: 0.10 };
     assert_eq!(of(&scene, Some((2, 0.0501)), 0.04), Err(rejection(0.0501)));
     assert_eq!(of(&scene, Some((2, 0.0514)), 0.049), Ok(()));
     assert_eq!(of(&scene, Some((2, 0.0515)), 0.049), Err(rejection(0.0515)));

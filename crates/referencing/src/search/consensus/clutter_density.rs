@@ -85,8 +85,31 @@ impl ClutterDensity {
         (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
         mode: &mut Mode,
     ) {
-        let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+        let excess = self.excesses(problem, (terms, prior_terms, graph), mode);
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
+        let gain = |at: usize| match self.with(SearchMechanism::AllCandidates) {
+            true => any_of(terms, graph, mode.members[at], mode, even[at]),
+            false => even[at],
+        };
+        let dense: Vec<f64> = (0..even.len()).map(|at| gain(at) - excess[at]).collect();
+        let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_fraction[even.len()];
+        let sum = |gains: &[f64]| match self.with(SearchMechanism::Subsets) {
+            true => ln_visible(gains, &terms.ln_fraction),
+            false => gains.iter().sum::<f64>() + terms.ln_fraction[gains.len()],
+        };
+        let (even, dense) = (sum(&even), sum(&dense));
+        mode.ln_evidence = of_pose + dense;
+        mode.ln_clutter_density = even - dense;
+    }
+
+    /// The excess density (nats) of clutter over uniform clutter about each of the mode's points.
+    pub(super) fn excesses(
+        &mut self,
+        problem: &Problem<'_>,
+        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        mode: &Mode,
+    ) -> Vec<f64> {
+        let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
         let known = prior_terms.known.as_ref().filter(|_| self.with(SearchMechanism::ClumpedClutter));
         let clumped = known.map(|known| {
             let clumped_clutter = self.clumped_clutter.get_or_insert_with(|| ClumpedClutter::of(problem, known));
@@ -113,20 +136,7 @@ impl ClutterDensity {
             })
             .collect();
         let mean = excess.iter().sum::<f64>() / excess.len().max(1) as f64;
-        let excess = |at: usize| if at.is_multiple_of(every) { excess[at / every] } else { mean };
-        let gain = |at: usize| match self.with(SearchMechanism::AllCandidates) {
-            true => any_of(terms, graph, mode.members[at], mode, even[at]),
-            false => even[at],
-        };
-        let dense: Vec<f64> = (0..members.len()).map(|at| gain(at) - excess(at)).collect();
-        let of_pose = mode.ln_evidence - even.iter().sum::<f64>() - terms.ln_fraction[even.len()];
-        let sum = |gains: &[f64]| match self.with(SearchMechanism::Subsets) {
-            true => ln_visible(gains, &terms.ln_fraction),
-            false => gains.iter().sum::<f64>() + terms.ln_fraction[gains.len()],
-        };
-        let (even, dense) = (sum(&even), sum(&dense));
-        mode.ln_evidence = of_pose + dense;
-        mode.ln_clutter_density = even - dense;
+        (0..members.len()).map(|at| if at.is_multiple_of(every) { excess[at / every] } else { mean }).collect()
     }
 
     /// ln ρ/ρ_even at the cloud point of a vertex if `members` are the object's.

@@ -13,6 +13,7 @@ mod fit;
 mod fractions;
 mod gaussian;
 pub(crate) mod graph;
+pub(crate) mod hinges;
 pub(crate) mod joined;
 mod labels;
 pub(crate) mod likelihood;
@@ -38,5 +39,6 @@ pub(crate) mod turned;
 mod visible;
 mod wireframe;
 
+pub use hinges::Hinge;
 pub use structured_clutter::StructuredClutter;
 pub use support::Support;

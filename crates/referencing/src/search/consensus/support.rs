@@ -25,8 +25,8 @@ const WITHHELD: f64 = 2.0 * ONE_PLACE;
 ///
 /// Descriptors of overlapping neighbourhoods are matched with a common error.
 const CORRELATED: f64 = 2.0 * ONE_PLACE;
-/// Number of standard deviations that are significant.
-const SIGNIFICANT: f64 = 3.0;
+/// −ln of the probability that chance fits as many places to a pose alone: 1e-3.
+const LN_CHANCE: f64 = 6.9;
 /// Number of seeds of wrong poses: the largest of 256 is exceeded by one wrong pose in 256.
 const WRONG_POSES: usize = 256;
 /// Number of wrong poses of most places that are compared, since support grows with the number of places.
@@ -44,7 +44,7 @@ pub struct Support {
     /// ln of the odds of the best wrong pose of other pairs against the best pose.
     pub ln_odds_elsewhere: f64,
     /// The number of pairs of the best pose for each place, one at least: neighbouring pairs have common errors.
-    pub pairs_a_place: f64,
+    pub pairs_per_place: f64,
 }
 
 /// The independent pairs of a large putative set.
@@ -86,7 +86,7 @@ impl<'a> IndependentPairs<'a> {
     pub(in crate::search) fn of(
         (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
     ) -> Self {
-        let mut kept = apart(terms, 0..terms.pairs.len(), ONE_PLACE, |pair| [pair.cloud, pair.model]);
+        let mut kept = apart(terms, 0..terms.pairs.len(), one_place, |pair| [pair.cloud, pair.model]);
         kept.sort_by(|&a, &b| terms.pairs[a].cloud.x.total_cmp(&terms.pairs[b].cloud.x).then(a.cmp(&b)));
         let count = terms.pairs.len() as f64;
         let edges: usize = (0..terms.pairs.len()).map(|v| shared(graph.row(v), graph.row(v), 0)).sum();
@@ -111,12 +111,12 @@ impl<'a> IndependentPairs<'a> {
                 false => scale * (self.of_motion(&other.motion, &places) - own),
             }
         };
-        let apart = self.places(&best.members, CORRELATED).max(1);
+        let apart = self.places(&best.members, correlated).max(1);
         Some(Support {
             ln_nfa: self.ln_poses - scale * own,
             ln_odds: modes.iter().map(ln_odds).collect(),
             ln_odds_elsewhere: scale * (wrong - own),
-            pairs_a_place: (best.members.len() as f64 / apart as f64).max(1.0),
+            pairs_per_place: (best.members.len() as f64 / apart as f64).max(1.0),
         })
     }
 
@@ -128,9 +128,7 @@ impl<'a> IndependentPairs<'a> {
         let places = Places::of(self.terms);
         let near = places.near(self.terms, self.graph, pose, 0).unwrap_or_default();
         let alone = near.into_iter().filter(|&v| self.d2(v, pose) <= far() && !(self.d2(v, image) <= LOOSE));
-        let alone = self.places(&alone.collect::<Vec<_>>(), ONE_PLACE) as f64;
-        let expected = self.expected(pose);
-        alone <= expected + SIGNIFICANT * expected.sqrt().max(1.0)
+        chernoff(self.places(&alone.collect::<Vec<_>>(), correlated) as f64, self.expected(pose)) <= LN_CHANCE
     }
 
     /// The support (nats) of a motion by all pairs that fit it, counted as for wrong poses.
@@ -139,9 +137,11 @@ impl<'a> IndependentPairs<'a> {
     fn of_motion(&self, motion: &Motion, places: &Places) -> f64 {
         let of = || {
             let near = places.near(self.terms, self.graph, motion, NEEDED)?;
-            let (motion, _) = fit(self.terms, self.prior_terms, &near, motion, 2)?;
-            let near = places.near(self.terms, self.graph, &motion, NEEDED)?;
-            Some(self.of_pose(&near, &motion))
+            let (fitted, _) = fit(self.terms, self.prior_terms, &near, motion, 2)?;
+            // A fit that loses the pairs of the motion is another pose.
+            let kept = near.iter().filter(|&&v| self.d2(v, &fitted) <= LOOSE).count();
+            let motion = if 2 * kept > near.len() { fitted } else { *motion };
+            Some(self.of_pose(&places.near(self.terms, self.graph, &motion, NEEDED)?, &motion))
         };
         of().unwrap_or(0.0)
     }
@@ -150,9 +150,8 @@ impl<'a> IndependentPairs<'a> {
     fn of_pose(&self, members: &[usize], motion: &Motion) -> f64 {
         let far = far();
         let near: Vec<usize> = members.iter().copied().filter(|&v| self.d2(v, motion) <= far).collect();
-        let more = self.places(&near, ONE_PLACE) as f64 - NEEDED as f64;
-        let expected = self.expected(motion);
-        if more > expected { more * libm::log(more / expected) - (more - expected) } else { 0.0 }
+        let more = self.places(&near, one_place) as f64 - NEEDED as f64;
+        chernoff(more, self.expected(motion))
     }
 
     /// χ² of a pair under a pose.
@@ -163,8 +162,8 @@ impl<'a> IndependentPairs<'a> {
 
     /// The number of places of some pairs, the smaller of those in the model and in the cloud.
     ///
-    /// Ends up to `wide` standard deviations apart are one place.
-    fn places(&self, members: &[usize], wide: f64) -> usize {
+    /// Ends up to the distance `wide` (m) apart are one place.
+    fn places(&self, members: &[usize], wide: fn(&Term) -> f64) -> usize {
         let of = || members.iter().copied();
         let model = apart(self.terms, of(), wide, |pair| [pair.model]);
         let cloud = apart(self.terms, of(), wide, |pair| [pair.cloud]);
@@ -211,13 +210,30 @@ impl<'a> IndependentPairs<'a> {
             let start = fitted(terms, &beginning(&adjacency, seed, ranked)?)?;
             let (motion, _) = fit(terms, self.prior_terms, &near(&start)?, &start, 2)?;
             let members = near(&motion)?;
-            Some((self.places(&members, ONE_PLACE), members, motion))
+            Some((self.places(&members, one_place), members, motion))
         };
         let mut sampled: Vec<_> = (0..WRONG_POSES.min(others.len())).filter_map(seeded).collect();
         sampled.sort_by_key(|(places, ..)| std::cmp::Reverse(*places));
         let all = sampled.iter().take(COMPARED).map(|(_, members, motion)| self.of_pose(members, motion));
         (all.fold(0.0, f64::max), libm::log(others.len() as f64 / WRONG_POSES as f64).max(0.0))
     }
+}
+
+/// The distance (m) up to which two points may be one place.
+fn one_place(pair: &Term) -> f64 {
+    ONE_PLACE * pair.variance.sqrt()
+}
+
+/// The distance (m) up to which errors are correlated: of the mean noise, not of its longest axis, since descriptors
+/// have the same extent in depth.
+fn correlated(pair: &Term) -> f64 {
+    let mean = pair.weight.determinant().powf(-1.0 / 3.0);
+    CORRELATED * mean.min(pair.variance).sqrt()
+}
+
+/// −ln of Chernoff's bound of the probability of `count` events or more of `expected`.
+fn chernoff(count: f64, expected: f64) -> f64 {
+    if count > expected { count * libm::log(count / expected) - (count - expected) } else { 0.0 }
 }
 
 /// Gate of a pair (χ²₃).
@@ -227,16 +243,16 @@ fn far() -> f64 {
 
 /// Some of these pairs of which no two are together at all `ends`, in their order.
 ///
-/// Ends are together up to `wide` standard deviations.
+/// Ends are together up to the distance `wide` (m).
 fn apart<const N: usize>(
     terms: &Terms,
     of: impl Iterator<Item = usize>,
-    wide: f64,
+    wide: impl Fn(&Term) -> f64,
     ends: impl Fn(&Term) -> [Vector3<f64>; N],
 ) -> Vec<usize> {
     let (mut kept, mut places): (Vec<usize>, Vec<[Vector3<f64>; N]>) = (Vec::new(), Vec::new());
     for v in of {
-        let (own, reach2) = (ends(&terms.pairs[v]), wide * wide * terms.pairs[v].variance);
+        let (own, reach2) = (ends(&terms.pairs[v]), wide(&terms.pairs[v]).powi(2));
         let together = |known: &[Vector3<f64>; N]| own.iter().zip(known).all(|(a, b)| (a - b).norm_squared() <= reach2);
         if !places.iter().any(together) {
             places.push(own);
