@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
+import judged
 
 problems, pairs, seafix, drivers, family, rounds, *names = sys.argv[1:]
 problems, pairs = Path(problems) / family, Path(pairs)
@@ -31,24 +31,7 @@ def ours():
 def peer(program):
     files = [pairs / f"{name}.txt" for name in ids]
     said = subprocess.run([Path(drivers) / program, *files], capture_output=True, text=True, env=one_thread).stderr
-    for line in said.splitlines():
-        words = line.split()
-        if len(words) == 19 and words[0] in ids:
-            pose = np.array(words[3:], float).reshape(4, 4)
-            yield words[0], float(words[1]), pose if words[2] == "1" else None
-
-
-def right(name, pose):
-    """Whether the pose is right: within three times the ideal error, or 5 cm and 2°, 1 cm in d."""
-    truth = json.loads((problems / f"{name}.truth.json").read_text())
-    model = np.array(json.loads((problems / f"{name}.json").read_text())["model"], float)[:, :3]
-    pose, true = np.array(pose), np.array(truth["T_cam_obj"])
-    off = model @ (pose - true)[:3, :3].T + (pose - true)[:3, 3]
-    rms = np.sqrt((off**2).sum(1).mean())
-    turn = np.degrees(np.arccos(np.clip((np.trace(pose[:3, :3].T @ true[:3, :3]) - 1) / 2, -1, 1)))
-    near = rms < 0.01 if family == "d" else np.linalg.norm(off.mean(0)) < 0.05 and turn < 2
-    ideal = truth.get("ideal_tre_rms")
-    return truth["pose_defined"] and (near or bool(ideal) and rms <= 3 * ideal)
+    yield from (answer for answer in judged.answers(said.splitlines()) if answer[0] in ids)
 
 
 times = {name: {} for name in ["ours", *names]}
@@ -67,7 +50,7 @@ for name, of in times.items():
     ratio = statistics.median(own.values()) / statistics.median(median.values())
     each = statistics.median(own[problem] / max(median[problem], 1e-9) for problem in of)
     answers = {problem: pose for problem, pose in poses[name].items() if pose is not None}
-    solved = sum(right(problem, pose) for problem, pose in answers.items())
+    solved = sum(judged.right(problems, problem, pose) for problem, pose in answers.items())
     print(
         f"{family} {name}: {statistics.median(median.values()):.4g} ms of {len(of)}, ours over it {ratio:.3f}, "
         f"median of ratios {each:.3f}; solved {solved}, wrong {len(answers) - solved} of {len(answers)}",

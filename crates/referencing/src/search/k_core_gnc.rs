@@ -27,6 +27,8 @@ use crate::{
 /// m‖²/Δ², 1) by graduated non-convexity. The translation has the most pairs within ½ Δ on each axis (adaptive
 /// voting). The answer is the one-to-one set that the pose explains.
 ///
+/// Unlike the package of KISS-Matcher, the answer has no pose unless three mutually coherent pairs agree with it.
+///
 /// Not exact: the core holds wrong pairs among many agreements by chance, and GNC follows one minimum. K²/2 pair tests
 /// for K candidate pairs, then O(E) for E coherent ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]

@@ -82,7 +82,7 @@ pub struct Posterior {
     /// The support of independent pairs, in place of all evidence of clutter; `None` but for a large putative set.
     pub support: Option<Support>,
     /// The pairs of the best pose, one or two of which may be wrong matches; empty unless the pose has four points or more and no
-    /// edges, may be accepted, and is no large putative set.
+    /// edges, and may be accepted.
     pub hinges: Vec<Hinge>,
 }
 

@@ -94,8 +94,11 @@ use crate::{
 ///
 /// Of more than 256 model points with putative partners and without a prior, as key points of scans with descriptors,
 /// wrong pairs come in groups and on common surfaces. Such a set is not weighed against models of clutter. Its best pose
-/// is accepted by the number of its independent pairs, compared with wrong poses of the same frame ([`Support`](super::Support)). The
-/// guided seeds suffice then, and a second copy is a wrong pose that leaves the best without support.
+/// is accepted by the number of its independent pairs, compared with wrong poses of the same frame
+/// ([`Support`](super::Support)). The guided seeds suffice then, and a second copy is a wrong pose that leaves the best
+/// without support. A mirror image refutes the pose only if nothing but chance fits the pose alone: descriptors do not
+/// tell the left side of a symmetric object from the right. The errors of neighbouring pairs are alike, so that the
+/// covariance counts them as one pair, and the parts of the object are not tested for displacement.
 ///
 /// With `prove`, and if the evidence of the best pose exceeds five nats, strict bounds decide which coherent sets are
 /// examined. They hold for uniform clutter and to first order in the geometry. A better set joins the posterior. The
@@ -163,6 +166,8 @@ const FLOOR: f64 = 3.0;
 const STRONG: f64 = 3.8;
 /// Maximum number of poses whose evidence is weighed with the local density of clutter.
 const MAX_COMPARED: usize = 64;
+/// Maximum number of pairs of a large putative set that are examined for wrong matches; more do not hang on one.
+const MAX_HINGES: usize = 40;
 /// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a [`COPY`].
 const BESIDE: f64 = 14.0;
 /// Number of points below the best pose at which a pose is only part of a copy.
@@ -375,7 +380,8 @@ impl Search for RigidConsensus {
             ln_evidence: mode.ln_evidence,
             ln_clutter_density: mode.ln_clutter_density,
         };
-        let weighed = !large && best.edges.is_empty() && best.ln_evidence >= STRONG && best.members.len() > NEEDED;
+        let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_HINGES);
+        let weighed = few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG);
         let hinges = if weighed { hinges(problem, parts, &mut clutter_density, best) } else { Vec::new() };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         let climb = Climb::new(problem.model, parts, &none);

@@ -32,6 +32,9 @@ use crate::{
 /// most of these with it; the principal eigenvector of their agreements weighs them in a least-squares pose. The pose
 /// with most pairs within tolerance is fitted again to all of them.
 ///
+/// Unlike the authors' program, a consensus set is not filled to its size with incompatible pairs, and there are at least
+/// three seeds.
+///
 /// Not exact. After K²/2 pair tests for K candidate pairs, a seed takes as many comparisons of rows as it has
 /// compatible pairs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]

@@ -1,5 +1,7 @@
 //! The pairs on which a pose depends, and the probability that one of them is a wrong match.
 
+use nalgebra::Vector3;
+
 use super::{
     clutter_density::ClutterDensity,
     fit::fit,
@@ -15,6 +17,8 @@ use crate::{
 /// Number of Gauss–Newton rounds of a pose without one of its pairs.
 const ROUNDS: usize = 4;
 
+/// Maximum number of model points that stand for the object in the errors of a pose.
+const MAX_ANCHORS: usize = 64;
 /// Maximum number of pairs of which two are left out at once; two of more hardly move a pose.
 const MAX_TWICE: usize = 20;
 
@@ -80,7 +84,12 @@ pub(in crate::search) fn hinges(
     mode: &Mode,
 ) -> Vec<Hinge> {
     let (terms, prior_terms, graph) = parts;
-    let anchors = problem.anchors();
+    let all_anchors = problem.anchors();
+    let anchors: Vec<Vector3<f64>> = all_anchors
+        .iter()
+        .step_by(all_anchors.len().div_ceil(MAX_ANCHORS).max(1))
+        .map(|anchor| anchor.at.coords)
+        .collect();
     let of = |members: &[usize]| {
         let (motion, factor) = fit(terms, prior_terms, members, &mode.motion, ROUNDS)?;
         let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
@@ -100,9 +109,9 @@ pub(in crate::search) fn hinges(
         };
         let about = motion.apply(&prior_terms.centroid);
         let (mut shift, mut variance) = (0.0, 0.0);
-        for anchor in anchors.iter() {
-            let place = motion.apply(&anchor.at.coords);
-            shift += (place - pose.apply(&anchor.at.coords)).norm_squared();
+        for anchor in &anchors {
+            let place = motion.apply(anchor);
+            shift += (place - pose.apply(anchor)).norm_squared();
             variance += spread(&covariance, &(place - about)).trace();
         }
         let count = anchors.len() as f64;
