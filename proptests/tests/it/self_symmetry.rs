@@ -275,7 +275,9 @@ fn a_nearly_symmetric_model_is_the_right_orientation_as_often_as_is_stated() {
         let attempt = view.attempt(0.05, &acceptance);
         let Outcome::Fix(fix) = &attempt.outcome else { continue };
         let [p_absent, p_wrong] = [attempt.p_absent, attempt.p_wrong].map(|p| p.expect("the search gives it"));
-        assert_eq!(fix.integrity.misidentified, Some(p_wrong));
+        // Levels cover single wrong matches by themselves.
+        let misidentified = fix.integrity.misidentified.expect("the search gives it");
+        assert!((p_absent..=p_wrong).contains(&misidentified), "{misidentified} {p_absent} {p_wrong}");
         // The object is always there.
         let elsewhere = (p_wrong - p_absent) / (1.0 - p_absent);
         let is_wrong = rms_apart(&view.model, &fix.object_from_camera, &view.truth) > 0.3;

@@ -47,8 +47,8 @@ pub(super) struct Judge<'a> {
     pub(super) rig: Option<&'a StereoRig>,
     /// The support of the pose by the independent pairs of a large putative set.
     pub(super) support: Option<&'a Support>,
-    /// Whether a posterior has weighed that single pairs are wrong matches, or need not.
-    pub(super) weighed: bool,
+    /// Whether the search states how probably wrong matches mislead the pose, or has too many pairs for that.
+    pub(super) hinges_known: bool,
     /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
     pub(super) near: Option<Transform<Object, Camera>>,
 }

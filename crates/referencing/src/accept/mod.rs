@@ -90,7 +90,8 @@ pub fn judge(
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
     let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
-    let weighed = support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.hinges.is_empty());
+    let hinges_known =
+        support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.hinges.is_empty());
     let judge = Judge {
         problem,
         solver,
@@ -101,7 +102,7 @@ pub fn judge(
         searched: true,
         rig,
         support,
-        weighed,
+        hinges_known,
         near,
     };
     let a_contrario = AContrario::of(problem, &found.pairs);
@@ -195,7 +196,7 @@ pub fn judge_labelled(
         searched: false,
         rig,
         support: None,
-        weighed: false,
+        hinges_known: false,
         near: None,
     };
     let consensus_bound = pairs.len();

@@ -381,8 +381,8 @@ impl Search for RigidConsensus {
             ln_clutter_density: mode.ln_clutter_density,
         };
         let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_HINGES);
-        let weighed = few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG);
-        let hinges = if weighed { hinges(problem, parts, &mut clutter_density, best) } else { Vec::new() };
+        let examined = few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG);
+        let hinges = if examined { hinges(problem, parts, &mut clutter_density, best) } else { Vec::new() };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         let climb = Climb::new(problem.model, parts, &none);
         let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());

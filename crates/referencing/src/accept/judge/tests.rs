@@ -104,7 +104,7 @@ impl Scene {
             searched,
             rig: None,
             support: None,
-            weighed: false,
+            hinges_known: false,
             near: None,
         })
     }

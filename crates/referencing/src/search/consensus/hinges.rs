@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pairs_that_contribute_most_are_named() {
+    fn the_worst_pairs_are_named() {
         let all = [hinge(-9.0, 0.2, 0.01), hinge(-3.0, 0.2, 0.01), hinge(-2.0, 0.0, 0.01)];
         assert_eq!(misled(&all, 0.1).1, Some(&all[1]));
         assert_eq!(misled(&[], 0.1).1, None);

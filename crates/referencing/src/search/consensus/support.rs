@@ -29,7 +29,7 @@ const WITHHELD: f64 = 2.0 * ONE_PLACE;
 /// then the predicted error of 13 sound fixes exceeds the alert limit.
 const CORRELATED: f64 = 2.0 * ONE_PLACE;
 /// −ln of the probability that chance fits as many places to a pose alone: 1e-3.
-const LN_CHANCE: f64 = 6.9;
+const LN_ACCIDENTAL: f64 = 6.9;
 /// Number of seeds of wrong poses: the largest of 256 is exceeded by one wrong pose in 256.
 const WRONG_POSES: usize = 256;
 /// Number of wrong poses of most places that are compared, since support grows with the number of places.
@@ -131,7 +131,7 @@ impl<'a> IndependentPairs<'a> {
         let places = Places::of(self.terms);
         let near = places.near(self.terms, self.graph, pose, 0).unwrap_or_default();
         let alone = near.into_iter().filter(|&v| self.d2(v, pose) <= far() && !(self.d2(v, image) <= LOOSE));
-        chernoff(self.places(&alone.collect::<Vec<_>>(), correlated) as f64, self.expected(pose)) <= LN_CHANCE
+        chernoff(self.places(&alone.collect::<Vec<_>>(), correlated) as f64, self.expected(pose)) <= LN_ACCIDENTAL
     }
 
     /// The support (nats) of a motion by all pairs that fit it, counted as for wrong poses.
