@@ -200,12 +200,10 @@ struct Tried {
 /// The limits at which an answer is tried; a second pose may make it ambiguous at a larger one.
 const LIMITS: [f64; 4] = [1e-3, 2e-2, 0.2, 1.0];
 
-fn tried(
-    problem: &Problem<'_>,
-    variants: &[Variant],
-    defined: bool,
-    right: &dyn Fn(&Transform<Object, Camera>) -> (bool, bool),
-) -> Vec<Tried> {
+/// Whether a pose is right, and whether it is wrong: off by more than the alert limit, or of an absent object.
+type Verdict<'a> = dyn Fn(&Transform<Object, Camera>) -> (bool, bool) + 'a;
+
+fn tried(problem: &Problem<'_>, variants: &[Variant], defined: bool, right: &Verdict<'_>) -> Vec<Tried> {
     let search = |without: Vec<SearchMechanism>| {
         let search = RigidConsensus { without, ..RigidConsensus::default() };
         search.search(problem, &mut ChaCha8Rng::seed_from_u64(0))
