@@ -382,7 +382,8 @@ impl Search for RigidConsensus {
         };
         let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_HINGES);
         let examined = few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG);
-        let hinges = if examined { hinges(problem, parts, &mut clutter_density, best) } else { Vec::new() };
+        let density = (!large).then_some(&mut clutter_density);
+        let hinges = if examined { hinges(problem, parts, density, best) } else { Vec::new() };
         let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
         let climb = Climb::new(problem.model, parts, &none);
         let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());

@@ -75,12 +75,12 @@ pub(crate) fn misled(hinges: &[Hinge], limit: f64) -> (f64, Option<&Hinge>) {
 ///
 /// O_S = Λ(V \\ S) B(k − |S|) e^x / (Λ(V) B(k)),
 ///
-/// x the excess density of clutter about the points. Both sets have their own pose and posterior volume: the worse the
-/// others determine the place of a point, the more clutter may lie there.
+/// x the excess density of clutter about the points; zero without `clutter_density`. Both sets have their own pose and
+/// posterior volume: the worse the others determine the place of a point, the more clutter may lie there.
 pub(in crate::search) fn hinges(
     problem: &Problem<'_>,
     parts: (&Terms, &PriorTerms, &ConsistencyGraph),
-    clutter_density: &mut ClutterDensity,
+    clutter_density: Option<&mut ClutterDensity>,
     mode: &Mode,
 ) -> Vec<Hinge> {
     let (terms, prior_terms, graph) = parts;
@@ -97,7 +97,8 @@ pub(in crate::search) fn hinges(
         Some((ln_evidence + terms.ln_fraction[members.len()], motion, factor.inverse()))
     };
     let Some((all, pose, _)) = of(&mode.members) else { return Vec::new() };
-    let excess = clutter_density.excesses(problem, parts, mode);
+    let even = || vec![0.0; mode.members.len()];
+    let excess = clutter_density.map_or_else(even, |density| density.excesses(problem, parts, mode));
     let hinge = |out: &[usize]| {
         let kept = |at: &usize| !out.contains(at);
         let others: Vec<usize> = (0..mode.members.len()).filter(kept).map(|at| mode.members[at]).collect();
