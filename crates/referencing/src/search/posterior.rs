@@ -81,8 +81,10 @@ pub struct Posterior {
     pub resembling: Option<f64>,
     /// The support of independent pairs, in place of all evidence of clutter; `None` but for a large putative set.
     pub support: Option<Support>,
-    /// The pairs of the best pose, one or two of which may be wrong matches; empty unless the pose has four points or more and no
-    /// edges, and may be accepted.
+    /// The pairs of the best pose, one or two of which may be wrong matches.
+    ///
+    /// Empty unless the pose has four points or more and no edges, and may be accepted; for a large putative set also
+    /// with more than forty pairs.
     pub hinges: Vec<Hinge>,
 }
 

@@ -98,7 +98,7 @@ use crate::{
 /// ([`Support`](super::Support)). The guided seeds suffice then, and a second copy is a wrong pose that leaves the best
 /// without support. A mirror image refutes the pose only if nothing but chance fits the pose alone: descriptors do not
 /// tell the left side of a symmetric object from the right. The errors of neighbouring pairs are alike, so that the
-/// covariance counts them as one pair, and the parts of the object are not tested for displacement.
+/// covariance counts them as one pair, and parts that look displaced enlarge it but reject no pose.
 ///
 /// With `prove`, and if the evidence of the best pose exceeds five nats, strict bounds decide which coherent sets are
 /// examined. They hold for uniform clutter and to first order in the geometry. A better set joins the posterior. The
@@ -166,7 +166,7 @@ const FLOOR: f64 = 3.0;
 const STRONG: f64 = 3.8;
 /// Maximum number of poses whose evidence is weighed with the local density of clutter.
 const MAX_COMPARED: usize = 64;
-/// Maximum number of pairs of a large putative set that are examined for wrong matches; more do not hang on one.
+/// Maximum number of pairs of a large putative set that are examined for wrong matches, for the time it takes: O(k²).
 const MAX_HINGES: usize = 40;
 /// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a [`COPY`].
 const BESIDE: f64 = 14.0;

@@ -79,7 +79,7 @@ impl Judge<'_> {
     /// points cannot be tested: each is needed.
     ///
     /// A posterior of points states the probability of such a match ([`Posterior::misled`](crate::Posterior::misled)).
-    /// A pose that a large putative set supports has more pairs than any wrong pose of the same frame.
+    /// Of a large putative set, poses of many pairs are not tested.
     ///
     /// `all` is the predicted error of the complete set, whose own test it passed. A pose does not depend on a point
     /// whose exclusion changes the predicted error by less than [`CARRIED`]: otherwise a pose of hundreds of points that

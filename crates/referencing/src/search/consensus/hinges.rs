@@ -19,7 +19,7 @@ const ROUNDS: usize = 4;
 
 /// Maximum number of model points that stand for the object in the errors of a pose.
 const MAX_ANCHORS: usize = 64;
-/// Maximum number of pairs of which two are left out at once; two of more hardly move a pose.
+/// Maximum number of pairs of which two are left out at once, for the time it takes: O(k³).
 const MAX_TWICE: usize = 20;
 
 /// One or two pairs of the best pose, and the pose without them.

@@ -23,10 +23,10 @@ const ONE_PLACE: f64 = 5.0;
 const WITHHELD: f64 = 2.0 * ONE_PLACE;
 /// Distance (standard deviations of a measurement) below which the errors of two pairs are correlated.
 ///
-/// Descriptors of overlapping neighbourhoods are matched with a common error: in 116 sets of 28 pairs of scans (FPFH of
-/// 5σ to 12σ) the errors of pairs within 5σ correlate at 0.32, within 10σ at 0.20, within 20σ at 0.12. With one pair
-/// for each 10σ the median NEES of their fixes falls from 65 to 13 (5.3 expected); with one for each 20σ to 5.2, but
-/// then the predicted error of 13 sound fixes exceeds the alert limit.
+/// Descriptors of overlapping neighbourhoods are matched with a common error: in 116 sets of 28 pairs of scans from 16
+/// sources (FPFH; outside of this repository) the errors of pairs within 5σ correlate at 0.32, within 10σ at 0.20,
+/// within 20σ at 0.12. With one pair for each 10σ the median NEES of their fixes falls from 65 to 13 (5.3 expected); with
+/// one for each 20σ to 5.2, but then the predicted error of 13 sound fixes exceeds the alert limit.
 const CORRELATED: f64 = 2.0 * ONE_PLACE;
 /// −ln of the probability that chance fits as many places to a pose alone: 1e-3.
 const LN_ACCIDENTAL: f64 = 6.9;
