@@ -71,6 +71,11 @@ pub struct Cloud {
 }
 
 impl Cloud {
+    /// The points of matched key points, then the corners of outlines and of straight edges, which may replace some.
+    pub fn points(&self) -> &[MeasuredPoint] {
+        &self.points
+    }
+
     /// Features that were measured elsewhere.
     pub(crate) fn given(points: &[MeasuredPoint], lines: &[MeasuredLine]) -> Self {
         let times = FrameTimes::default();

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
-use seafix::PipelineSettings;
+use seafix::{FrameData, PipelineSettings};
 use seafix_component::{Choice, Fault};
 use seafix_data::dataset::{partners_remedy, strangers, swap_fault};
 use seafix_experiment::changed_pipeline;
 use seafix_geometry::StereoRig;
-use seafix_vision::{EpipolarCheck, FrontEnd, FrontEndOutput, Image, Keypoint, Sides, StageTimes, Threads};
+use seafix_vision::{EpipolarCheck, FrontEnd, FrontEndOutput, Image, Keypoint, Regions, Sides, StageTimes, Threads};
 use serde_json::{Value, json};
 
 use super::{
@@ -61,7 +61,8 @@ pub(crate) struct Cloud {
 impl Cloud {
     pub(crate) fn execute(&self) -> Ended {
         let base = self.base()?;
-        let (pipeline, front_end) = built(&self.set, |set| changed_pipeline(&base, set), PipelineSettings::front_end)?;
+        let (pipeline, stages) = built(&self.set, |set| changed_pipeline(&base, set), PipelineSettings::build)?;
+        let front_end = pipeline.front_end().map_err(|error| Failure::new(USAGE, error))?;
         let CloudPair { images: [left, right], names, rig, rig_file, warnings } = self.input.read()?;
         let sides = Sides::of_images(&left, &right, &rig);
         if let Some(fault) = swap_fault(sides, &names[0]) {
@@ -72,7 +73,7 @@ impl Cloud {
             .num_threads(usize::from(self.threads))
             .build()
             .map_err(|error| Failure::new(OUTPUT, format!("cannot start threads: {error}")))?;
-        let (look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
+        let (mut look, times) = pool.install(|| self.make(&front_end, &left, &right, &rig));
         let warnings: Vec<Fault> = warnings
             .into_iter()
             .chain(epipolar_check)
@@ -80,6 +81,10 @@ impl Cloud {
             .chain(strangers(sides, &names[0]).or_else(|| nothing(&front_end, &look, [&left, &right], &rig, &names[0])))
             .collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
+        // A pipeline adds corners that no key point has, and replaces key points by better corners.
+        let whole = stages.cloud(&FrameData::Stereo(left.clone(), right), &rig, &[], &[Regions::NONE; 2]);
+        let corners = whole.points().iter().filter(|point| !look.cloud.contains(point)).count();
+        look.cloud = whole.points().to_vec();
         if let Some(path) = &self.out {
             AtomicFile::begin(path, self.replacing, &self.input.files())?.finish(ply::ply(&look.cloud, &left))?;
         }
@@ -87,7 +92,7 @@ impl Cloud {
         print(&if self.json {
             self.machines(&names, &look, &times, &pipeline, &warnings)
         } else {
-            self.people(&look, &times)
+            self.people(&look, corners, &times)
         })?;
         Ok(DONE)
     }
@@ -128,13 +133,17 @@ impl Cloud {
     }
 
     /// The output for people: counts, and the times of the stages.
-    fn people(&self, look: &FrontEndOutput, times: &[StageTimes]) -> String {
+    fn people(&self, look: &FrontEndOutput, corners: usize, times: &[StageTimes]) -> String {
         let [left, right] = look.keypoints().map(<[_]>::len);
         let depths = look.cloud.iter().map(|point| point.position.at.coords.z);
         let (near, far) = depths.fold((f64::INFINITY, 0.0_f64), |(near, far), z| (near.min(z), far.max(z)));
         let depth = if look.cloud.is_empty() { String::new() } else { format!(", {near:.2} to {far:.2} m deep") };
         let (matches, points) = (look.matches.len(), look.cloud.len());
-        let mut text = format!("{left} and {right} key points, {matches} matches, {points} points{depth}\n");
+        let corners = match corners {
+            0 => String::new(),
+            corners => format!(", {corners} of them corners of outlines and edges"),
+        };
+        let mut text = format!("{left} and {right} key points, {matches} matches, {points} points{corners}{depth}\n");
         text += &format!("{:12}{:>10}{:>12}\n", "stage", "min ms", "median ms");
         for (stage, [min, median]) in summary(times) {
             text += &format!("{stage:12}{min:10.2}{median:12.2}\n");
@@ -180,6 +189,8 @@ impl Cloud {
                 "matcher": pipeline.matcher,
                 "refinement": pipeline.refinement,
                 "triangulator": pipeline.triangulator,
+                "edge-corners": pipeline.edge_corners,
+                "outline-corners": pipeline.outline_corners,
             },
         });
         value.to_string() + "\n"

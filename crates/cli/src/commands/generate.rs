@@ -8,7 +8,7 @@ use seafix_simulation::families::{Family, Generated, Presence};
 
 use crate::{
     atomic_file,
-    exit::{DONE, Ended, Failure, OUTPUT},
+    exit::{DONE, Ended, Failure, OUTPUT, USAGE},
     terminal::print,
 };
 
@@ -28,6 +28,9 @@ pub(crate) struct Generate {
     /// Omit the object: the cloud is clutter only.
     #[arg(long)]
     absent: bool,
+    /// Omit the object and put a box of other dimensions in its place (families of boxes).
+    #[arg(long, conflicts_with = "absent")]
+    replaced: bool,
     /// The folder of the problems, new or empty.
     #[arg(long)]
     out: PathBuf,
@@ -38,11 +41,21 @@ impl Generate {
         let failed = |error: &dyn std::fmt::Display| {
             Failure::new(OUTPUT, format!("cannot write into {}: {error}", self.out.display()))
         };
+        if self.replaced && matches!(self.family, Family::D | Family::E) {
+            return Err(Failure::new(
+                USAGE,
+                format!("--replaced: family {} has no box to replace; use --absent", self.family.name()),
+            ));
+        }
         create_real_folder(&self.out).map_err(|error| failed(&error))?;
         if fs::read_dir(&self.out).map_err(|error| failed(&error))?.next().is_some() {
             return Err(failed(&"the folder is not empty; name another folder with --out"));
         }
-        let presence = if self.absent { Presence::Absent } else { Presence::Present };
+        let presence = match (self.absent, self.replaced) {
+            (true, _) => Presence::Absent,
+            (_, true) => Presence::Replaced,
+            _ => Presence::Present,
+        };
         for number in self.first..self.first + self.count {
             let generated = Generated::new(self.family, self.seed, number, presence);
             let file = |end: &str| self.out.join(format!("{}{end}", generated.problem.id));

@@ -62,6 +62,22 @@ fn threads_and_repeats_change_no_point() {
     assert_eq!(points(&["--threads", "3", "--repeat", "3"]), points(&[]));
 }
 
+/// As in a run, corners without a key point follow the points of key points, of which they may replace some.
+///
+/// Fails if the cloud is that of the front end alone.
+#[test]
+fn the_cloud_is_that_of_the_pipeline() {
+    let points = |more: &[&str]| json(more)["points"].as_array().unwrap().clone();
+    let without = ["--set", "outline-corners.enabled=false", "--set", "edge-corners.enabled=false"];
+    let (all, of_key_points) = (points(&[]), points(&without));
+    let corners = all.iter().filter(|point| !of_key_points.contains(point)).count();
+    assert!(corners > 0 && all.len() <= of_key_points.len() + corners, "{} and {}", all.len(), of_key_points.len());
+    assert!(all[all.len() - corners..].iter().all(|point| !of_key_points.contains(point)));
+    let counts = format!("{} points, {corners} of them corners", all.len());
+    let message = cloud(&[], 0).out;
+    assert!(message.contains(&counts), "{message}: {counts}");
+}
+
 #[test]
 fn the_budget_is_kept() {
     let all = json(&["--features", "50"]);

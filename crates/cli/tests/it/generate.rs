@@ -43,11 +43,13 @@ fn problems_and_truth_are_written_and_sound() {
 #[test]
 fn the_object_can_be_left_away() {
     let folder = TempDir::new().unwrap();
-    let out = folder.path().join("gone");
-    let (code, ..) = seafix(&["generate", "few-visible", "--absent", "--out", out.to_str().unwrap()]);
-    assert_eq!(code, Some(0));
-    let truth = fs::read_to_string(out.join("f000.truth.json")).unwrap();
-    assert!(truth.contains(r#""pairs":[],"pose_defined":false"#), "{truth}");
+    for how in ["--absent", "--replaced"] {
+        let out = folder.path().join(how);
+        let (code, ..) = seafix(&["generate", "few-visible", how, "--out", out.to_str().unwrap()]);
+        assert_eq!(code, Some(0));
+        let truth = fs::read_to_string(out.join("f000.truth.json")).unwrap();
+        assert!(truth.contains(r#""pairs":[],"pose_defined":false"#), "{truth}");
+    }
 }
 
 #[test]
@@ -64,6 +66,8 @@ fn what_cannot_be_generated_is_refused() {
         (&["generate", "paper-scale", "--seed", "-1", "--out", out_name], "unexpected argument '-1'"),
         (&["generate", "paper-scale", "--seed", "x", "--out", out_name], "invalid value 'x'"),
         (&["generate", "paper-scale"], "--out <OUT>"),
+        (&["generate", "lattice", "--replaced", "--out", out_name], "no box to replace"),
+        (&["generate", "paper-scale", "--absent", "--replaced", "--out", out_name], "cannot be used with"),
     ] {
         let (code, _, error) = seafix(arguments);
         assert_eq!(code, Some(2), "{arguments:?}: {error}");

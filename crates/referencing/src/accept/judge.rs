@@ -7,6 +7,7 @@ use seafix_geometry::{Camera, Covariance6, Object, StereoRig, Transform};
 
 use super::{
     acceptance::Acceptance,
+    alert_limit,
     apart::rms_apart,
     hypothesis::{Fallen, Hypothesis, by_score},
     integrity::{Integrity, Protection, Redundancy, protection, semi_axes},
@@ -48,12 +49,35 @@ pub(super) struct Judge<'a> {
     /// The support of the pose by the independent pairs of a large putative set.
     pub(super) support: Option<&'a Support>,
     /// Whether the search states how probably wrong matches mislead the pose, or has too many pairs for that.
-    pub(super) hinges_known: bool,
+    pub(super) weighs_hinges: bool,
     /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
     pub(super) near: Option<Transform<Object, Camera>>,
 }
 
-impl Judge<'_> {
+impl<'a> Judge<'a> {
+    /// The judge of labelled pairs, which no search selected.
+    pub(super) fn of_labelled(
+        problem: &'a Problem<'a>,
+        solver: &'a dyn Solver,
+        acceptance: &'a Acceptance,
+        rig: Option<&'a StereoRig>,
+    ) -> Self {
+        let anchors = problem.anchors();
+        Self {
+            problem,
+            solver,
+            acceptance,
+            alert_limit: alert_limit(&anchors, acceptance),
+            anchors,
+            largest: 0,
+            searched: false,
+            rig,
+            support: None,
+            weighs_hinges: false,
+            near: None,
+        }
+    }
+
     /// Whether points and edges are enough: the required number of features, and at least those that fix a pose.
     pub(super) fn size(&self, pairs: &[Correspondence], edges: &[Correspondence]) -> Result<(), RejectionReason> {
         let needed = self.acceptance.min_points.max(self.solver.minimum());

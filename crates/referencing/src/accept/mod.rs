@@ -79,8 +79,6 @@ pub fn judge(
             return Attempt { outcome, ..attempt };
         }
     };
-    let anchors = problem.anchors();
-    let alert_limit = alert_limit(&anchors, acceptance);
     let found = match solver.takes_edges() {
         true => found,
         false => Identification { edges: Vec::new(), alternative_edges: Vec::new(), ..found },
@@ -90,23 +88,12 @@ pub fn judge(
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
     let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
-    let hinges_known =
+    let weighs_hinges =
         support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.hinges.is_empty());
-    let judge = Judge {
-        problem,
-        solver,
-        acceptance,
-        anchors,
-        alert_limit,
-        largest,
-        searched: true,
-        rig,
-        support,
-        hinges_known,
-        near,
-    };
+    let labelled = Judge::of_labelled(problem, solver, acceptance, rig);
+    let judge = Judge { largest, searched: true, support, weighs_hinges, near, ..labelled };
     let a_contrario = AContrario::of(problem, &found.pairs);
-    let evidence = Evidence::of(problem, &found, alert_limit, &a_contrario, &acceptance.without);
+    let evidence = Evidence::of(problem, &found, judge.alert_limit, &a_contrario, &acceptance.without);
     let mut probability = evidence.probability();
     let sized = judge.size(&found.pairs, &found.edges);
     let (outcome, runner_up) = match (sized, &found.posterior) {
@@ -184,21 +171,7 @@ pub fn judge_labelled(
     acceptance: &Acceptance,
     rig: Option<&StereoRig>,
 ) -> Attempt {
-    let anchors = problem.anchors();
-    let alert_limit = alert_limit(&anchors, acceptance);
-    let judge = Judge {
-        problem,
-        solver,
-        acceptance,
-        anchors,
-        alert_limit,
-        largest: pairs.len(),
-        searched: false,
-        rig,
-        support: None,
-        hinges_known: false,
-        near: None,
-    };
+    let judge = Judge { largest: pairs.len(), ..Judge::of_labelled(problem, solver, acceptance, rig) };
     let consensus_bound = pairs.len();
     let found = Identification::unproved(pairs, consensus_bound, 0);
     let (outcome, runner_up) = match judge.size(&found.pairs, &found.edges) {

@@ -44,7 +44,7 @@ impl Judge<'_> {
             return (Outcome::Rejected(rejection), runner_up, probability);
         }
         if !max.allows(probability.wrong)
-            && max.allows(evidence.unmisled().wrong)
+            && max.allows(evidence.without_hinges().wrong)
             && let Some(rejection) = self.hanging(posterior)
         {
             return (Outcome::Rejected(rejection), runner_up, probability);
@@ -59,7 +59,7 @@ impl Judge<'_> {
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None, probability);
         }
         // The protection levels cover single wrong matches by themselves.
-        let (mut outcome, _) = self.poses(found, Some(evidence.unmisled().wrong));
+        let (mut outcome, _) = self.poses(found, Some(evidence.without_hinges().wrong));
         if let Outcome::Ambiguous(all) = &outcome {
             let probability = probability.among(all.len());
             return (outcome, runner_up, probability);

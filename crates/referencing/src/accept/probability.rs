@@ -162,7 +162,7 @@ impl<'a> Evidence<'a> {
     }
 
     /// The probabilities if every pair is the object's or all are clutter.
-    pub(super) fn unmisled(&self) -> Probability {
+    pub(super) fn without_hinges(&self) -> Probability {
         self.posterior.map_or_else(|| self.probability(), |posterior| self.weighted(&posterior))
     }
 

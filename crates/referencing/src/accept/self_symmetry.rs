@@ -15,7 +15,7 @@ use super::{
 use crate::{
     ablation::AcceptanceTest,
     observations::Observations,
-    problem::Correspondence,
+    problem::{Correspondence, Problem},
     solve::{kabsch::Kabsch, solver::Solver},
 };
 
@@ -23,6 +23,9 @@ use crate::{
 const MAX_BASES: usize = 1_000_000;
 /// Maximum number of assignments of one set; more are not needed to call it ambiguous.
 const MAX_SYMMETRIC: usize = 64;
+/// Number of poses from which an assignment is made: that of three points, and those of all assigned points.
+const ROUNDS: usize = 2;
+
 impl Judge<'_> {
     /// The outcome under the model's self-symmetry: ambiguous if other model points fit the measurements.
     ///
@@ -83,21 +86,24 @@ impl Judge<'_> {
     ///
     /// Alignment (Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990): a wide
     /// triangle of the measured points is placed on every coherent triangle of the model, and each other point must
-    /// then lie at a model point of its own.
+    /// then lie at a model point of its own. The points are taken at the places of their model points, without noise,
+    /// so that model points side by side are told apart.
     fn symmetric_sets(&self, pairs: &[Correspondence], admitted: &Admitted) -> BTreeSet<Vec<Correspondence>> {
         let mut found = BTreeSet::new();
-        let Some(base) = self.wide(pairs) else { return found };
+        let mut cloud = self.problem.cloud.to_vec();
+        pairs.iter().for_each(|pair| cloud[pair.cloud].position.at = self.problem.model[pair.model].at.coords.into());
+        let exact = &Problem { cloud: &cloud, ..*self.problem };
+        let Some(base) = wide(exact, pairs) else { return found };
         let [first, second, third] = base.map(|cloud| &admitted.models[&cloud]);
         if first.len().saturating_mul(second.len()) > MAX_BASES {
             return found;
         }
         let at = |model: usize, place: usize| Correspondence { model, cloud: base[place] };
         let known: BTreeSet<&Correspondence> = pairs.iter().collect();
-        let measured = |a: usize, b: usize| self.problem.measured(base[a], base[b]);
+        let measured = |a: usize, b: usize| exact.measured(base[a], base[b]);
         let [near, far, opposite] = [measured(0, 1), measured(0, 2), measured(1, 2)];
-        let meet = |a: Correspondence, b: Correspondence, measured: f64| {
-            a.model != b.model && self.problem.agrees(a, b, measured)
-        };
+        let meet =
+            |a: Correspondence, b: Correspondence, measured: f64| a.model != b.model && exact.agrees(a, b, measured);
         for &i in first {
             let seconds: Vec<usize> = second.iter().copied().filter(|&j| meet(at(i, 0), at(j, 1), near)).collect();
             if seconds.is_empty() {
@@ -110,7 +116,7 @@ impl Judge<'_> {
                     if three.iter().all(|pair| known.contains(pair)) {
                         continue;
                     }
-                    found.extend(self.completed(three, pairs, admitted));
+                    found.extend(completed(exact, three, pairs, admitted));
                     if found.len() >= MAX_SYMMETRIC {
                         return found;
                     }
@@ -120,75 +126,96 @@ impl Judge<'_> {
         found
     }
 
-    /// Three distant measured points: one far from the centroid, the farthest from it, and the one with the largest
-    /// triangle.
-    fn wide(&self, pairs: &[Correspondence]) -> Option<[usize; 3]> {
-        let place = |pair: &Correspondence| self.problem.cloud[pair.cloud].position.at.coords;
-        let middle = pairs.iter().map(place).sum::<Vector3<f64>>() / pairs.len() as f64;
-        let largest = |size: &dyn Fn(Vector3<f64>) -> f64| {
-            pairs.iter().max_by(|a, b| size(place(a)).total_cmp(&size(place(b))).then_with(|| b.cmp(a)))
-        };
-        let first = largest(&|at| (at - middle).norm())?;
-        let second = largest(&|at| (at - place(first)).norm())?;
-        let side = place(second) - place(first);
-        let third = largest(&|at| side.cross(&(at - place(first))).norm())?;
-        let three = [first.cloud, second.cloud, third.cloud];
-        (three[0] != three[1] && three[0] != three[2] && three[1] != three[2]).then_some(three)
-    }
-
-    /// The assignment of all measured points of `pairs` that extends these three.
-    ///
-    /// `None` unless each other point lies at a model point of its own.
-    fn completed(
-        &self,
-        three: [Correspondence; 3],
-        pairs: &[Correspondence],
-        admitted: &Admitted,
-    ) -> Option<Vec<Correspondence>> {
-        let pose =
-            Kabsch::default().solve(&Observations::of(&three, self.problem.model, self.problem.cloud, None)).ok()?;
-        let mut set = three.to_vec();
-        let mut taken: BTreeSet<usize> = three.iter().map(|pair| pair.model).collect();
-        for cloud in pairs.iter().map(|pair| pair.cloud).filter(|cloud| three.iter().all(|pair| pair.cloud != *cloud)) {
-            let model = self.nearest(&pose, cloud, &three, &admitted.models[&cloud])?;
-            if !taken.insert(model) {
-                return None;
-            }
-            set.push(Correspondence { model, cloud });
-        }
-        set.sort_unstable();
-        Some(set)
-    }
-
-    /// The nearest admitted model point under the pose that is coherent with the three.
-    fn nearest(
-        &self,
-        pose: &Transform<Object, Camera>,
-        cloud: usize,
-        three: &[Correspondence; 3],
-        admitted: &[usize],
-    ) -> Option<usize> {
-        let place = *pose * self.problem.cloud[cloud].position.at;
-        let three = three.map(|pair| (pair, self.problem.measured(pair.cloud, cloud)));
-        let coherent = |model: usize| {
-            let own = Correspondence { model, cloud };
-            three.iter().all(|&(pair, measured)| pair.model != model && self.problem.agrees(pair, own, measured))
-        };
-        let mut nearest = (f64::INFINITY, None);
-        for &model in admitted {
-            // The distance excludes most points and is cheaper than the coherence test.
-            let apart = (self.problem.model[model].at - place).norm_squared();
-            if apart < nearest.0 && coherent(model) {
-                nearest = (apart, Some(model));
-            }
-        }
-        nearest.1
-    }
-
     /// Whether the camera sees the identified points from their visible sides.
     pub(super) fn faces(&self, hypothesis: &Hypothesis) -> bool {
         let camera = hypothesis.pose.translation();
         !self.acceptance.with(AcceptanceTest::Visibility)
             || hypothesis.pairs.iter().all(|pair| self.problem.model[pair.model].shows_itself(&camera))
     }
+}
+
+/// Three distant measured points: one far from the centroid, the farthest from it, and the one with the largest
+/// triangle.
+fn wide(problem: &Problem<'_>, pairs: &[Correspondence]) -> Option<[usize; 3]> {
+    let place = |pair: &Correspondence| problem.cloud[pair.cloud].position.at.coords;
+    let middle = pairs.iter().map(place).sum::<Vector3<f64>>() / pairs.len() as f64;
+    let largest = |size: &dyn Fn(Vector3<f64>) -> f64| {
+        pairs.iter().max_by(|a, b| size(place(a)).total_cmp(&size(place(b))).then_with(|| b.cmp(a)))
+    };
+    let first = largest(&|at| (at - middle).norm())?;
+    let second = largest(&|at| (at - place(first)).norm())?;
+    let side = place(second) - place(first);
+    let third = largest(&|at| side.cross(&(at - place(first))).norm())?;
+    let three = [first.cloud, second.cloud, third.cloud];
+    (three[0] != three[1] && three[0] != three[2] && three[1] != three[2]).then_some(three)
+}
+
+/// The assignment of all measured points of `pairs` that extends these three.
+///
+/// `None` unless each other point lies at a model point of its own. The pose of three points alone may put two points
+/// beside one model point, so that it is computed again from all points that were assigned, nearest first.
+fn completed(
+    problem: &Problem<'_>,
+    three: [Correspondence; 3],
+    pairs: &[Correspondence],
+    admitted: &Admitted,
+) -> Option<Vec<Correspondence>> {
+    let mut possible: Vec<Correspondence> = Vec::new();
+    for cloud in pairs.iter().map(|pair| pair.cloud).filter(|cloud| three.iter().all(|pair| pair.cloud != *cloud)) {
+        let before = possible.len();
+        possible.extend(coherent(problem, cloud, &three, &admitted.models[&cloud]));
+        if possible.len() == before {
+            return None;
+        }
+    }
+    let mut set = three.to_vec();
+    for _ in 0..ROUNDS {
+        let data = Observations::of(&set, problem.model, problem.cloud, None);
+        let pose = Kabsch::default().solve(&data).ok()?;
+        set = nearest_first(problem, &pose, three, &possible);
+    }
+    set.sort_unstable();
+    (set.len() == pairs.len()).then_some(set)
+}
+
+/// The admitted model points of a measured point that are coherent with the three.
+fn coherent(
+    problem: &Problem<'_>,
+    cloud: usize,
+    three: &[Correspondence; 3],
+    admitted: &[usize],
+) -> impl Iterator<Item = Correspondence> {
+    let measured = three.map(|pair| (pair, problem.measured(pair.cloud, cloud)));
+    let own = move |&model: &usize| Correspondence { model, cloud };
+    let agrees = move |own: &Correspondence| {
+        let agrees =
+            |&(pair, measured): &(Correspondence, f64)| pair.model != own.model && problem.agrees(pair, *own, measured);
+        measured.iter().all(agrees)
+    };
+    admitted.iter().map(own).filter(agrees)
+}
+
+/// The three with each other measured point at the nearest free model point under a pose, nearest pairs first.
+fn nearest_first(
+    problem: &Problem<'_>,
+    pose: &Transform<Object, Camera>,
+    three: [Correspondence; 3],
+    possible: &[Correspondence],
+) -> Vec<Correspondence> {
+    let apart = |pair: &Correspondence| {
+        let place = *pose * problem.cloud[pair.cloud].position.at;
+        (problem.model[pair.model].at - place).norm_squared()
+    };
+    let mut ranked: Vec<(f64, Correspondence)> = possible.iter().map(|pair| (apart(pair), *pair)).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut set = three.to_vec();
+    let mut models: BTreeSet<usize> = three.iter().map(|pair| pair.model).collect();
+    let mut clouds = BTreeSet::new();
+    for (_, pair) in ranked {
+        if !models.contains(&pair.model) && clouds.insert(pair.cloud) {
+            models.insert(pair.model);
+            set.push(pair);
+        }
+    }
+    set
 }

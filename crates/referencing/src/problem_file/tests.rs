@@ -248,6 +248,13 @@ fn coincident_points_are_refused_and_unlikely_values_are_reported() {
             vec![("[0.5,0.5,4]", "[0.25,-0.75,3]"), ("null}", "[[0,0],[1,1],[2,2],[3,2],[3,3],[4,4]]}")],
             "repeated cloud points in p.json: 1 of 5, e.g. 3 and 2; equal coordinates are one point; each takes part",
         ),
+        (
+            vec![
+                (CLOUD, &places(24, |k| [(k / 4.0).floor() * 0.3, (k / 8.0).floor(), 3.0 + 0.004 * (k % 4.0)])),
+                no_prior,
+            ],
+            "repeated measurements in p.json: 24 of 24 cloud points have 2 or more others within 0.04 m; give each place",
+        ),
         // The prior.
         (
             vec![("0.05]", "1e300]")],

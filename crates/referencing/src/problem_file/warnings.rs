@@ -32,6 +32,14 @@ const MAX_CHECKED: usize = 100;
 /// Distance of mapped points, in standard deviations, up to which a motion equals the identity.
 const DISTINGUISHED: f64 = 3.0;
 
+/// Distance of two cloud points, in standard deviations, up to which they may be measurements of one place; 95 % of two
+/// measurements are within it.
+const SAME_PLACE: f64 = 4.0;
+/// Maximum ratio of the pairs up to twice that distance to those within it, for measurements of separate places.
+const CLUMPED: f64 = 1.25;
+/// Number of others at its place from which a cloud point counts as measured repeatedly; a second one may be clutter.
+const REPEATED: usize = 2;
+
 /// The standard deviation (rad) of a rotation that leaves an attitude useless, 5°.
 const OPEN: f64 = 0.09;
 
@@ -50,7 +58,7 @@ impl Hints<'_> {
 impl CoherenceProblem {
     /// Warnings about valid but implausible contents of `file`.
     ///
-    /// They cover points too few for a pose, collinear, repeated, or too close for Δ; a symmetric model; zero noise, or noise far
+    /// They cover points too few for a pose, collinear, repeated, measured several times, or too close for Δ; a symmetric model; zero noise, or noise far
     /// above Δ; putative pairs that determine no pose; a prior that places the object out of view or bounds nothing;
     /// coordinates that are apparently not in metres; edges without lines, or lines without edges; lines that are behind the
     /// camera, repeated, or shorter than their noise; and too many candidates.
@@ -59,6 +67,7 @@ impl CoherenceProblem {
         self.of_the_model(&mut reported);
         self.of_the_cloud(&mut reported);
         self.of_duplicates(&mut reported);
+        self.of_repeated_measurements(&mut reported);
         self.of_the_edges(&mut reported);
         self.of_the_noise(&mut reported);
         self.of_putative(&mut reported);
@@ -155,6 +164,42 @@ impl CoherenceProblem {
                 let remedy = "equal coordinates are one point; each takes part as its first";
                 reported.warn(&format!("repeated {what} points"), value, remedy);
             }
+        }
+    }
+
+    /// A cloud that holds most points several times, as one that was gathered from several frames.
+    ///
+    /// Points in clumps are the image of clumped clutter: little evidence remains for each.
+    fn of_repeated_measurements(&self, reported: &mut Hints<'_>) {
+        if self.putative.is_some() {
+            return;
+        }
+        let reach = SAME_PLACE * self.typical_sigma();
+        let mut places: Vec<_> = self.cloud.iter().map(|point| point.position.at.coords).collect();
+        places.sort_by(|a, b| a.x.total_cmp(&b.x));
+        let (mut near, mut pairs, mut wide) = (vec![0usize; places.len()], 0u32, 0u32);
+        for (a, from) in places.iter().enumerate() {
+            let next = places.iter().enumerate().skip(a + 1).take_while(|(_, to)| to.x - from.x <= 2.0 * reach);
+            for (b, apart) in next.map(|(b, to)| (b, (to - from).norm())).filter(|(_, apart)| *apart <= 2.0 * reach) {
+                wide += 1;
+                if apart <= reach {
+                    pairs += 1;
+                    near[a] += 1;
+                    near[b] += 1;
+                }
+            }
+        }
+        let repeated = near.iter().filter(|count| **count >= REPEATED).count();
+        // A dense line or surface has twice as many pairs and more up to twice the distance.
+        let clumped = f64::from(wide) <= CLUMPED * f64::from(pairs);
+        if repeated > 0 && 2 * repeated >= places.len() && clumped {
+            let value = format!(
+                "{repeated} of {} cloud points have {REPEATED} or more others within {} m",
+                places.len(),
+                number(reach)
+            );
+            let remedy = "give each place once: merge its measurements into their mean, with its standard deviation";
+            reported.warn("repeated measurements", value, remedy);
         }
     }
 

@@ -83,8 +83,8 @@ pub struct Posterior {
     pub support: Option<Support>,
     /// The pairs of the best pose, one or two of which may be wrong matches.
     ///
-    /// Empty unless the pose has four points or more and no edges, and may be accepted; for a large putative set also
-    /// with more than forty pairs.
+    /// Empty unless the pose has four points or more, no edges, and an evidence of at least 3.8 nats; for a large putative
+    /// set also with more than forty pairs.
     pub hinges: Vec<Hinge>,
 }
 

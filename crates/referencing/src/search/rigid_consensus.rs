@@ -100,7 +100,7 @@ use crate::{
 /// tell the left side of a symmetric object from the right. The errors of neighbouring pairs are alike, so that the
 /// covariance counts them as one pair, and parts that look displaced enlarge it but reject no pose.
 ///
-/// With `prove`, and if the evidence of the best pose exceeds five nats, strict bounds decide which coherent sets are
+/// With `prove`, and if the evidence of the best pose is at least 3.8 nats, strict bounds decide which coherent sets are
 /// examined. They hold for uniform clutter and to first order in the geometry. A better set joins the posterior. The
 /// answer is optimal if no set remains open, unless some pairs of its pose were removed for lack of coherence.
 ///
@@ -111,7 +111,7 @@ use crate::{
 /// beside the best pose come on top: for a complete second copy as thorough as the first search, for parts of a copy up
 /// to two and a half times its work, for structured clutter an eighth. In dense clutter a partly visible object beside
 /// a complete copy of it may therefore be missed; [`Posterior::copies_sought`] is then false. A pose of less than nine
-/// nats is not a copy. The tolerance and the maximum rotation of the prior prune the graph; they do not judge the pose.
+/// nats is a copy only if it would be accepted by itself. The tolerance and the maximum rotation of the prior prune the graph; they do not judge the pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RigidConsensus {
@@ -134,7 +134,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 14;
+    const VERSION: u32 = 15;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -164,6 +164,8 @@ const FLOOR: f64 = 3.0;
 /// Minimum evidence (nats) of a pose that may be accepted, a probability of absence of 2.2 %; only then are
 /// alternatives searched for.
 const STRONG: f64 = 3.8;
+/// Evidence (nats) below the best at which a pose elsewhere is no alternative; the margin of the search.
+const MARGIN: f64 = 10.0;
 /// Maximum number of poses whose evidence is weighed with the local density of clutter.
 const MAX_COMPARED: usize = 64;
 /// Maximum number of pairs of a large putative set that are examined for wrong matches, for the time it takes: O(k²).
@@ -286,6 +288,7 @@ impl Search for RigidConsensus {
         let mut copies_sought = None;
         let mut structured_clutter = None;
         let mut unlikely = None;
+        let mut missed: Vec<Mode> = Vec::new();
         if best.ln_evidence >= STRONG && !large {
             let elsewhere = |mode: &Mode| {
                 let points = mode.members.iter().filter(|&&v| best.holds(v)).count();
@@ -342,6 +345,11 @@ impl Search for RigidConsensus {
                 others.modes.retain(elsewhere);
                 // A shift of the object within its pattern is a hypothesis of its own.
                 let is_shift = |mode: &Mode| pattern.as_ref().is_some_and(|of| of.is_shift(&best.motion, &mode.motion));
+                // Poses that the pruned search missed, although they explain as much as the best.
+                let known = |mode: &Mode| swept.modes.iter().any(|known| known.members == mode.members);
+                let comparable = |mode: &&Mode| mode.ln_evidence >= best.ln_evidence - MARGIN;
+                let comparable = others.modes.iter().filter(comparable);
+                missed = comparable.filter(|mode| !known(mode)).cloned().collect();
                 let clutter_patterns = others
                     .modes
                     .iter()
@@ -402,7 +410,7 @@ impl Search for RigidConsensus {
             consensus_bound: bound,
             pair_tests,
             posterior: Some(Posterior {
-                explanations: explain(&swept),
+                explanations: swept.modes.iter().chain(&missed).map(explanation).collect(),
                 beside: explain(&beside),
                 copies_sought,
                 pattern_alone: continued.map(|continued| continued.alone),

@@ -111,7 +111,12 @@ pub(super) fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], 
         })
     };
     if let Some((field, bound)) = group.split_once("<=") {
-        let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
+        let wrong = field.strip_prefix("wrong ");
+        let (field, bound) = (Field::named(wrong.unwrap_or(field))?, bound.parse::<f64>().ok()? / scale);
+        if wrong.is_some() {
+            let is = |row: &TargetRecord| is_wrong(row) && field.of(row).is_some_and(|value| value <= bound);
+            return Some(known(all().map(|row| is(&row.record)).collect()));
+        }
         if fixes.is_some() {
             let own = all().filter(|row| row.record.outcome == Outcome::Fix);
             return Some(known(own.filter_map(|row| field.of(&row.record)).map(|value| value <= bound).collect()));
@@ -143,6 +148,32 @@ pub(super) fn fraction_of(which: &str, group: &str, scale: f64, span: [u64; 2], 
         _ => 100.0 * high,
     };
     Some((n > 0).then_some(value))
+}
+
+/// A class of the reliability diagram: `count`, `mean`, `percent` (wrong), `low` or `high` of `p_wrong from A to B of
+/// fixes`.
+pub(super) fn class(which: &str, range: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let (from, to) = range.strip_prefix("p_wrong from ")?.strip_suffix(" of fixes")?.split_once(" to ")?;
+    let (from, to): (f64, f64) = (from.parse().ok()?, to.parse().ok()?);
+    let inside = |p: f64| (from == 0.0 || p > from) && p <= to;
+    let fixes = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.record.outcome == Outcome::Fix);
+    let fixes = fixes.filter(|row| is_wrong(&row.record) || found(&row.record));
+    let own: Vec<(f64, bool)> = fixes
+        .filter_map(|row| Some((Field::PWrong.of(&row.record).filter(|p| inside(*p))?, is_wrong(&row.record))))
+        .collect();
+    let events: Vec<bool> = own.iter().map(|(_, wrong)| *wrong).collect();
+    let (low, high) = proportion::interval(false, &events);
+    Some((!own.is_empty()).then(|| match which {
+        "count" => own.len() as f64,
+        "mean" => own.iter().map(|(p, _)| p).sum::<f64>() / own.len() as f64,
+        "percent" => 100.0 * events.iter().filter(|wrong| **wrong).count() as f64 / own.len() as f64,
+        "low" => 100.0 * low,
+        _ => 100.0 * high,
+    }))
+}
+
+fn is_wrong(row: &TargetRecord) -> bool {
+    row.outcome == Outcome::Fix && row.evaluation.wrong == Some(true)
 }
 
 /// A column of the NEES histogram: the value of `nees from A to B of found`.

@@ -17,7 +17,7 @@ use crate::{
     proportion::{self, BORNE},
     rms,
     verify::{
-        counts::{end_of, fraction_of, histogram, pooled},
+        counts::{class, end_of, fraction_of, histogram, pooled},
         logs::{Log, Logs, Seen},
         rows::{error, found, rows, value},
         written::{combined, extreme, f1, in_common},
@@ -114,6 +114,7 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
             Some(at(log, span)?.marks[place] as f64)
         }
         ("disparity", _) => (log.disparity.1 > 0).then(|| (log.disparity.0 / log.disparity.1 as f64).sqrt()),
+        (_, range) if range.starts_with("p_wrong from ") => class(first, range, span, logs)?,
         ("count" | "density", range) if range.contains(" from ") => histogram(first, range, span, logs),
         ("count", group) if Counted::ALL.iter().any(|counted| counted.name() == group) => {
             let counted = Counted::ALL.into_iter().find(|counted| counted.name() == group)?;

@@ -2,21 +2,33 @@
 
 use std::{fs, path::Path};
 
-use seafix_log::{Axis, Writer};
+use seafix_log::{Axis, FrameRecord, TrialHeader, Writer};
 use seafix_report::{Forms, report, verify};
 
 use crate::made_up::{blind, header};
 
 /// Writes a trial of 40 frames, of which the first `rejected` have no fix.
 pub(crate) fn trial(folder: &Path, index: usize, axes: [(&str, &str); 2], question: &str, rejected: u64) {
+    // Frame 5 of the synthetic run is rejected.
+    let of = |header: &TrialHeader, place| blind(header, if place < rejected { 5 } else { 0 }, 2.0);
+    trial_of(folder, index, axes, question, of);
+}
+
+/// Writes a trial of 40 frames.
+pub(crate) fn trial_of(
+    folder: &Path,
+    index: usize,
+    axes: [(&str, &str); 2],
+    question: &str,
+    of: impl Fn(&TrialHeader, u64) -> FrameRecord,
+) {
     let mut header = header(index, 2.0, axes[1].1);
     header.question = question.to_owned();
     header.trial = format!("{index:03}");
     header.axes = axes.map(|(key, value)| Axis { key: key.to_owned(), value: value.to_owned() }).to_vec();
     let mut writer = Writer::create(&folder.join(format!("{}.mcap", header.trial)), &header).unwrap();
     for place in 0..40 {
-        // Frame 5 of the synthetic run is rejected.
-        let mut frame = blind(&header, if place < rejected { 5 } else { 0 }, 2.0);
+        let mut frame = of(&header, place);
         (frame.frame, frame.stamp_ns) = (place, 100 * place);
         writer.frame(&frame).unwrap();
     }

@@ -13,6 +13,7 @@ mod integrity;
 mod made_up;
 mod objects;
 mod paper;
+mod probability;
 mod reach;
 mod rows;
 mod sentences;

@@ -5,7 +5,7 @@ use seafix_geometry::Point;
 
 use super::{
     clutter::{EDGE_JITTER, Scene, in_gates, on_edge, on_face},
-    family::{Family, Part, Source},
+    family::{Family, Part, Presence, Source},
     generated::Generated,
     prior::{ahead, prior_pose},
     problem::{GeneratedProblem, micrometres, round},
@@ -111,6 +111,7 @@ impl Cell {
             sigma: site.then_some(self.sigma),
             aniso: (source.family == Family::B).then_some(self.depth),
             absent: source.absent().then_some(true),
+            replaced: (source.presence == Presence::Replaced).then_some(true),
             ..GeneratedParameters::default()
         }
     }
@@ -156,7 +157,9 @@ pub(super) fn draw(source: &Source) -> Generated {
     });
 
     let mut stream = source.stream(Part::Clutter);
-    let scene = Scene { camera_from_object: &pose, half: cell.half.into(), margin: cell.margin, placed: &placed };
+    let replaced = source.presence == Presence::Replaced;
+    let half = if replaced { other(&cell.half, &mut source.stream(Part::Replacement)) } else { cell.half.into() };
+    let scene = Scene { camera_from_object: &pose, half, margin: cell.margin, placed: &placed };
     let predicted: Option<Vec<Vector3<f64>>> = prior
         .as_ref()
         .filter(|_| cell.dense)
@@ -164,10 +167,12 @@ pub(super) fn draw(source: &Source) -> Generated {
     let mut points: Vec<Vector3<f64>> = measured.iter().map(|(_, at)| *at).collect();
     while points.len() < cell.m {
         let at = match (&predicted, cell.gate) {
+            // The other box has a quarter of the clutter here as well.
+            (Some(_), _) if replaced && stream.below(4) == 0 => scene.edge(&mut stream),
             (Some(predicted), Some(half)) => in_gates(&mut stream, predicted, half),
             _ => scene.clutter(&mut stream),
         };
-        if hidden.iter().all(|&i| (placed[i] - at).norm() >= cell.clear) {
+        if replaced || hidden.iter().all(|&i| (placed[i] - at).norm() >= cell.clear) {
             points.push(at);
         }
     }
@@ -180,6 +185,12 @@ pub(super) fn draw(source: &Source) -> Generated {
     let pairs = order.iter().enumerate().filter_map(|(j, &k)| Some([*seen.get(k)?, j])).collect();
     let truth = GeneratedTruth::new(&problem, &pose, pairs, cell.parameters(source, seen.len()));
     Generated { problem, truth }
+}
+
+/// Half extents of another box: each larger or smaller by 10 to 30 %.
+fn other(half: &[f64; 3], stream: &mut Stream) -> Vector3<f64> {
+    Vector3::from(*half)
+        .map(|half| half * (1.0 + stream.between(0.1, 0.3) * if stream.below(2) == 0 { -1.0 } else { 1.0 }))
 }
 
 /// Standard deviations along the camera's axes (m), whose root mean square is the cell's σ.

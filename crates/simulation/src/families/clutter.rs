@@ -25,15 +25,23 @@ pub(super) struct Scene<'a> {
 impl Scene<'_> {
     /// A clutter point: half lie anywhere, a quarter on the box's edges, a quarter on the floor about it.
     pub(super) fn clutter(&self, stream: &mut Stream) -> Vector3<f64> {
-        let place = |at: Vector3<f64>| (*self.camera_from_object * Point::from(at)).coords;
         match stream.below(4) {
-            0 => place(on_edge(stream, &self.half) + stream.normal3(EDGE_JITTER)),
+            0 => self.edge(stream),
             1 => {
                 let [x, y] = [0, 1].map(|k| stream.between(-1.0, 1.0) * (self.half[k] + self.margin));
-                place(Vector3::new(x, y, -self.half.z + FLOOR_RELIEF * stream.normal()))
+                self.place(Vector3::new(x, y, -self.half.z + FLOOR_RELIEF * stream.normal()))
             }
             _ => anywhere(stream, self.placed, self.margin),
         }
+    }
+
+    /// A clutter point on an edge of the box.
+    pub(super) fn edge(&self, stream: &mut Stream) -> Vector3<f64> {
+        self.place(on_edge(stream, &self.half) + stream.normal3(EDGE_JITTER))
+    }
+
+    fn place(&self, at: Vector3<f64>) -> Vector3<f64> {
+        (*self.camera_from_object * Point::from(at)).coords
     }
 }
 

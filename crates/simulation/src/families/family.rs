@@ -58,6 +58,9 @@ pub enum Presence {
     Present,
     /// The object is absent, and the cloud is clutter.
     Absent,
+    /// The object is absent, and clutter lies on a box of other dimensions in its place (families a, b, c, f and g; the
+    /// others as [`Absent`](Self::Absent)). No place is kept clear of clutter.
+    Replaced,
 }
 
 /// The origin of a problem.
@@ -79,6 +82,7 @@ pub(super) enum Part {
     Clutter,
     Noise,
     Order,
+    Replacement,
 }
 
 impl Source {
@@ -87,6 +91,6 @@ impl Source {
     }
 
     pub(super) fn absent(&self) -> bool {
-        self.presence == Presence::Absent
+        self.presence != Presence::Present
     }
 }

@@ -131,6 +131,33 @@ fn an_absent_object_leaves_model_prior_and_size_as_they_are() {
     }
 }
 
+/// Half extents 10 to 30 % away from the object's, so that the box's edges are elsewhere; and no place is kept clear.
+///
+/// Fails if the box keeps a dimension, and if places stay clear.
+#[test]
+fn another_box_stands_in_the_place_of_a_replaced_object() {
+    let (mut inside, mut problems) = (0, 0);
+    for gone in all(Presence::Replaced) {
+        assert!(gone.truth.pairs.is_empty() && !gone.truth.pose_defined && gone.truth.params.absent == Some(true));
+        if !matches!(gone.problem.family, "b" | "f") {
+            continue;
+        }
+        let at = placed(&gone, &gone.truth.t_cam_obj);
+        let near = |seen: &[f64; 3]| at.iter().any(|at| (Vector3::from(*seen) - at).norm() < 0.15);
+        inside += usize::from(gone.problem.cloud.iter().any(near));
+        problems += 1;
+        // Few points lie within 0.1 m of two planes of the object's own box.
+        let pose = motion(&gone.truth.t_cam_obj).inverse();
+        let on_own_edge = |seen: &&[f64; 3]| {
+            let at = (pose * Point::from(**seen)).coords.abs() - Vector3::new(2.5, 1.75, 1.5);
+            at.iter().filter(|off| off.abs() < 0.1).count() >= 2 && at.max() < 0.1
+        };
+        let on_edges = gone.problem.cloud.iter().filter(on_own_edge).count();
+        assert!(on_edges * 10 < gone.problem.cloud.len(), "{on_edges} of {}", gone.problem.cloud.len());
+    }
+    assert!(inside == problems && problems > 0, "{inside} of {problems}");
+}
+
 #[test]
 fn families_are_known_by_their_names() {
     assert!(Family::ALL.into_iter().all(|family| family.name().parse() == Ok(family)));

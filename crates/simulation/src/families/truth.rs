@@ -74,6 +74,9 @@ pub struct GeneratedParameters {
     /// Whether the object is absent; not given for a present object.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absent: Option<bool>,
+    /// Whether a box of other dimensions stands in its place; given if one does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replaced: Option<bool>,
 }
 
 impl GeneratedTruth {

@@ -91,7 +91,7 @@ impl Judge<'_> {
         all: f64,
     ) -> Result<(), RejectionReason> {
         let Some((place, rms)) =
-            hinge.filter(|_| self.searched && !self.hinges_known && self.acceptance.with(AcceptanceTest::Hinge))
+            hinge.filter(|_| self.searched && !self.weighs_hinges && self.acceptance.with(AcceptanceTest::Hinge))
         else {
             return Ok(());
         };

@@ -94,19 +94,7 @@ impl Scene {
         };
         let (acceptance, searched, largest) = (&self.acceptance, self.searched, self.largest);
         let alert_limit = acceptance.alert_limit;
-        work(&Judge {
-            problem: &problem,
-            solver,
-            acceptance,
-            anchors: problem.anchors(),
-            alert_limit,
-            largest,
-            searched,
-            rig: None,
-            support: None,
-            hinges_known: false,
-            near: None,
-        })
+        work(&Judge { alert_limit, largest, searched, ..Judge::of_labelled(&problem, solver, acceptance, None) })
     }
 
     fn pairs(&self) -> Vec<Correspondence> {
@@ -237,6 +225,28 @@ fn a_pose_passes_whose_two_standard_deviations_are_within_the_limits() {
         other => panic!("{other:?}"),
     }
     assert!(matches!(of(0.0, f64::NAN), Some(RejectionReason::Imprecise { .. })));
+}
+
+/// Of a large putative set with k pairs per place the variance counts k times, and the error must be within the limit with
+/// 2/√k standard deviations, between one and two: half of the limit for 1 ≤ k ≤ 4.
+///
+/// Fails with two standard deviations for all k, and without the variance.
+#[test]
+fn the_common_errors_of_a_large_set_count_once_in_its_precision() {
+    let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
+    let passes = |pairs_per_place: f64, rms: f64| {
+        let support = Support { ln_nfa: -50.0, ln_odds: vec![0.0], ln_odds_elsewhere: -50.0, pairs_per_place };
+        let solver = Fixed::at(Transform::identity(), 0.0, rms / 3.0_f64.sqrt());
+        scene.judge(&solver, |judge| {
+            let judge = Judge { support: Some(&support), anchors: judge.anchors.clone(), ..*judge };
+            let fallen = judge.precise_and_near(&mut scene.hypothesis(solver.pose, 0.0));
+            refused(fallen).is_none()
+        })
+    };
+    for (pairs_per_place, largest) in [(1.0, 0.05), (2.25, 0.05), (4.0, 0.05), (16.0, 0.025)] {
+        let around = [0.99, 1.01].map(|of| passes(pairs_per_place, of * largest));
+        assert_eq!(around, [true, false], "{pairs_per_place} pairs per place");
+    }
 }
 
 /// The prior's 5 cm and the fix's 12 cm combine to 13 cm; √χ²₆ at 99.9 % is 4.739.

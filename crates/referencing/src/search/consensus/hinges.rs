@@ -4,18 +4,14 @@ use nalgebra::Vector3;
 
 use super::{
     clutter_density::ClutterDensity,
-    fit::fit,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms, ln_volume},
+    likelihood::{Mode, Terms},
     prior_terms::{PriorTerms, spread},
 };
 use crate::{
     problem::{Correspondence, Problem},
     search::limits::NEEDED,
 };
-
-/// Number of Gauss–Newton rounds of a pose without one of its pairs.
-const ROUNDS: usize = 4;
 
 /// Maximum number of model points that stand for the object in the errors of a pose.
 const MAX_ANCHORS: usize = 64;
@@ -91,9 +87,7 @@ pub(in crate::search) fn hinges(
         .map(|anchor| anchor.at.coords)
         .collect();
     let of = |members: &[usize]| {
-        let (motion, factor) = fit(terms, prior_terms, members, &mode.motion, ROUNDS)?;
-        let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
-        let ln_evidence = gains + prior_terms.ln_density(&motion) + ln_volume(&factor);
+        let (ln_evidence, motion, factor) = mode.refitted(terms, prior_terms, members)?;
         Some((ln_evidence + terms.ln_fraction[members.len()], motion, factor.inverse()))
     };
     let Some((all, pose, _)) = of(&mode.members) else { return Vec::new() };

@@ -16,6 +16,9 @@ use crate::{
 /// Gate of a pair about its place under the pose (χ²₃).
 const FAR: f64 = 25.0;
 
+/// Number of Gauss–Newton rounds of a pose of some members of a mode.
+const REFIT_ROUNDS: usize = 4;
+
 /// Rounding error of a coordinate relative to the greatest.
 const ROUNDING: f64 = 1e-9;
 
@@ -255,9 +258,20 @@ impl Mode {
         if members.len() < 3 && prior_terms.known.is_none() {
             return 0.0;
         }
-        let Some((motion, factor)) = fit(terms, prior_terms, members, &self.motion, 4) else { return 0.0 };
+        self.refitted(terms, prior_terms, members).map_or(0.0, |(ln_evidence, ..)| ln_evidence)
+    }
+
+    /// The evidence (ln) of some members alone, without the probability of their number; their pose, and the Cholesky
+    /// factor of its information. `None` if they determine no pose.
+    pub(super) fn refitted(
+        &self,
+        terms: &Terms,
+        prior_terms: &PriorTerms,
+        members: &[usize],
+    ) -> Option<(f64, Motion, Cholesky<f64, U6>)> {
+        let (motion, factor) = fit(terms, prior_terms, members, &self.motion, REFIT_ROUNDS)?;
         let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
-        gains + prior_terms.ln_density(&motion) + ln_volume(&factor)
+        Some((gains + prior_terms.ln_density(&motion) + ln_volume(&factor), motion, factor))
     }
 
     /// Whether a vertex is a member.

@@ -6,6 +6,7 @@ pub(crate) mod cost;
 mod frames;
 mod grid;
 pub(crate) mod layout;
+mod probability;
 mod rates;
 mod recall;
 pub(crate) mod sawtooth;
@@ -34,6 +35,8 @@ pub(crate) fn blocks(run: &Run, summary: &RunSummary) -> Vec<Block> {
         &|| axis::boxes(run, summary),
         &|| recall::figure(run),
         &|| tolerance::precision_recall(run, summary),
+        &|| probability::roc(run, summary),
+        &|| probability::reliability(run, summary),
         &|| grid::figure(run, summary),
         &|| trajectory::figure(run),
         &|| consistency::histogram(run),

@@ -17,7 +17,7 @@ pub(super) struct Limit {
 }
 
 /// Whether the frames of a trial lack the object.
-pub(super) fn is_absent(row: &Row) -> bool {
+pub(crate) fn is_absent(row: &Row) -> bool {
     row.axes.iter().any(|axis| short(&axis.key) == "absent" && axis.value == "true")
 }
 

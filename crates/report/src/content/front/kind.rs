@@ -67,7 +67,7 @@ impl Kind {
             Self::Points | Self::Objects | Self::Navigation => &["sawtooth", "rates", "error-over-condition"],
             Self::Cost => &["search-cost"],
             Self::Tolerance(_) => &["precision-recall"],
-            Self::Acceptance(_) => &["rates", "success", "recall"],
+            Self::Acceptance(_) => &["roc", "rates", "success", "recall"],
             Self::Outliers(_) => &["success", "error-over-condition", "recall"],
             Self::Along(_) | Self::Families(_) | Self::Cases if !asked.accuracy => {
                 &["rates", "success", "error-over-condition", "recall"]

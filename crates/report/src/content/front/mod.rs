@@ -36,6 +36,7 @@ use crate::{
 };
 use kind::{Asked, Kind};
 
+pub(crate) use acceptance::is_absent;
 pub(crate) use authored::{Authored, Checked};
 
 /// The blocks of the first page; the main figure is taken from the section that has it.
