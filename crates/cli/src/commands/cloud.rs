@@ -82,9 +82,9 @@ impl Cloud {
             .collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         // A pipeline adds corners that no key point has, and replaces key points by better corners.
-        let whole = stages.cloud(&FrameData::Stereo(left.clone(), right), &rig, &[], &[Regions::NONE; 2]);
-        let corners = whole.points().iter().filter(|point| !look.cloud.contains(point)).count();
-        look.cloud = whole.points().to_vec();
+        let complete = stages.cloud(&FrameData::Stereo(left.clone(), right), &rig, &[], &[Regions::NONE; 2]);
+        let corners = complete.points().iter().filter(|point| !look.cloud.contains(point)).count();
+        look.cloud = complete.points().to_vec();
         if let Some(path) = &self.out {
             AtomicFile::begin(path, self.replacing, &self.input.files())?.finish(ply::ply(&look.cloud, &left))?;
         }

@@ -191,7 +191,8 @@ impl CoherenceProblem {
         }
         let repeated = near.iter().filter(|count| **count >= REPEATED).count();
         // A dense line or surface has twice as many pairs and more up to twice the distance.
-        let clumped = f64::from(wide) <= CLUMPED * f64::from(pairs);
+        let separate = (wide as usize) < places.len() * places.len().saturating_sub(1) / 2;
+        let clumped = separate && f64::from(wide) <= CLUMPED * f64::from(pairs);
         if repeated > 0 && 2 * repeated >= places.len() && clumped {
             let value = format!(
                 "{repeated} of {} cloud points have {REPEATED} or more others within {} m",

@@ -22,7 +22,7 @@ const MAX: usize = 9;
 const LIMITS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 2e-2, 0.1];
 const PRESETS: [f64; 3] = [1e-5, 1e-3, 2e-2];
 /// The largest rate of false answers (%) in the figure.
-const MOST: f64 = 10.0;
+const MAX_FALSE: f64 = 10.0;
 /// The ends of the classes of the probability.
 const ENDS: [f64; 6] = [0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5];
 /// The ends of both axes of the reliability; smaller values are drawn at the lower end.
@@ -110,14 +110,14 @@ pub(super) fn roc(run: &Run, summary: &RunSummary) -> Option<Figure> {
             let mut points = vec![at(LIMITS[0])];
             for [x, y] in limits.into_iter().filter(|limit| *limit > LIMITS[0]).map(at) {
                 let [_, before] = points[points.len() - 1];
-                if x > MOST {
-                    points.push([MOST, before]);
+                if x > MAX_FALSE {
+                    points.push([MAX_FALSE, before]);
                     break;
                 }
                 points.extend([[x, before], [x, y]]);
             }
             let series = names.iter().position(|name| *name == group.method).unwrap_or(0);
-            let marks = PRESETS.map(at).into_iter().filter(|at| at[0] <= MOST).collect();
+            let marks = PRESETS.map(at).into_iter().filter(|at| at[0] <= MAX_FALSE).collect();
             layers.push(Layer::Line { series, points });
             layers.push(Layer::Marks { series, points: marks, radius: 2.2 });
             for limit in LIMITS {
@@ -133,7 +133,7 @@ pub(super) fn roc(run: &Run, summary: &RunSummary) -> Option<Figure> {
         }
         panels.push(Panel {
             title: condition.clone(),
-            x: Axis::linear("answers without the object (%)").within([-0.2, MOST]),
+            x: Axis::linear("answers without the object (%)").within([-0.2, MAX_FALSE]),
             y: Axis::linear("found (%)"),
             layers,
             equal: false,
