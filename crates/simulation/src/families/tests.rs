@@ -155,7 +155,8 @@ fn another_box_stands_in_the_place_of_a_replaced_object() {
         let on_edges = gone.problem.cloud.iter().filter(on_own_edge).count();
         assert!(on_edges * 10 < gone.problem.cloud.len(), "{on_edges} of {}", gone.problem.cloud.len());
     }
-    assert!(inside == problems && problems > 0, "{inside} of {problems}");
+    // Of 500 points about 1.4 are near a place, none of an absent object's: a quarter of those clouds has none by chance.
+    assert!(2 * inside > problems && problems > 0, "{inside} of {problems}");
 }
 
 #[test]
