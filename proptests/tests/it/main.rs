@@ -12,6 +12,7 @@ mod clutter_patterns;
 mod complete;
 mod consensus;
 mod dead_reckoning;
+mod equal_poses;
 mod equations;
 mod frames;
 mod gates;

@@ -87,7 +87,7 @@ impl Judge<'_> {
     /// Alignment (Huttenlocher and Ullman, *Recognizing solid objects by alignment with an image*, 1990): a wide
     /// triangle of the measured points is placed on every coherent triangle of the model, and each other point must
     /// then lie at a model point of its own. The points are taken at the places of their model points, without noise,
-    /// so that model points side by side are told apart.
+    /// so that model points side by side are distinguished.
     fn symmetric_sets(&self, pairs: &[Correspondence], admitted: &Admitted) -> BTreeSet<Vec<Correspondence>> {
         let mut found = BTreeSet::new();
         let mut cloud = self.problem.cloud.to_vec();

@@ -22,7 +22,7 @@ use super::{
         proof::{Proved, prove},
         repeated_pattern::Pattern,
         resembling,
-        seeds::{Seeds, Swept, guided::LARGE},
+        seeds::{MARGIN, Seeds, Swept, guided::LARGE},
         structured_clutter::{Occupied, StructuredClutter},
         support::IndependentPairs,
         turned::turned,
@@ -164,8 +164,6 @@ const FLOOR: f64 = 3.0;
 /// Minimum evidence (nats) of a pose that may be accepted, a probability of absence of 2.2 %; only then are
 /// alternatives searched for.
 const STRONG: f64 = 3.8;
-/// Evidence (nats) below the best at which a pose elsewhere is no alternative; the margin of the search.
-const MARGIN: f64 = 10.0;
 /// Maximum number of poses whose evidence is weighed with the local density of clutter.
 const MAX_COMPARED: usize = 64;
 /// Maximum number of pairs of a large putative set that are examined for wrong matches, for the time it takes: O(k²).

@@ -18,12 +18,13 @@ use crate::{
 
 /// Maximum number of methods and of conditions.
 const MAX: usize = 9;
-/// The limits of the tables; the first three marked ones are the presets strict, balanced and permissive.
+/// The limits of `p_wrong` in the table of found objects.
 const LIMITS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 2e-2, 0.1];
+/// The presets strict, balanced and permissive, which the figure marks.
 const PRESETS: [f64; 3] = [1e-5, 1e-3, 2e-2];
 /// The largest rate of false answers (%) in the figure.
 const MAX_FALSE: f64 = 10.0;
-/// The ends of the classes of the probability.
+/// The ends of the classes of `p_wrong`.
 const ENDS: [f64; 6] = [0.0, 1e-4, 1e-3, 1e-2, 0.1, 0.5];
 /// The ends of both axes of the reliability; smaller values are drawn at the lower end.
 const LOWEST: f64 = 1e-5;

@@ -25,7 +25,7 @@ use queue::Pair;
 use queue::{Queue, order};
 
 /// Evidence (nats) below the best at which a pose is not searched for.
-const MARGIN: f64 = 10.0;
+pub(in crate::search) const MARGIN: f64 = 10.0;
 /// Gate (standard deviations of a pair) about the pose of three noisy points.
 const LOOSE: f64 = 3.5;
 /// Number of modes that a new triple is compared with before it is followed.
