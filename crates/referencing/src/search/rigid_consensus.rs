@@ -1,5 +1,8 @@
 //! Rigid consensus: a maximum-a-posteriori search that compares each pose with its alternatives and with absence.
 
+mod beside;
+mod context;
+
 use std::collections::BTreeSet;
 
 use rand::Rng;
@@ -10,20 +13,17 @@ use super::{
     consensus::{
         clutter_density::ClutterDensity,
         edge_nfa::ln_nfa,
-        edge_seeds::{edge_modes, lines_of},
         edge_terms::EdgeTerms,
         graph::ConsistencyGraph,
-        hinges::hinges,
+        hinges::{Hinge, hinges},
         joined::Joined,
         likelihood::{Mode, Terms},
-        local_maxima::Climb,
         mirror::mirror_image,
         prior_terms::PriorTerms,
         proof::{Proved, prove},
         repeated_pattern::Pattern,
         resembling,
-        seeds::{MARGIN, Seeds, Swept, guided::LARGE},
-        structured_clutter::{Occupied, StructuredClutter},
+        seeds::{Swept, guided::LARGE},
         support::IndependentPairs,
         turned::turned,
     },
@@ -31,11 +31,13 @@ use super::{
     identification::{Identification, Rejected, Search},
     limits::{NEEDED, bounded},
     orientation::Sense,
-    posterior::{COPY, Explanation, Posterior},
+    posterior::Posterior,
 };
 use crate::{
     a_contrario::coordinates::shuffled, ablation::SearchMechanism, problem::Problem, solve::likelihood::mixed::ENOUGH,
 };
+use beside::Beside;
+use context::Context;
 
 /// Maximum-a-posteriori pose search with Bayesian model comparison (MacKay 2003, ch. 27 and 28).
 ///
@@ -168,21 +170,8 @@ const STRONG: f64 = 3.8;
 const MAX_COMPARED: usize = 64;
 /// Maximum number of pairs of a large putative set that are examined for wrong matches, for the time it takes: O(k²).
 const MAX_HINGES: usize = 40;
-/// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a [`COPY`].
-const BESIDE: f64 = 14.0;
-/// Number of points below the best pose at which a pose is only part of a copy.
-///
-/// Parts of an object whose pattern continues are visible beside it anyway and are not searched for.
-const LEAD: usize = 4;
-/// Minimum work (words read) of the search for parts, a fraction of a millisecond.
-///
-/// A tenth of it is the minimum for structured clutter. Both apply even if the complete object was found at once.
-const MIN_EFFORT: u64 = 50_000;
 /// Rounding error (nats) of sums in different order.
 const ROUNDING: f64 = 1e-9;
-/// Pair tests of the graph that take as long as one word read.
-const PAIRS_A_WORD: u64 = 16;
-
 impl Search for RigidConsensus {
     fn takes_edges(&self) -> bool {
         true
@@ -206,197 +195,65 @@ impl Search for RigidConsensus {
         let Some(prior_terms) = PriorTerms::of(problem) else { return Err(nothing) };
         let graph = ConsistencyGraph::of(problem, &prior_terms);
         let terms = Terms::of(problem, &prior_terms, &graph);
-        let parts = (&terms, &prior_terms, &graph);
-        let none = BTreeSet::new();
-        let seeds = Seeds::new(problem.model, parts, &none, (NEEDED, -FLOOR), self.budget);
-        let with = |mechanism| !self.without.contains(&mechanism);
         // A large putative set is judged by its independent pairs.
-        let large = with(SearchMechanism::IndependentPairs)
+        let large = self.with(SearchMechanism::IndependentPairs)
             && problem.edges.with_candidates() == 0
             && shuffled(problem)
             && graph.starts.len() > LARGE;
-        // The proof starts from the complete enumeration.
-        let mut swept = match enough(0) {
-            true => if self.prove { seeds } else { seeds.guided(self.budget).sampled(large) }.sweep(),
-            false => Swept { complete: true, parts: true, ..Swept::default() },
+        let context = Context {
+            problem,
+            parts: (&terms, &prior_terms, &graph),
+            edges: EdgeTerms::of(problem, &prior_terms),
+            by_points: enough(0),
+            none: BTreeSet::new(),
+            without: &self.without,
         };
-        let mut pair_tests = graph.pair_tests + swept.pair_tests;
-        let strong = |swept: &Swept| swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG);
-        // A pose that cannot be accepted needs no proof.
-        let proved =
-            if self.prove && strong(&swept) { prove(problem.model, parts, &mut swept, self.budget) } else { None };
-        pair_tests += proved.as_ref().map_or(0, |proved| proved.pair_tests);
-        // Frees up to a hundred megabytes that are no longer needed.
-        swept.pairs = Vec::new();
-        let edge_terms = EdgeTerms::of(problem, &prior_terms);
-        if let Some(edges) = &edge_terms {
-            with_edges(problem, parts, edges, [&none, &none], &mut swept);
-        }
+        let (mut swept, proved) = self.enumerate(&context, large);
+        let proof_tests = proved.as_ref().map_or(0, |proved| proved.pair_tests);
         let mut clutter_density = ClutterDensity::without(&self.without);
-        let mut weighted = |swept: &mut Swept| {
-            for mode in &mut swept.modes {
-                clutter_density.weigh(problem, parts, mode);
-            }
-            let by =
-                |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
-            swept.modes.sort_by(by);
-        };
-        // The pattern is that of points.
-        let by_points = swept.modes.first().is_some_and(|best| best.members.len() >= NEEDED);
-        let pattern = if with(SearchMechanism::Pattern) && strong(&swept) && by_points && !large {
-            Pattern::of(problem.model, problem.edges.model)
-        } else {
-            None
-        };
-        if let (true, Some(pattern), Some(best)) = (with(SearchMechanism::PatternShifts), &pattern, swept.modes.first())
-        {
-            let climb = Climb::new(problem.model, parts, &none);
-            let shifts = pattern.shifts(problem, &climb, edge_terms.as_ref(), best);
-            swept.insert(shifts);
-        }
-        if let (Some(edges), Some(best)) = (&edge_terms, swept.modes.first().filter(|best| !best.edges.is_empty())) {
-            let climb = Climb::new(problem.model, parts, &none);
-            let turned = turned(&Joined { climb: &climb, edges, taken: &none }, best);
-            swept.insert(turned);
-        }
+        let pattern = if large { None } else { pattern_of(&context, &swept) };
+        add_shifted_and_turned(&context, pattern.as_ref(), &mut swept);
         swept.modes.truncate(MAX_COMPARED);
         if !large {
-            weighted(&mut swept);
+            context.weigh(&mut clutter_density, &mut swept);
         }
-        let continued =
-            pattern.as_ref().and_then(|pattern| pattern.weigh(problem, parts, edge_terms.as_ref(), &mut swept.modes));
+        let continued = pattern
+            .as_ref()
+            .and_then(|pattern| pattern.weigh(problem, context.parts, context.edges.as_ref(), &mut swept.modes));
+        let mut pair_tests = graph.pair_tests + swept.pair_tests + proof_tests;
         let ended = |best: usize, pair_tests| Rejected::Budget { budget: self.budget, best, bound, pair_tests };
         let Some(best) = swept.modes.first() else {
             return if swept.complete { Err(nothing) } else { so_far(problem, true, ended(0, pair_tests)) };
         };
-        // Two edges and more have a sense of their own.
-        let image = if with(SearchMechanism::Mirror) && best.edges.len() < 2 {
-            mirror_image(problem.model, parts, best)
-        } else {
-            None
-        };
         // Neighbouring pairs of a large set have common errors: the places that the pose explains alone decide.
-        let independent = large.then(|| IndependentPairs::of(parts));
+        let independent = large.then(|| IndependentPairs::of(context.parts));
         let refutes = |image: &Mode| independent.as_ref().is_none_or(|of| of.explains(&image.motion, &best.motion));
-        if let Some(image) = image.filter(refutes) {
+        // Two edges and more have a sense of their own.
+        if self.with(SearchMechanism::Mirror)
+            && best.edges.len() < 2
+            && let Some(image) = mirror_image(problem.model, context.parts, best).filter(refutes)
+        {
             return Err(Rejected::Mirrored { best: image.members.len(), proved: false });
         }
-        // A second copy of the object in the rest of the cloud, and a pose to compare the best with.
-        let mut beside = Swept { complete: true, parts: true, ..Swept::default() };
-        let mut copies_sought = None;
-        let mut structured_clutter = None;
-        let mut unlikely = None;
-        let mut missed: Vec<Mode> = Vec::new();
-        if best.ln_evidence >= STRONG && !large {
-            let elsewhere = |mode: &Mode| {
-                let points = mode.members.iter().filter(|&&v| best.holds(v)).count();
-                let edges = mode.edges.iter().filter(|v| best.edges.binary_search(v).is_ok()).count();
-                2 * points + 3 * edges < ENOUGH
-            };
-            let taken = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
-            let min = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
-            let left = self.budget.saturating_sub(swept.pair_tests);
-            let work = swept.pair_tests + graph.pair_tests / PAIRS_A_WORD;
-            let full = work.max(MIN_EFFORT);
-            let by_points = enough(0);
-            let copies = with(SearchMechanism::SecondCopies);
-            beside = if !(by_points && copies) {
-                Swept { complete: true, parts: true, ..Swept::default() }
-            } else if pattern.is_some() {
-                Seeds::new(problem.model, parts, &taken, (min, STRONG), left).sweep()
-            } else {
-                // Parts of a copy: pairs are examined for twice, and followed for half, of the time of the complete
-                // search.
-                let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                let seeds = Seeds::new(problem.model, parts, &taken, (NEEDED, floor), left);
-                seeds.with_parts(min, left.min(2 * full), left.min(full / 2)).guided(self.budget).sweep()
-            };
-            if let Some(edges) = edge_terms.as_ref().filter(|_| copies) {
-                let lines = lines_of(best, edges);
-                let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
-                with_edges(problem, parts, edges, [&taken, &lines], &mut beside);
-                // A structure of the object's kind beside the object is no second object.
-                let climb = Climb::new(problem.model, parts, &none);
-                let joined = Joined { climb: &climb, edges, taken: &none };
-                let compared = |mode: &&mut Mode| with(SearchMechanism::Resembling) && mode.ln_evidence >= floor;
-                for mode in beside.modes.iter_mut().filter(compared) {
-                    mode.ln_evidence -= resembling::ln_evidence(&joined, mode).unwrap_or(0.0).max(0.0);
-                }
-                beside.modes.retain(|mode| mode.ln_evidence >= floor);
-            }
-            // Parts of an object whose pattern continues are visible anyway.
-            copies_sought = Some(copies && beside.complete && beside.parts && pattern.is_none());
-            // Structured clutter: poses elsewhere with at least the evidence of absence, in an eighth of that time.
-            let effort = left.min((work / 8).max(MIN_EFFORT / 10));
-            let structured = with(SearchMechanism::StructuredClutter);
-            let mut others = match by_points && best.members.len() >= NEEDED {
-                true => Seeds::new(problem.model, parts, &none, (NEEDED, 0.0), effort).contradicting(best).sweep(),
-                false => Swept::default(),
-            };
-            pair_tests += others.pair_tests;
-            weighted(&mut others);
-            if best.members.len() >= NEEDED {
-                let occupied = Occupied::of(problem, best, pattern.as_ref().and_then(Pattern::distinctive));
-                let mistaken = with(SearchMechanism::Mislabelled)
-                    .then(|| occupied.mistaken(problem, (&terms, &graph), &others.modes))
-                    .flatten();
-                others.modes.retain(elsewhere);
-                // A shift of the object within its pattern is a hypothesis of its own.
-                let is_shift = |mode: &Mode| pattern.as_ref().is_some_and(|of| of.is_shift(&best.motion, &mode.motion));
-                // Poses that the pruned search missed, although they explain as much as the best.
-                let known = |mode: &Mode| swept.modes.iter().any(|known| known.members == mode.members);
-                let comparable = |mode: &&Mode| mode.ln_evidence >= best.ln_evidence - MARGIN;
-                let comparable = others.modes.iter().filter(comparable);
-                missed = comparable.filter(|mode| !known(mode)).cloned().collect();
-                let clutter_patterns = others
-                    .modes
-                    .iter()
-                    .filter(|other| structured && !is_shift(other))
-                    .map(|other| occupied.structured_clutter(problem, parts, other));
-                let weight = |of: &StructuredClutter| of.ln_evidence + of.ln_alone;
-                structured_clutter = clutter_patterns.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b)));
-            }
-            weighted(&mut beside);
-            pair_tests += beside.pair_tests;
-            unlikely = others.modes.into_iter().next();
-            if unlikely.is_none()
-                && best.members.len() >= NEEDED
-                && swept.modes.iter().chain(&beside.modes).all(|mode| !elsewhere(mode))
-            {
-                unlikely = Seeds::new(problem.model, parts, &none, (NEEDED, f64::NEG_INFINITY), 0).elsewhere(best);
-            }
-        }
-        let complete = swept.complete && beside.complete;
-        let support = independent.and_then(|of| of.support(&swept.modes));
+        let beside = match best.ln_evidence >= STRONG && !large {
+            true => Beside::of(&context, &swept, pattern.as_ref(), self.budget, &mut clutter_density),
+            false => Beside::none(),
+        };
+        pair_tests += beside.pair_tests;
+        let complete = swept.complete && beside.copies.complete;
         let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
         let evidence_gap = proved.map(gap);
         // The returned set is coherent throughout: among twenty true points some two usually differ by more than the
         // tolerance, and the worst fitting are dropped. The posterior keeps them.
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut pair_tests);
-        let identified = edge_terms.as_ref().map_or_else(Vec::new, |edges| best.edge_pairs(edges));
+        let identified = context.edge_pairs(best);
         if 2 * pairs.len() + 3 * identified.len() < ENOUGH {
             let size = pairs.len() + identified.len();
             return if complete { Err(nothing) } else { so_far(problem, true, ended(size, pair_tests)) };
         }
         pairs.sort_unstable();
-        let explanation = |mode: &Mode| Explanation {
-            pairs: mode.pairs(&graph),
-            edges: edge_terms.as_ref().map_or_else(Vec::new, |edges| mode.edge_pairs(edges)),
-            object_from_camera: mode.motion.transform().inverse(),
-            ln_evidence: mode.ln_evidence,
-            ln_clutter_density: mode.ln_clutter_density,
-        };
-        let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_HINGES);
-        let examined = few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG);
-        let density = (!large).then_some(&mut clutter_density);
-        let hinges = if examined { hinges(problem, parts, density, best) } else { Vec::new() };
-        let explain = |swept: &Swept| swept.modes.iter().map(explanation).collect::<Vec<_>>();
-        let climb = Climb::new(problem.model, parts, &none);
-        let joined = edge_terms.as_ref().filter(|_| !best.edges.is_empty());
-        let joined = joined.map(|edges| Joined { climb: &climb, edges, taken: &none });
-        let ln_nfa = joined.as_ref().and_then(|joined| ln_nfa(joined, best));
-        let acceptable = joined.as_ref().filter(|_| with(SearchMechanism::Resembling) && best.ln_evidence >= STRONG);
-        let resembling = acceptable.and_then(|joined| resembling::ln_evidence(joined, best));
+        let (ln_nfa, resembling) = of_its_kind(&context, best);
+        let explain = |modes: &[Mode]| modes.iter().map(|mode| context.explanation(mode)).collect::<Vec<_>>();
         Ok(Identification {
             undecided: (!complete).then(|| ended(pairs.len() + identified.len(), pair_tests)),
             edges: identified,
@@ -408,48 +265,93 @@ impl Search for RigidConsensus {
             consensus_bound: bound,
             pair_tests,
             posterior: Some(Posterior {
-                explanations: swept.modes.iter().chain(&missed).map(explanation).collect(),
-                beside: explain(&beside),
-                copies_sought,
+                explanations: [explain(&swept.modes), explain(&beside.missed)].concat(),
+                beside: explain(&beside.copies.modes),
+                copies_sought: beside.copies_sought,
                 pattern_alone: continued.map(|continued| continued.alone),
                 pattern_shifted: continued.map(|continued| continued.shifted),
-                structured_clutter,
-                unlikely: unlikely.as_ref().map(explanation),
+                structured_clutter: beside.structured_clutter,
+                unlikely: beside.unlikely.as_ref().map(|mode| context.explanation(mode)),
                 evidence_gap,
                 ln_nfa,
                 resembling,
-                support,
-                hinges,
+                support: independent.and_then(|of| of.support(&swept.modes)),
+                hinges: hinges_of(&context, best, (!large).then_some(&mut clutter_density)),
             }),
             pairs,
         })
     }
 }
 
-/// Adds edges to the modes of points, and the modes of edges; `taken` are the cloud points and lines not to be used.
-fn with_edges(
-    problem: &Problem<'_>,
-    (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
-    edges: &EdgeTerms<'_>,
-    [taken, lines]: [&BTreeSet<usize>; 2],
-    swept: &mut Swept,
-) {
-    let climb = Climb::new(problem.model, (terms, prior_terms, graph), taken);
-    let joined = Joined { climb: &climb, edges, taken: lines };
-    // A mode of points alone sees none of the edges.
-    swept.modes.iter_mut().for_each(|mode| {
-        mode.ln_evidence += edges.ln_fraction[0];
-        mode.ln_even = mode.ln_evidence;
-    });
-    let upgraded: Vec<Mode> = swept
-        .modes
-        .iter()
-        .take(MAX_COMPARED)
-        .filter_map(|mode| joined.near(&mode.motion, None, f64::NEG_INFINITY))
-        .collect();
-    let found = edge_modes(&joined, &upgraded, &mut swept.pair_tests);
-    swept.insert(upgraded);
-    swept.insert(found);
+impl RigidConsensus {
+    fn with(&self, mechanism: SearchMechanism) -> bool {
+        !self.without.contains(&mechanism)
+    }
+
+    /// The poses of points and edges by their evidence under uniform clutter, and the proof, if one is wanted.
+    fn enumerate(&self, context: &Context<'_>, large: bool) -> (Swept, Option<Proved>) {
+        let seeds = context.seeds(&context.none, (NEEDED, -FLOOR), self.budget);
+        let mut swept = match context.by_points {
+            // The proof starts from the complete enumeration.
+            true => if self.prove { seeds } else { seeds.guided(self.budget).sampled(large) }.sweep(),
+            false => Swept::nothing(),
+        };
+        // A pose that cannot be accepted needs no proof.
+        let proved = match self.prove && strong(&swept) {
+            true => prove(context.problem.model, context.parts, &mut swept, self.budget),
+            false => None,
+        };
+        // Frees up to a hundred megabytes that are no longer needed.
+        swept.pairs = Vec::new();
+        context.add_edges([&context.none, &context.none], &mut swept);
+        (swept, proved)
+    }
+}
+
+/// Whether the best pose may be accepted.
+fn strong(swept: &Swept) -> bool {
+    swept.modes.first().is_some_and(|best| best.ln_evidence >= STRONG)
+}
+
+/// The pattern that the model repeats, if the best pose is one of points and may be accepted.
+fn pattern_of(context: &Context<'_>, swept: &Swept) -> Option<Pattern> {
+    let of_points = swept.modes.first().is_some_and(|best| best.members.len() >= NEEDED);
+    let wanted = context.with(SearchMechanism::Pattern) && strong(swept) && of_points;
+    wanted.then(|| Pattern::of(context.problem.model, context.problem.edges.model)).flatten()
+}
+
+/// Adds the poses that the best one becomes when the object is shifted within its pattern, or turned about its edges.
+fn add_shifted_and_turned(context: &Context<'_>, pattern: Option<&Pattern>, swept: &mut Swept) {
+    let climb = context.climb();
+    if context.with(SearchMechanism::PatternShifts)
+        && let (Some(pattern), Some(best)) = (pattern, swept.modes.first())
+    {
+        let shifts = pattern.shifts(context.problem, &climb, context.edges.as_ref(), best);
+        swept.insert(shifts);
+    }
+    if let (Some(edges), Some(best)) = (&context.edges, swept.modes.first().filter(|best| !best.edges.is_empty())) {
+        let turned = turned(&Joined { climb: &climb, edges, taken: &context.none }, best);
+        swept.insert(turned);
+    }
+}
+
+/// The pairs of the best pose that may be clutter, if their number can be examined.
+fn hinges_of(context: &Context<'_>, best: &Mode, density: Option<&mut ClutterDensity>) -> Vec<Hinge> {
+    let large = density.is_none();
+    let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_HINGES);
+    match few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG) {
+        true => hinges(context.problem, context.parts, density, best),
+        false => Vec::new(),
+    }
+}
+
+/// Of a pose with edges: the ln number of false alarms, and the ln evidence of another structure of the object's kind.
+fn of_its_kind(context: &Context<'_>, best: &Mode) -> (Option<f64>, Option<f64>) {
+    let Some(edges) = context.edges.as_ref().filter(|_| !best.edges.is_empty()) else { return (None, None) };
+    let climb = context.climb();
+    let joined = Joined { climb: &climb, edges, taken: &context.none };
+    let wanted = context.with(SearchMechanism::Resembling) && best.ln_evidence >= STRONG;
+    (ln_nfa(&joined, best), wanted.then(|| resembling::ln_evidence(&joined, best)).flatten())
 }
 
 #[cfg(test)]

@@ -45,7 +45,6 @@ const COST_OF_A_MODE: u64 = 64;
 const COST_OF_A_PAIR: u64 = 4;
 
 /// The result of a search for modes.
-#[derive(Default)]
 pub(in crate::search) struct Swept {
     /// The modes, the best first.
     pub(in crate::search) modes: Vec<Mode>,
@@ -62,6 +61,11 @@ pub(in crate::search) struct Swept {
 }
 
 impl Swept {
+    /// The result where there is nothing to search.
+    pub(in crate::search) fn nothing() -> Self {
+        Self { modes: Vec::new(), complete: true, pairs: Vec::new(), looked_for: 0.0, parts: true, pair_tests: 0 }
+    }
+
     /// Adds modes found later; they replace known modes of the same members.
     pub(in crate::search) fn insert(&mut self, modes: Vec<Mode>) {
         for mode in modes {
