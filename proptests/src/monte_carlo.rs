@@ -19,7 +19,7 @@ pub struct Cell {
     /// Number of draws with an answer.
     pub answered: u32,
     /// Number of draws without an answer.
-    pub refused: u32,
+    pub rejected: u32,
     /// Number of draws with an equally probable alternative, if alternatives are examined; they have no answer either.
     pub ambiguous: u32,
     /// Number of answers in another minimum than the truth's, with NEES above 100, if alternatives are examined. They
@@ -117,18 +117,18 @@ pub fn cell_of(solver: &dyn Solver, settings: &Layout, placed: &[Placed], asked:
     for placed in placed {
         let bound = bound(placed, settings);
         cell.layouts += 1;
-        cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_sigma());
+        cell.attitude_sigma = cell.attitude_sigma.max(bound.attitude_rms());
         cell.bent = cell.bent.max(bent(placed, settings.sigma_px, &bound));
-        let curved = foreseen(placed, settings).map_or(f64::NAN, |covariance| covariance.position_sigma());
+        let curved = foreseen(placed, settings).map_or(f64::NAN, |covariance| covariance.position_rms());
         let (tre_limit, position_limit) =
-            (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_sigma());
+            (transfer_bound(&bound, &placed.object_from_camera, &placed.model), bound.position_rms());
         let mut mean = Vector3::zeros();
         let mut here = 0u32;
         for draw in 0..asked.draws {
             let Some(points) = observations(placed, draw, settings.model_sigma) else { continue };
             let data = Observations { points, edges: Vec::new(), rig: Some(&placed.rig) };
             let Ok(pose) = solver.solve(&data) else {
-                cell.refused += 1;
+                cell.rejected += 1;
                 continue;
             };
             if asked.alternatives.is_some_and(|max| !solver.alternatives(&data, &pose, max).is_empty()) {

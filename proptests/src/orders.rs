@@ -452,8 +452,8 @@ pub fn happens(navigator: &mut Navigator<'_>, site: &Site, steps: usize, happeni
 
 /// Whether a settled pose is better known than this pose of the same object.
 pub fn is_better(well: bool, known: Option<&Navigated>) -> bool {
-    let sigma = settled(well).position_sigma();
-    known.is_none_or(|known| sigma < known.object_pose.covariance.position_sigma())
+    let sigma = settled(well).position_rms();
+    known.is_none_or(|known| sigma < known.object_pose.covariance.position_rms())
 }
 
 fn settled(well: bool) -> Covariance6<Object, Camera> {

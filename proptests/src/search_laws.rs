@@ -22,7 +22,7 @@ pub type Law = fn(&[Tried]);
 pub const LAWS: [(&str, Law); 5] = [
     ("every returned set is coherent", every_returned_set_is_coherent),
     ("no point serves twice", no_point_serves_twice),
-    ("a mirror image is rejected", a_mirror_image_is_refused),
+    ("a mirror image is rejected", a_mirror_image_is_rejected),
     ("the order of the points changes nothing", the_order_of_the_points_changes_nothing),
     ("points outside every gate change nothing", points_outside_every_gate_change_nothing),
 ];
@@ -45,7 +45,7 @@ pub fn all_distinct(planted: &Planted) -> bool {
 fn every_set_is_admissible(searches: &[Tried], planted: &Planted) -> TestCaseResult {
     for search in searches {
         for set in sets(&search.answer(planted)) {
-            let objection = objection(&planted.problem(), search.refuses_mirrors(), set);
+            let objection = objection(&planted.problem(), search.rejects_mirrors(), set);
             prop_assert!(objection.is_none(), "{}: {}", search.name, objection.unwrap_or_default());
         }
     }
@@ -130,7 +130,7 @@ pub fn reflection(
 ///
 /// # Panics
 /// If a search breaks the law, with the smallest counterexample found.
-pub fn a_mirror_image_is_refused(searches: &[Tried]) {
+pub fn a_mirror_image_is_rejected(searches: &[Tried]) {
     let points = prop::collection::vec(vector(1.0), 4..=6);
     law(128, (points, direction(), pose(5.0), 1e-6..1e-3), |(points, normal, pose, delta)| {
         let pose: Transform<Camera, Object> = pose;
@@ -144,8 +144,8 @@ pub fn a_mirror_image_is_refused(searches: &[Tried]) {
         for search in searches {
             let answer = search.answer(&planted);
             if !search.claims.exact {
-                prop_assert!(answer.is_err() || !search.refuses_mirrors(), "{}: {:?}", &search.name, &answer);
-            } else if search.refuses_mirrors() {
+                prop_assert!(answer.is_err() || !search.rejects_mirrors(), "{}: {:?}", &search.name, &answer);
+            } else if search.rejects_mirrors() {
                 prop_assert_eq!(answer, Err(Rejected::Mirrored { best: all.len(), proved: true }), "{}", &search.name);
             } else {
                 let size = answer.as_ref().map_or(0, |found| found.pairs.len());

@@ -83,7 +83,7 @@ pub fn named(name: &str, budget: i64) -> Vec<Tried> {
 
 impl Tried {
     /// Whether it rejects mirror images; a search without the switch must do so.
-    pub fn refuses_mirrors(&self) -> bool {
+    pub fn rejects_mirrors(&self) -> bool {
         self.variant.switch("orientation").unwrap_or(true)
     }
 

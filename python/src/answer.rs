@@ -14,6 +14,7 @@ use seafix::{
 
 use crate::{
     array::{array4, array6, table},
+    integrity::Integrity,
     invalid::invalid,
 };
 
@@ -119,10 +120,26 @@ impl Answer {
         self.fix().map(|fix| array6(py, &fix.covariance.matrix))
     }
 
-    /// float or None: the standard deviation of the position of a fix over the three axes together (m).
+    /// float or None: the standard deviation of the position of a fix along one axis (m), the RMS over the three axes.
+    ///
+    /// It is the `position_sigma` of a ``PosePrior``.
     #[getter]
     fn position_sigma(&self) -> Option<f64> {
         self.fix().map(|fix| fix.position_sigma())
+    }
+
+    /// float or None: the standard deviation of the attitude of a fix about one axis (rad), the RMS over the three axes.
+    ///
+    /// It is the `attitude_sigma` of a ``PosePrior``.
+    #[getter]
+    fn attitude_sigma(&self) -> Option<f64> {
+        self.fix().map(|fix| fix.attitude_sigma())
+    }
+
+    /// Integrity or None: the residual test, the solution separation and the protection levels of a fix.
+    #[getter]
+    fn integrity(&self) -> Option<Integrity> {
+        self.fix().map(|fix| Integrity(fix.integrity))
     }
 
     /// ndarray of int, shape (k, 2), or None: the identified pairs (model, cloud) of a fix.

@@ -9,6 +9,7 @@ mod choice;
 mod edges;
 mod failure;
 mod image;
+mod integrity;
 mod interpreter;
 mod invalid;
 mod laws;
@@ -33,6 +34,7 @@ mod _seafix {
     #[pymodule_export]
     use crate::{
         answer::{Answer, Pose},
+        integrity::Integrity,
         invalid::DegenerateError,
         laws::{search_laws, solver_laws},
         listing::{describe, detectors, searches, solvers},

@@ -93,10 +93,8 @@ impl PosePrior {
     }
 
     fn __repr__(&self) -> String {
-        // The RMS over the three axes: the number that an isotropic prior was given.
-        let of_axis = |sigma: f64| sigma / 3f64.sqrt();
-        let position = of_axis(self.covariance.position_sigma());
-        let attitude = of_axis(self.covariance.attitude_sigma()).to_degrees();
+        let position = self.covariance.position_sigma();
+        let attitude = self.covariance.attitude_sigma().to_degrees();
         format!("PosePrior({}, each axis ± {position:.3} m and ± {attitude:.2}°)", self.pose)
     }
 }

@@ -44,20 +44,20 @@ impl<'a> AtomicFile<'a> {
     /// An existing file stays unless it is to be replaced. One of the `inputs`, or a file in a folder of them, is never
     /// replaced.
     pub(crate) fn begin(path: &'a Path, replacing: Replacing, inputs: &[&Path]) -> Result<Self, Failure> {
-        let refuse = |fault: Fault| Err(Failure::new(OUTPUT, fault));
+        let write_error = |fault: Fault| Err(Failure::new(OUTPUT, fault));
         if let Ok(existing) = fs::symlink_metadata(path) {
             if !existing.is_file() {
-                return refuse(
+                return write_error(
                     Fault::new("the output is not a file", path).remedy("name a new file, or one to replace"),
                 );
             }
             if let Some(input) = inputs.iter().find(|input| is_inside(path, input)) {
                 let fault = Fault::new("an input as output", path).value(input.display());
-                return refuse(fault.remedy("name another file with --out"));
+                return write_error(fault.remedy("name another file with --out"));
             }
             if !replacing.overwrite {
                 let fault = Fault::new("the output file exists", path);
-                return refuse(fault.remedy("name a new file with --out, or replace this one with --overwrite"));
+                return write_error(fault.remedy("name a new file with --out, or replace this one with --overwrite"));
             }
         }
         let (partial, file) = PartialFile::create(path).map_err(|error| failed(path, &error))?;

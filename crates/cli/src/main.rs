@@ -21,8 +21,8 @@ mod terminal;
 mod usage;
 
 fn main() -> ExitCode {
-    signals::outgrow_files();
-    let arguments = commands::Arguments::try_parse().unwrap_or_else(|error| usage::refuse(&error));
+    signals::ignore_size_limit_signal();
+    let arguments = commands::Arguments::try_parse().unwrap_or_else(|error| usage::usage_error(&error));
     match arguments.command.execute() {
         Ok(code) => ExitCode::from(code),
         Err(failure) => {

@@ -36,7 +36,7 @@ pub(crate) fn listen() {
 }
 
 /// Turns the limit of a file's size (`ulimit -f`) into a write error instead of the end of the program.
-pub(crate) fn outgrow_files() {
+pub(crate) fn ignore_size_limit_signal() {
     #[cfg(unix)]
     {
         // With an empty handler the system call returns EFBIG.
@@ -52,7 +52,7 @@ pub(crate) fn end_at_once() {
 }
 
 /// Whether a signal was received.
-pub(crate) fn turned_out() -> bool {
+pub(crate) fn interrupted() -> bool {
     ASKED.get().is_some_and(|asked| asked.signal.load(Ordering::Relaxed) != 0)
 }
 

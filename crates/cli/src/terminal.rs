@@ -101,6 +101,6 @@ impl Observer for Progress {
     }
 
     fn stops(&self) -> bool {
-        signals::turned_out()
+        signals::interrupted()
     }
 }

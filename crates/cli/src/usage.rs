@@ -3,7 +3,7 @@
 use clap::{Error, error::ErrorKind};
 
 /// Prints what is wrong with a command line and ends the program with 2; help and version are printed as they are.
-pub(crate) fn refuse(error: &Error) -> ! {
+pub(crate) fn usage_error(error: &Error) -> ! {
     match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             error.exit()

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_without_a_name_is_refused() {
+    fn a_table_without_a_name_is_rejected() {
         assert!(toml::from_str::<Choice>("min-sine = 0.2").unwrap_err().to_string().contains("needs a `name`"));
     }
 }

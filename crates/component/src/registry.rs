@@ -182,13 +182,13 @@ pub fn settings<C: Component>(mut settings: toml::Table) -> Result<C, Vec<Settin
     // can be checked.
     for key in settings.keys().cloned().collect::<Vec<_>>() {
         while let Some(value) = settings.get(&key) {
-            let refused = |value: &toml::Value| {
+            let rejected = |value: &toml::Value| {
                 let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
                 alone.try_into::<C>().err().map(|error| error.message().to_owned())
             };
-            let Some(message) = refused(value) else { break };
+            let Some(message) = rejected(value) else { break };
             let mut path = vec![key.clone()];
-            culprit(value, &message, &refused, &mut path);
+            culprit(value, &message, &rejected, &mut path);
             take_out(&mut settings, &path);
             errors.push(SettingsError { key: Some(path.join(".")), message });
         }
@@ -217,16 +217,16 @@ pub fn settings<C: Component>(mut settings: toml::Table) -> Result<C, Vec<Settin
 
 /// Appends to `path` the steps that lead to the error `message` inside `value`.
 ///
-/// The function `refused` gives the error message for a replacement value.
+/// The function `rejected` gives the error message for a replacement value.
 fn culprit(
     value: &toml::Value,
     message: &str,
-    refused: &dyn Fn(&toml::Value) -> Option<String>,
+    rejected: &dyn Fn(&toml::Value) -> Option<String>,
     path: &mut Vec<String>,
 ) {
     let is_it = |rest: &toml::Value| {
         // The removed part is at fault if the error disappears or another one appears.
-        refused(rest).is_none_or(|other| other != message && !other.starts_with("missing field"))
+        rejected(rest).is_none_or(|other| other != message && !other.starts_with("missing field"))
     };
     let steps: Vec<String> = match value {
         toml::Value::Table(table) => table.keys().cloned().collect(),
@@ -245,7 +245,7 @@ fn culprit(
                 if let Some(place) = inside(&mut full, &step) {
                     *place = inner.clone();
                 }
-                refused(&full)
+                rejected(&full)
             };
             let mut full = value.clone();
             if let Some(inner) = inside(&mut full, &step) {

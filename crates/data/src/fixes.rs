@@ -26,8 +26,8 @@ pub struct LoggedFix {
 }
 
 impl LoggedFix {
-    /// The standard deviation of the camera's position (m), √tr Σ of its position.
-    pub fn position_sigma(&self) -> f64 {
+    /// The expected RMS length of the camera's position error (m), √tr Σ of its position.
+    pub fn position_rms(&self) -> f64 {
         (3..6).map(|axis| self.covariance[axis][axis]).sum::<f64>().sqrt()
     }
 }
@@ -128,7 +128,7 @@ impl LoggedFixes {
         let mut best: Vec<&LoggedFix> = Vec::new();
         for fix in &self.fixes {
             match best.last_mut().filter(|last| last.stamp_ns == fix.stamp_ns) {
-                Some(last) if fix.position_sigma() < last.position_sigma() => *last = fix,
+                Some(last) if fix.position_rms() < last.position_rms() => *last = fix,
                 Some(_) => {}
                 None => best.push(fix),
             }
@@ -197,7 +197,7 @@ mod tests {
         let fixes = LoggedFixes { trial: "t,1".to_owned(), fixes };
         assert_eq!(fixes.object_tum(), "0.000000005 2 0 0 0 0 0 1\n0.000000009 3 0 0 0 0 0 1\n");
         assert_eq!(fixes.world_tum(), None);
-        assert!((fixes.fixes[1].position_sigma() - 0.1).abs() < 1e-15);
+        assert!((fixes.fixes[1].position_rms() - 0.1).abs() < 1e-15);
         let csv = fixes.csv();
         let line = csv.lines().next().expect("three lines");
         assert!(line.starts_with("\"t,1\",0,5,a,1,0,0,0,0,0,1,0,0,"), "{line}");

@@ -107,7 +107,7 @@ impl Experiment {
     }
 
     /// The dotted paths of all invalid settings, with messages `FAULT; REMEDY`.
-    pub(crate) fn refused(&self) -> Vec<(String, String)> {
+    pub(crate) fn rejected(&self) -> Vec<(String, String)> {
         let itself = self.invalid_itself().into_iter().map(|(path, what, remedy)| (path, format!("{what}; {remedy}")));
         let axes = sweep::check(&self.vary, |path, _, what| Fault::new(what, Path::new(&path.join("."))));
         let axes = axes.into_iter().map(|fault| {

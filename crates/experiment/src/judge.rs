@@ -72,7 +72,7 @@ impl<'a> Evaluator<'a> {
                 let true_pose = known.world_from_object.inverse() * truth.world_from_camera;
                 let model: Vec<Point<Object>> = known.target.points.iter().map(|point| point.at).collect();
                 row.evaluation.tre_crlb = Some(transfer_bound(&bound, &true_pose, &model));
-                row.evaluation.position_crlb = Some(bound.position_sigma());
+                row.evaluation.position_crlb = Some(bound.position_rms());
             }
             if let Outcome::Fix(fix) = &attempt.answer.outcome {
                 evaluate(&mut row.evaluation, fix, known, frame_result, truth, rig);

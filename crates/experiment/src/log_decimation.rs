@@ -48,7 +48,7 @@ mod tests {
     use seafix_log::{Evaluation, TargetRecord};
 
     fn frame(number: u64, wrong: bool) -> FrameRecord {
-        let mut target = TargetRecord::refused("object", "search", "solver", "");
+        let mut target = TargetRecord::rejected("object", "search", "solver", "");
         target.outcome = Outcome::Fix;
         target.evaluation = Evaluation {
             wrong: Some(wrong),

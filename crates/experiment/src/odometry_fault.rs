@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_make_no_fault_are_refused() {
+    fn numbers_that_make_no_fault_are_rejected() {
         let fault = OdometryFault { kind: FaultKind::Intermittent, from: 0.0, to: 1.0, amount: 1.5 };
         assert_eq!(fault.check(0).unwrap_err(), "faults[0].amount = 1.5; give a number from 0 to 1");
         assert!(OdometryFault { from: f64::NAN, ..fault }.check(3).unwrap_err().starts_with("faults[3].from = NaN"));

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leads_nowhere_is_refused() {
+    fn what_leads_nowhere_is_rejected() {
         for wrong in [
             "from = 1\nto = 1\ncount = 2",
             "from = 0\nto = 1",

@@ -133,7 +133,7 @@ pub(crate) fn complete(
 /// The result for one target.
 fn target(attempt: &TargetAttempt, target: &Target, search: &str, solver: &str) -> TargetRecord {
     let answer = &attempt.answer;
-    let mut record = TargetRecord::refused(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
+    let mut record = TargetRecord::rejected(&target.name, search, solver, answer.outcome.reason().unwrap_or_default());
     record.candidates = attempt.candidates.lists.iter().map(|list| list.iter().map(|&j| j as u32).collect()).collect();
     let seafix::TargetTimes { candidates_ms, search_ms, solve_ms, total_ms } = attempt.times;
     record.times = TargetTimes { candidates_ms, search_ms, solve_ms, total_ms };

@@ -40,8 +40,10 @@ fn refusals(given: &toml::Table) -> Vec<SettingsError> {
     table.extend(given.iter().filter(|(key, _)| *key != "base").map(|(key, value)| (key.clone(), value.clone())));
     match table.try_into::<Experiment>() {
         Err(error) => vec![SettingsError { key: None, message: error.message().to_owned() }],
-        Ok(experiment) => {
-            experiment.refused().into_iter().map(|(path, message)| SettingsError { key: Some(path), message }).collect()
-        }
+        Ok(experiment) => experiment
+            .rejected()
+            .into_iter()
+            .map(|(path, message)| SettingsError { key: Some(path), message })
+            .collect(),
     }
 }

@@ -1,6 +1,6 @@
 //! Parameter sweeps: axes, their grid, and changed settings.
 
-use std::{collections::HashSet, path::Path};
+use std::{borrow::Cow, collections::HashSet, path::Path};
 
 use seafix::PipelineSettings;
 use seafix_component::{Fault, Part, Settings};
@@ -188,6 +188,9 @@ pub(crate) fn grid(axes: &[Axis]) -> Vec<Cell> {
 
 /// Applies `settings` to `full`: each is `key=value` with a dotted key and a TOML value.
 ///
+/// A setting of the pipeline may have the prefix `pipeline.` or not, whatever `full` is, so that the remedies of
+/// rejected attempts hold for every command.
+///
 /// # Errors
 /// The invalid setting, with `example` as a valid one.
 pub fn changed<T: Serialize + DeserializeOwned>(
@@ -207,7 +210,8 @@ pub fn changed<T: Serialize + DeserializeOwned>(
             .ok()
             .and_then(|mut table| table.remove("value"))
             .unwrap_or_else(|| value.trim().into());
-        set(&mut table, key.trim(), value).map_err(|message| fault(message, setting))?;
+        let key = placed(&table, key.trim());
+        set(&mut table, &key, value).map_err(|message| fault(message, setting))?;
     }
     table.try_into().map_err(|error: toml::de::Error| {
         // The first change after which the settings are wrong.
@@ -218,6 +222,18 @@ pub fn changed<T: Serialize + DeserializeOwned>(
             vec![setting.map_or_else(|| fault.clone(), |setting| fault.clone().value(setting))]
         })
     })
+}
+
+/// The path of a setting of the pipeline: with `pipeline.` if `table` has a pipeline, else without.
+fn placed<'k>(table: &toml::Table, key: &'k str) -> Cow<'k, str> {
+    let first = |key: &'k str| key.split('.').next().unwrap_or(key);
+    match table.get("pipeline").and_then(toml::Value::as_table) {
+        Some(pipeline) if !table.contains_key(first(key)) && pipeline.contains_key(first(key)) => {
+            Cow::Owned(format!("pipeline.{key}"))
+        }
+        None => Cow::Borrowed(key.strip_prefix("pipeline.").unwrap_or(key)),
+        Some(_) => Cow::Borrowed(key),
+    }
 }
 
 /// Applies `settings` to a pipeline.

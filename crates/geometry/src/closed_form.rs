@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_point_is_refused() {
+    fn what_is_no_point_is_rejected() {
         let rig = rig();
         let seen = rig.project(&Point::new(0.3, -0.2, 2.0)).unwrap();
         let swapped = StereoPixels { left: seen.right, right: seen.left };

@@ -51,14 +51,26 @@ impl<A: Frame, B: Frame> Covariance6<A, B> {
         j * self.matrix * j.transpose()
     }
 
-    /// The standard deviation of the position over the three axes together (m): √tr Σ_ρρ.
-    pub fn position_sigma(&self) -> f64 {
+    /// The expected RMS length of the position error (m): √tr Σ_ρρ.
+    pub fn position_rms(&self) -> f64 {
         self.matrix.fixed_view::<3, 3>(3, 3).trace().sqrt()
     }
 
-    /// The standard deviation of the attitude over the three axes together (rad): √tr Σ_φφ.
-    pub fn attitude_sigma(&self) -> f64 {
+    /// The expected RMS angle of the attitude error (rad): √tr Σ_φφ.
+    pub fn attitude_rms(&self) -> f64 {
         self.matrix.fixed_view::<3, 3>(0, 0).trace().sqrt()
+    }
+
+    /// The standard deviation of the position along one axis (m): √(tr Σ_ρρ/3), the RMS over the three axes.
+    ///
+    /// It is the σ of an isotropic covariance with the same [`position_rms`](Self::position_rms).
+    pub fn position_sigma(&self) -> f64 {
+        self.position_rms() / 3f64.sqrt()
+    }
+
+    /// The standard deviation of the attitude about one axis (rad): √(tr Σ_φφ/3), the RMS over the three axes.
+    pub fn attitude_sigma(&self) -> f64 {
+        self.attitude_rms() / 3f64.sqrt()
     }
 }
 

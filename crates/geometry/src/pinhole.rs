@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_no_camera_are_refused() {
+    fn numbers_that_are_no_camera_are_rejected() {
         assert!(matches!(Pinhole::new([640, 480], [0.0, 1.0], [1.0, 1.0], &[]), Err(BadCamera::FocalLength { .. })));
         assert!(matches!(
             Pinhole::new([640, 480], [1.0, f64::NAN], [1.0, 1.0], &[]),

@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_in_one_place_are_refused() {
+    fn cameras_in_one_place_are_rejected() {
         let camera = *rig(Vector3::x()).left();
         assert!(StereoRig::new(camera, camera, Transform::identity()).is_err());
     }

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_that_is_no_motion_is_refused() {
+    fn a_matrix_that_is_no_motion_is_rejected() {
         let mut m = Matrix4::identity();
         m[(0, 0)] = -1.0;
         assert!(matches!(Transform::<Object, Camera>::from_matrix(&m), Err(NotRigid::Reflection(_))));

@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bomb_is_refused_by_its_header() {
+    fn a_bomb_is_rejected_by_its_header() {
         let mut bytes = encode_png(&GreyImage { width: 1, height: 1, pixels: vec![0] }).unwrap();
         bytes[16..20].copy_from_slice(&8_000_000_u32.to_be_bytes());
         assert!(decode(&bytes).is_err());

@@ -165,7 +165,7 @@ quantities! {
     OPTIMAL: Target Flag "optimal" "" "/referencing/result" "Whether the search proved its set the best." = |r: &TargetRecord| r.optimal;
     CONSENSUS_BOUND: Target Integer "consensus_bound" "" "/referencing/result" "An upper bound of the size of any admissible set." = |r: &TargetRecord| r.consensus_bound.map(|n| n as i64);
     NFA: Target Real "nfa" "" "/referencing/result" "The number of false alarms: the expected number of random sets that are at least as large and fit at least as well." = |r: &TargetRecord| r.nfa;
-    PAIR_TESTS: Target Integer "pair_tests" "" "/referencing/result" "The number of pair tests of the search." = |r: &TargetRecord| r.pair_tests.map(|n| n as i64);
+    PAIR_TESTS: Target Integer "pair_tests" "" "/referencing/result" "The number of pair tests of the search; of `rigid-consensus`, words read of its graph, of 64 pairs each." = |r: &TargetRecord| r.pair_tests.map(|n| n as i64);
     CANDIDATES: Target Integer "candidates" "" "/referencing/candidates" "The number of candidate pairs." = |r: &TargetRecord| Some(r.candidates.iter().map(Vec::len).sum::<usize>() as i64);
     DETECT_MS: Frame Real "detect_ms" "ms" "/metrics/timing" "The duration of filters and detection, both images." = |r: &FrameRecord| r.times.detect_ms;
     LOCATE_MS: Frame Real "locate_ms" "ms" "/metrics/timing" "The duration of the corner location, both images." = |r: &FrameRecord| r.times.locate_ms;

@@ -28,7 +28,7 @@
 //!
 //! // The fused pose is more accurate than either input.
 //! let fused = FUSIONS.build(&Choice::named("fuse")).unwrap().take(&known, &fix(1.02)).unwrap();
-//! assert!(fused.covariance.position_sigma() < known.covariance.position_sigma());
+//! assert!(fused.covariance.position_rms() < known.covariance.position_rms());
 //! ```
 
 mod chain;

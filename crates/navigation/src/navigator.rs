@@ -298,7 +298,7 @@ impl<'a> Navigator<'a> {
     pub fn settle(&mut self, pose: &Navigated, why: String) -> bool {
         let better = self.known.as_ref().is_none_or(|known| {
             let known = known.passed_to(pose.object, &self.places).object_pose;
-            pose.object_pose.covariance.position_sigma() < known.covariance.position_sigma()
+            pose.object_pose.covariance.position_rms() < known.covariance.position_rms()
         });
         if better {
             self.doubts.fill(None);

@@ -80,7 +80,7 @@ pub enum AcceptanceTest {
     /// The test that the camera sees the identified points from their visible sides.
     Visibility,
     /// The probability that the pose depends on a wrong match, or the test that it depends on no single point.
-    Hinge,
+    InfluentialPairs,
     /// The test of the scale.
     Scale,
     /// The test of consistency between the parts of the object.
@@ -101,7 +101,7 @@ impl AcceptanceTest {
         Self::Residuals,
         Self::Prior,
         Self::Visibility,
-        Self::Hinge,
+        Self::InfluentialPairs,
         Self::Scale,
         Self::Consistency,
         Self::Association,

@@ -4,12 +4,12 @@ use std::borrow::Cow;
 
 use crate::site::{edge::ModelEdge, model::ModelPoint};
 
-/// Number of points that stand for an object by themselves.
-const ENOUGH: usize = 3;
+/// Minimum number of points that stand for an object without the ends of its edges.
+const MIN_ANCHOR_POINTS: usize = 3;
 
 /// The points of an object and, if they are fewer than three, the ends of its edges too.
 pub(crate) fn anchors<'a>(points: &'a [ModelPoint], edges: &[ModelEdge]) -> Cow<'a, [ModelPoint]> {
-    if points.len() >= ENOUGH {
+    if points.len() >= MIN_ANCHOR_POINTS {
         return Cow::Borrowed(points);
     }
     let ends = edges.iter().flat_map(|edge| {

@@ -88,8 +88,8 @@ pub use joint::{
 pub use observations::{EdgeObservation, Observation, Observations};
 pub use problem::{Correspondence, Edges, Prior, PriorBound, Problem, Tolerance};
 pub use search::{
-    Explanation, Hinge, Identification, MaximumClique, Posterior, PosteriorProbabilities, Rejected, RigidConsensus,
-    SEARCHES, Samples, Search, StructuralCoherence, StructuredClutter, Support,
+    Explanation, Identification, InfluentialPairs, MaximumClique, Posterior, PosteriorProbabilities, Rejected,
+    RigidConsensus, SEARCHES, Samples, Search, StructuralCoherence, StructuredClutter, Support,
 };
 pub use site::{
     BoundingBox, Congruence, End, Interest, ModelEdge, ModelPoint, NoWorld, Site, SiteObject, Target, TargetKind,

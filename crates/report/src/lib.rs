@@ -51,6 +51,7 @@ mod published;
 mod rejections;
 mod rms;
 mod run;
+mod scale_error;
 mod summary;
 mod terminal;
 mod verify;

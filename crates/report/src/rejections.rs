@@ -16,17 +16,17 @@ use crate::{
 /// frames without an attempt, counted for each trial.
 pub(crate) fn sentence(
     run: &Run,
-    [attempted, refused, frames]: [usize; 3],
+    [attempted, rejected, frames]: [usize; 3],
     [reasons, idle]: [Vec<&BTreeMap<String, usize>>; 2],
 ) -> Option<String> {
-    let fixes = attempted - refused;
+    let fixes = attempted - rejected;
     let counted = counts(if attempted > 0 { &reasons } else { &idle });
     let (reason, count) = counted.into_iter().rev().max_by_key(|(_, count)| *count)?;
     let why = typical(run, reason, attempted > 0).map_or_else(String::new, |why| format!(": {why}"));
     Some(match (attempted, fixes) {
         (0, _) => format!("no fix in {frames} frames: {count} frames without an attempt are `{reason}`{why}"),
         (_, 0) => format!("no fix in {frames} frames: {count} of {attempted} attempts are `{reason}`{why}"),
-        _ => format!("Most common rejection: `{reason}`, {count} of {refused} rejected attempts, typically{why}"),
+        _ => format!("Most common rejection: `{reason}`, {count} of {rejected} rejected attempts, typically{why}"),
     })
 }
 

@@ -23,6 +23,7 @@ use crate::{
     navigation_quantity::{Counted, NavigationQuantity},
     place,
     points_of_interest::{self, PoiQuantity},
+    scale_error::ScaleError,
 };
 
 /// The trials of a run, sorted by file name.
@@ -51,6 +52,8 @@ pub(crate) struct Trial {
     pub(crate) pictures: bool,
     /// The sum of the squared disparity errors of correctly identified points (px²), and their number.
     pub(crate) disparity: (f64, usize),
+    /// The scale error that its fixes agree about.
+    pub(crate) scale_error: ScaleError,
     /// The names of search and solver in the first row.
     pub(crate) named: [String; 2],
     /// The stages shared with other trials in any frame.
@@ -176,6 +179,7 @@ impl Trial {
             images: false,
             pictures: false,
             disparity: (0.0, 0),
+            scale_error: ScaleError::default(),
             named: Default::default(),
             shared: SharedStages::default(),
             digest: Vec::new(),
@@ -211,6 +215,7 @@ impl Trial {
         }
         let first = self.rows.len() as u32;
         for target in &frame.targets {
+            self.scale_error.add(target);
             if self.rows.is_empty() {
                 self.named = [target.search.clone(), target.solver.clone()];
             }

@@ -31,7 +31,7 @@ pub struct RunSummary {
     pub lacking: Vec<String>,
 }
 
-/// The results of one trial; `found`, `refused` and `wrong` add up to `attempted`.
+/// The results of one trial; `found`, `rejected` and `wrong` add up to `attempted`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The name of the trial.
@@ -53,7 +53,7 @@ pub struct Row {
     /// The number of fixes that are not known to be wrong.
     pub found: usize,
     /// The number of rejected attempts, those without a fix.
-    pub refused: usize,
+    pub rejected: usize,
     /// The number of wrong fixes, those with a TRE beyond the alert limit.
     pub wrong: usize,
     /// The number of fixes without ground truth; they count in `found`.
@@ -217,7 +217,7 @@ impl RunSummary {
             published: Published::of(run).iter().map(Published::sentence).collect(),
             rejections: {
                 let total = |of: fn(&Row) -> usize| rows.iter().map(of).sum::<usize>();
-                let counts = [total(|row| row.attempted), total(|row| row.refused), total(|row| row.frames)];
+                let counts = [total(|row| row.attempted), total(|row| row.rejected), total(|row| row.frames)];
                 let reasons = rows.iter().map(|row| &row.reasons).collect();
                 rejections::sentence(run, counts, [reasons, rows.iter().map(|row| &row.idle).collect()])
             },
@@ -270,7 +270,7 @@ impl Row {
             wrong_frames: 0,
             attempted: 0,
             found: 0,
-            refused: 0,
+            rejected: 0,
             wrong: 0,
             unjudged: 0,
             reasons: BTreeMap::new(),
@@ -311,7 +311,7 @@ impl Row {
             } else if attempt.wrong() {
                 row.wrong += 1;
             } else {
-                row.refused += 1;
+                row.rejected += 1;
                 *row.reasons.entry(trial.reason(attempt).to_owned()).or_default() += 1;
             }
         }
@@ -344,7 +344,7 @@ impl Row {
         (self.frames, self.attempted) = (full(totals.frames), full(totals.attempted));
         (self.fix_frames, self.wrong_frames) = (full(totals.fix_frames), full(totals.wrong_frames));
         (self.found, self.wrong, self.unjudged) = (full(totals.found), full(totals.wrong), full(totals.unjudged));
-        self.refused = full(totals.refused());
+        self.rejected = full(totals.rejected());
         self.reasons = totals.reasons.iter().map(|(reason, &count)| (reason.clone(), full(count))).collect();
     }
 

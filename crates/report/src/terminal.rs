@@ -59,7 +59,7 @@ impl fmt::Display for RunSummary {
             let frames = format!("{}/{}", row.fix_frames, row.frames);
             let wrong =
                 if row.found > 0 && row.unjudged == row.found { "–".to_owned() } else { row.wrong.to_string() };
-            let counts = [frames, row.attempted.to_string(), row.found.to_string(), row.refused.to_string(), wrong];
+            let counts = [frames, row.attempted.to_string(), row.found.to_string(), row.rejected.to_string(), wrong];
             let errors = columns.iter().map(|column| column[index].clone());
             let total = format::number(row.times.total_ms, 1);
             results.row(names[index].iter().cloned().chain(counts).chain(errors).chain(timed.then_some(total)));

@@ -29,6 +29,8 @@ pub struct Report {
     pub page: PathBuf,
     /// The results as a table for the terminal.
     pub summary: RunSummary,
+    /// A scale error that the fixes of a trial agree about, as a sentence.
+    pub scale_warning: Option<String>,
     /// The report's section of the page that [`index`](crate::index) writes.
     pub findings: String,
 }
@@ -43,6 +45,7 @@ pub struct Prepared {
     files: Vec<File>,
     identity: String,
     summary: RunSummary,
+    scale_warning: Option<String>,
     section: Section,
 }
 
@@ -74,7 +77,9 @@ pub fn prepare(run_dir: &Path, forms: Forms, answer: Option<&Answer>) -> Result<
     let files = files(&run, &summary, forms, authored.as_ref())?;
     let section = Section::of(&run, &summary, authored.as_ref(), &files);
     let unmet = authored.map(|authored| authored.unmet()).unwrap_or_default();
-    Ok(Prepared { unmet, files, identity: run.header().run.clone(), summary, section })
+    // Trials share frames: the fixes of several would not be independent.
+    let scale_warning = run.trials.iter().find_map(|trial| trial.scale_error.warning());
+    Ok(Prepared { unmet, files, identity: run.header().run.clone(), summary, scale_warning, section })
 }
 
 /// The written answer with its values in a run.
@@ -104,7 +109,8 @@ impl Prepared {
         let page = self.files.iter().map(|(name, _)| name).find(|name| name.starts_with("report."));
         let page = page.map_or_else(|| folder.to_owned(), |name| folder.join(name));
         let findings = self.section.text(folder);
-        Ok(Report { folder: folder.to_owned(), page, summary: self.summary, findings })
+        let (summary, scale_warning) = (self.summary, self.scale_warning);
+        Ok(Report { folder: folder.to_owned(), page, summary, scale_warning, findings })
     }
 }
 

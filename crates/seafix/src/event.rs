@@ -61,7 +61,7 @@ pub enum NavigationEvent {
         inliers: usize,
         /// The number of matches.
         matches: usize,
-        /// The standard deviation of the position relative to the key frame (m).
+        /// The standard deviation of the position relative to the key frame along one axis (m).
         sigma: f64,
         /// Whether the pose graph rejected it.
         loop_rejected: bool,
@@ -109,7 +109,7 @@ impl fmt::Display for NavigationEvent {
                 write!(f, "key frame {keyframe} recognised with {inliers} of {matches} matches, ")?;
                 match loop_rejected {
                     true => write!(f, "rejected: inconsistent with the pose graph"),
-                    false => write!(f, "position ± {:.1} mm", 1e3 * sigma),
+                    false => write!(f, "position ± {:.1} mm on each axis", 1e3 * sigma),
                 }
             }
             Self::NoKeyframe { why } => write!(f, "no key frame recognised: {why}"),

@@ -301,16 +301,16 @@ impl Pipeline {
             UseOfPoints::On => problem.candidates(),
             UseOfPoints::Off => Ok(none()),
         });
-        let (candidates, refused) = match listed {
+        let (candidates, rejected) = match listed {
             Ok(candidates) => (candidates, None),
-            Err(refused) => (none(), Some(refused)),
+            Err(rejected) => (none(), Some(rejected)),
         };
         let edges = match self.settings.edges {
             UseOfEdges::On => problem.edges.candidates(&target.points, problem.prior.as_ref()),
             UseOfEdges::Off => Vec::new(),
         };
         let posed = self.posed(target, problem, &candidates, &edges);
-        let (found, stage2) = timed(|| refused.map_or_else(|| self.search.search(&posed, rng), Err));
+        let (found, stage2) = timed(|| rejected.map_or_else(|| self.search.search(&posed, rng), Err));
         SearchResult { candidates, edges, found, spent: [stage1, stage2] }
     }
 

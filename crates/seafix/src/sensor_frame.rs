@@ -76,7 +76,7 @@ impl PosePrior {
     /// use seafix::{PosePrior, geometry::Transform};
     ///
     /// let prior = PosePrior::isotropic(Transform::identity(), 0.5_f64.to_radians(), 0.1);
-    /// assert!((prior.covariance.position_sigma() - 0.1 * 3_f64.sqrt()).abs() < 1e-12);
+    /// assert!((prior.covariance.position_sigma() - 0.1).abs() < 1e-12);
     /// ```
     pub fn isotropic(world_from_camera: Transform<World, Camera>, attitude: f64, position: f64) -> Self {
         Self { world_from_camera, covariance: Covariance6::isotropic(attitude, position) }

@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layout_that_no_camera_sees_is_refused() {
+    fn a_layout_that_no_camera_sees_is_rejected() {
         assert!(Layout { distance: 0.2, shape: Shape::Compact, ..Layout::default() }.place(1).is_err());
     }
 }

@@ -441,7 +441,9 @@ fn each_mechanism_can_be_left_out() {
     assert_eq!(open, Vec::<String>::new());
     let names =
         |wrong: String| SearchMechanism::ALL.into_iter().map(Variant::Search).all(|of| wrong.contains(&of.name()));
-    let refused = toml::from_str::<RigidConsensus>("without = ['luck']").unwrap_err().to_string();
-    assert!(refused.contains("unknown variant `luck`") && names(refused.clone()), "{refused}");
-    assert!(toml::from_str::<Acceptance>("without = ['mirror']").unwrap_err().message().contains("`hinge`"));
+    let rejected = toml::from_str::<RigidConsensus>("without = ['luck']").unwrap_err().to_string();
+    assert!(rejected.contains("unknown variant `luck`") && names(rejected.clone()), "{rejected}");
+    assert!(
+        toml::from_str::<Acceptance>("without = ['mirror']").unwrap_err().message().contains("`influential-pairs`")
+    );
 }

@@ -20,7 +20,7 @@ struct Tried {
     stated: f64,
     nfa: f64,
     /// The reason of the rejection by the default settings; `None` if they accept.
-    refused: Option<&'static str>,
+    rejected: Option<&'static str>,
     right: bool,
     /// Whether the most probable pose is right, accepted or not.
     map_estimate: bool,
@@ -42,7 +42,7 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
     let (mut p_wrong, mut right) = (1.0, false);
     let solver = Mahalanobis::default();
     let by_default = judge(&problem, found.clone(), &solver, &Acceptance::default(), None);
-    let refused = by_default.outcome.reason();
+    let rejected = by_default.outcome.reason();
     let [stated, nfa] = [by_default.p_wrong, by_default.nfa].map(|of| of.unwrap_or(f64::INFINITY));
     let attempt = judge(&problem, found, &solver, &acceptance, None);
     // If every probability is accepted, any second pose is a copy, so the default's answer is judged as it is.
@@ -51,7 +51,7 @@ fn tried(family: Family, seed: u64, number: u64, presence: Presence) -> Tried {
         p_wrong = stated;
         right = rule.holds(&reference.object_from_camera, &truth, &at);
     }
-    Tried { defined: generated.truth.pose_defined, p_wrong, stated, nfa, refused, right, map_estimate }
+    Tried { defined: generated.truth.pose_defined, p_wrong, stated, nfa, rejected, right, map_estimate }
 }
 
 fn variable(name: &str, default: &str) -> String {
@@ -130,14 +130,14 @@ fn what_is_solved_depends_on_what_is_believed() {
                 100.0 * map_estimate as f64 / defined.max(1) as f64,
             );
         };
-        row("default".to_owned(), &|one| one.refused.is_none());
+        row("default".to_owned(), &|one| one.rejected.is_none());
         for max in [0.5, 0.1, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 1e-4, 1e-5] {
             row(format!("{max:.0e}"), &|one| one.p_wrong <= max);
         }
         // The unsolved problems with a solution: reasons, with the most probable pose right and wrong.
         let mut reasons: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
-        for one in with.iter().filter(|one| one.defined && !(one.refused.is_none() && one.right)) {
-            reasons.entry(one.refused.unwrap_or("answered")).or_default()[usize::from(!one.map_estimate)] += 1;
+        for one in with.iter().filter(|one| one.defined && !(one.rejected.is_none() && one.right)) {
+            reasons.entry(one.rejected.unwrap_or("answered")).or_default()[usize::from(!one.map_estimate)] += 1;
         }
         println!("{name}, of {defined} not solved (most probable pose right, wrong): {reasons:?}");
     }
@@ -175,7 +175,7 @@ fn rank_by_probability_and_by_the_number_of_false_alarms() {
                 right(&|one| one.stated),
                 right(&|one| one.nfa),
                 without.iter().map(|one| one.nfa).fold(f64::INFINITY, f64::min),
-                without.iter().filter(|one| one.refused.is_none()).count(),
+                without.iter().filter(|one| one.rejected.is_none()).count(),
                 without.len(),
             );
         }

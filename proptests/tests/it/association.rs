@@ -87,7 +87,7 @@ fn coverage(clump: Clump, draws: u64) -> Coverage {
         all.fixes += 1;
         all.before += beyond(&of_noise);
         all.after += beyond(&fix.covariance);
-        all.growth += fix.covariance.position_sigma() / of_noise.position_sigma();
+        all.growth += fix.covariance.position_rms() / of_noise.position_rms();
     }
     all
 }

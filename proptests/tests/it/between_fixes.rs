@@ -322,8 +322,8 @@ fn dead_reckoning_grows_as_predicted() {
             let error = known.object_pose.object_from_camera.error_to(&sailing.truth(0));
             real[0] += error.fixed_rows::<3>(0).norm_squared();
             real[1] += error.fixed_rows::<3>(3).norm_squared();
-            message[0] += known.object_pose.covariance.attitude_sigma().powi(2);
-            message[1] += known.object_pose.covariance.position_sigma().powi(2);
+            message[0] += known.object_pose.covariance.attitude_rms().powi(2);
+            message[1] += known.object_pose.covariance.position_rms().powi(2);
         }
         (
             [(real[0] / 300.0).sqrt(), (real[1] / 300.0).sqrt()],

@@ -61,7 +61,7 @@ fn table() {
                                     c.nees,
                                     c.coverage,
                                     c.attitude_sigma.to_degrees(),
-                                    c.refused,
+                                    c.rejected,
                                     c.tre_rms * 1e3,
                                     c.position_rms * 1e3
                                 );
@@ -328,7 +328,7 @@ fn three_compact(distance: f64, draws: u64) -> Vec<String> {
             c.nees,
             c.coverage,
             c.ambiguous,
-            c.refused,
+            c.rejected,
             c.elsewhere,
             draws * 20,
             c.position_foreseen,
@@ -392,7 +392,7 @@ fn four_compact(seed: u64, distance: f64, draws: u64) -> Vec<String> {
             c.nees,
             c.coverage,
             c.ambiguous,
-            c.refused,
+            c.rejected,
             c.elsewhere,
             c.position_foreseen,
             c.bent,
@@ -428,7 +428,7 @@ fn three_points(name: &str, solver: &str, settings: &Layout, draws: u64) -> Cell
 /// error of 3.4 m.
 #[test]
 fn no_answer_is_less_likely_than_the_truth() {
-    let mut refused = 0;
+    let mut rejected = 0;
     for solver in ["mahalanobis", "stereo-reprojection"].map(build) {
         for number in 0..20 {
             let settings = Layout { points: 4, number, distance: 5.0, sigma_px: 0.5, ..Layout::default() };
@@ -437,7 +437,7 @@ fn no_answer_is_less_likely_than_the_truth() {
                 let Some(points) = observations(&placed, draw, 0.0) else { continue };
                 let data = Observations { points, edges: Vec::new(), rig: Some(&placed.rig) };
                 let Ok(pose) = solver.solve(&data) else {
-                    refused += 1;
+                    rejected += 1;
                     continue;
                 };
                 let chi2 =
@@ -447,7 +447,7 @@ fn no_answer_is_less_likely_than_the_truth() {
             }
         }
     }
-    assert!(refused <= 10, "{refused} of 20 000 rejected");
+    assert!(rejected <= 10, "{rejected} of 20 000 rejected");
 }
 
 /// Figure 4 for every solver: its covariance is consistent within ±10 % in every cell with an attitude error below 5°,
@@ -473,7 +473,7 @@ fn every_solver_knows_its_error() {
             let turn = c.attitude_rms.to_degrees();
             println!(
                 "{name} {cell_name}: NEES {:.3} cover {:.4}, attitude {turn:.2}°, {} rejected",
-                c.nees, c.coverage, c.refused
+                c.nees, c.coverage, c.rejected
             );
             if c.nees > 6.6 || turn < 5.0 && c.nees < 5.4 {
                 missed.push(format!("{name} {cell_name}: {:.3}", c.nees));

@@ -210,7 +210,7 @@ fn a_blow_up_ends_at_the_budget() {
             Ok(found) => {
                 let (size, bound) = (found.pairs.len(), found.consensus_bound);
                 assert!(size <= bound && bound <= 50, "{}: {size}, {bound}", search.name);
-                let objection = objection(&problem.problem(), search.refuses_mirrors(), &found.pairs);
+                let objection = objection(&problem.problem(), search.rejects_mirrors(), &found.pairs);
                 assert_eq!(objection, None, "{}", search.name);
                 assert!(size >= 3 && !found.optimal, "{}: {size}", search.name);
             }

@@ -21,7 +21,7 @@ fn agree(searches: &[Tried], planted: &Planted) -> Result<u32, TestCaseError> {
     for orientation in [true, false] {
         let exact = searches.iter().filter(|search| search.claims.exact);
         let mut first: Option<(&Tried, Result<Identification, Rejected>)> = None;
-        for search in exact.filter(|search| search.refuses_mirrors() == orientation) {
+        for search in exact.filter(|search| search.rejects_mirrors() == orientation) {
             let answer = search.answer(planted);
             let ended = match &answer {
                 Ok(found) => found.optimal,
@@ -84,7 +84,7 @@ fn bounds_hold(searches: &[Tried], planted: &Planted) -> TestCaseResult {
     let brute = [false, true].map(|orientation| largest(&planted.problem(), orientation));
     prop_assume!(!brute.iter().any(|largest| largest.doubtful));
     for search in searches {
-        let best = brute[usize::from(search.refuses_mirrors())].size;
+        let best = brute[usize::from(search.rejects_mirrors())].size;
         match search.answer(planted) {
             Ok(found) => {
                 let (size, bound) = (found.pairs.len(), found.consensus_bound);

@@ -63,7 +63,7 @@ fn a_motion_of_the_cloud_changes_nothing() {
             match (&here, &there) {
                 (Ok(a), Ok(b)) if a.optimal && b.optimal => {
                     prop_assert_eq!(a.pairs.len(), b.pairs.len(), "{}", &search.name);
-                    let only = brute[usize::from(search.refuses_mirrors())].sets.len() == 1;
+                    let only = brute[usize::from(search.rejects_mirrors())].sets.len() == 1;
                     prop_assert!(!only || a.pairs == b.pairs, "{}", search.name);
                 }
                 _ if ended(&here) || ended(&there) => {}

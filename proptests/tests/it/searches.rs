@@ -45,7 +45,7 @@ fn what_is_left_of_a_set_is_one() {
                 for without in 0..set.len() {
                     let mut left = set.clone();
                     left.remove(without);
-                    let objection = objection(&planted.problem(), search.refuses_mirrors(), &left);
+                    let objection = objection(&planted.problem(), search.rejects_mirrors(), &left);
                     prop_assert!(objection.is_none(), "{}: {}", search.name, objection.unwrap_or_default());
                     let pairs = left.iter().map(|pair| (pair.model, pair.cloud));
                     let candidates = Candidates::from_pairs(planted.model.len(), pairs);
@@ -123,7 +123,7 @@ fn a_difference_of_exactly_delta_is_coherent() {
 #[test]
 fn no_admissible_set_is_larger() {
     let searches = searches(BUDGET);
-    let [settled, refused, mirrored] = [0; 3].map(Cell::new);
+    let [settled, rejected, mirrored] = [0; 3].map(Cell::new);
     let cases = law(256, planted(SMALL), |planted| {
         let problem = planted.problem();
         let brute = [false, true].map(|mirrors| largest(&problem, mirrors));
@@ -131,11 +131,11 @@ fn no_admissible_set_is_larger() {
         let mut proofs = 0;
         for search in &searches {
             let coherent = &brute[0];
-            let best = &brute[usize::from(search.refuses_mirrors())];
+            let best = &brute[usize::from(search.rejects_mirrors())];
             let answer = search.answer(&planted);
             let name = &search.name;
             for set in sets(&answer) {
-                let objection = objection(&problem, search.refuses_mirrors(), set);
+                let objection = objection(&problem, search.rejects_mirrors(), set);
                 prop_assert!(objection.is_none(), "{name}: {}", objection.unwrap_or_default());
             }
             match answer {
@@ -146,7 +146,7 @@ fn no_admissible_set_is_larger() {
                         "{name}: {size}, brute {}",
                         best.size
                     );
-                    let mirror = search.refuses_mirrors() && best.size == 3 && coherent.size >= 4;
+                    let mirror = search.rejects_mirrors() && best.size == 3 && coherent.size >= 4;
                     prop_assert!(
                         !mirror || !search.claims.exact,
                         "{name}: three points of a mirror image of {} are an answer",
@@ -186,7 +186,7 @@ fn no_admissible_set_is_larger() {
                 Err(Rejected::NoConsensus { best: size, needed }) => {
                     prop_assert!(search.claims.exact, "{name} proves nothing");
                     prop_assert!(size <= best.size && best.size < needed, "{name}: brute {}", best.size);
-                    refused.set(refused.get() + 1);
+                    rejected.set(rejected.get() + 1);
                     proofs += 1;
                 }
                 Err(Rejected::NotFound { bound, needed }) => {
@@ -198,12 +198,12 @@ fn no_admissible_set_is_larger() {
                 Err(Rejected::NoPrior) => prop_assert!(false, "{name} has a prior"),
                 Err(Rejected::Mirrored { best: size, proved }) if !search.claims.exact => {
                     prop_assert!(
-                        !proved && search.refuses_mirrors() && size >= 4 && size <= coherent.size,
+                        !proved && search.rejects_mirrors() && size >= 4 && size <= coherent.size,
                         "{name}: {size}"
                     );
                 }
                 Err(Rejected::Mirrored { best: size, .. }) => {
-                    prop_assert!(search.refuses_mirrors(), "{name}");
+                    prop_assert!(search.rejects_mirrors(), "{name}");
                     prop_assert!(best.size < 4 && size == coherent.size && size >= 4, "{name}: brute {}", best.size);
                     mirrored.set(mirrored.get() + 1);
                     proofs += 1;
@@ -219,7 +219,7 @@ fn no_admissible_set_is_larger() {
         Ok(())
     });
     not_idle("answers that solve a problem", settled.get(), cases, 1);
-    not_idle("no consensus", refused.get(), cases, 30);
+    not_idle("no consensus", rejected.get(), cases, 30);
     not_idle("mirror images", mirrored.get(), cases, 50);
 }
 
@@ -232,7 +232,7 @@ fn a_planted_set_is_not_missed() {
     let searches = searches(BUDGET);
     law(128, planted(LARGE), |planted| {
         for search in &searches {
-            if objection(&planted.problem(), search.refuses_mirrors(), &planted.truth).is_some() {
+            if objection(&planted.problem(), search.rejects_mirrors(), &planted.truth).is_some() {
                 continue;
             }
             let size = planted.truth.len();
@@ -297,6 +297,6 @@ fn no_point_serves_twice() {
 /// Seen to fail when the orientation test always passes, when it rejects equal signs, and when a triple of the image is
 /// an answer.
 #[test]
-fn a_mirror_image_is_refused() {
-    search_laws::a_mirror_image_is_refused(&searches(BUDGET));
+fn a_mirror_image_is_rejected() {
+    search_laws::a_mirror_image_is_rejected(&searches(BUDGET));
 }

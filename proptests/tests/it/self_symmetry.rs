@@ -116,12 +116,12 @@ fn no_pose_shows_points_from_behind() {
         [[0.0, 0.9, 0.0], [0.4, 0.5, 0.3], [-0.4, 0.4, 0.1], [0.1, -0.8, 0.4], [0.5, -0.1, -0.2], [-0.6, -0.3, 0.2]];
     let solid = solid.map(Point::from);
     let reported = |normal| answers(&model(&solid, Some(normal)), Vector3::new(0.1, 0.2, -0.3), None);
-    let refused = reported(Vector3::z()).into_iter().filter_map(|(_, outcome, _)| match outcome {
+    let rejected = reported(Vector3::z()).into_iter().filter_map(|(_, outcome, _)| match outcome {
         Outcome::Rejected(RejectionReason::Behind { point, angle, max }) => Some((point, angle, max)),
         _ => None,
     });
-    let refused: Vec<_> = refused.collect();
-    assert!(!refused.is_empty() && refused.iter().all(|(_, angle, max)| angle > max), "{refused:?}");
+    let rejected: Vec<_> = rejected.collect();
+    assert!(!rejected.is_empty() && rejected.iter().all(|(_, angle, max)| angle > max), "{rejected:?}");
     let found = |normal| {
         reported(normal)
             .into_iter()

@@ -284,10 +284,10 @@ fn independent_judges_agree() {
 ///
 /// Seen to fail when every end counts as a minimum.
 #[test]
-fn what_has_not_converged_is_refused() {
+fn what_has_not_converged_is_rejected() {
     let build = |choice: seafix_component::Choice| SOLVERS.build(&choice).expect("it is listed");
     let ours = build(seafix_component::Choice::named("stereo-reprojection"));
-    let (refused, answered) = (Cell::new(0), Cell::new(0));
+    let (rejected, answered) = (Cell::new(0), Cell::new(0));
     let scene = (seen(0.5), prop_oneof![Just("l-bfgs"), Just("nelder-mead")], 1..40_i64);
     let cases = law(128, scene, |(mut scene, name, iterations)| {
         prop_assume!(scene.points.len() >= 5);
@@ -305,12 +305,12 @@ fn what_has_not_converged_is_refused() {
             }
             Err(Degenerate::Unconverged { steps, off, max }) => {
                 prop_assert!(steps > 0 && off > max, "{name}: {steps} {off} {max}");
-                refused.set(refused.get() + 1);
+                rejected.set(rejected.get() + 1);
             }
             Err(other) => prop_assert!(false, "{}: {}", name, other),
         }
         Ok(())
     });
-    not_idle("rejected", refused.get(), cases, 8);
+    not_idle("rejected", rejected.get(), cases, 8);
     not_idle("answered", answered.get(), cases, 16);
 }

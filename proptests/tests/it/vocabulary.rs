@@ -17,8 +17,8 @@ const REPLACED: &[&str] = &[
     "hear", "heard", "hears", "helm", "imitate", "imitates", "imitation", "imitations", "journey", "journeys", "laid",
     "lasting", "lay", "lays", "least", "leg", "legs", "likelier", "likeliest", "look", "looked", "looks", "misfit", "misfits",
     "misnamed", "most", "passage", "passages", "realigned", "reckon", "reckoned", "reckoning", "recognise", "recogniser",
-    "recognises", "referenced", "refound", "refusal", "rival", "rivals", "rough", "roughs", "sailed", "says", "share", "shares", "shell",
-    "shells", "sight", "sighting", "sightings", "sights", "standing", "standings", "station", "stations", "strain", "stretch", "teeth",
+    "recognises", "referenced", "refound", "refusal", "refused", "refuses", "rival", "rivals", "rough", "roughs", "sailed", "says", "share", "shares", "shell",
+    "shells", "sight", "sighting", "sightings", "sights", "standing", "standings", "station", "stations", "strain", "stretch", "stretched", "stretches", "teeth",
     "tell", "tells", "told", "tooth", "twin", "twins", "underway", "unfit", "unidentified", "unreferenced", "unrecognised",
     "voyage", "voyages", "way", "ways", "weighed", "whole", "wholes", "widen", "widened",
 ];

@@ -90,9 +90,9 @@ impl Cloud {
         }
         let pipeline = pipeline.resolved().map_err(|error| Failure::new(USAGE, error))?;
         print(&if self.json {
-            self.machines(&names, &look, &times, &pipeline, &warnings)
+            self.json(&names, &look, &times, &pipeline, &warnings)
         } else {
-            self.people(&look, corners, &times)
+            self.text(&look, corners, &times)
         })?;
         Ok(DONE)
     }
@@ -132,8 +132,8 @@ impl Cloud {
         (look, times)
     }
 
-    /// The output for people: counts, and the times of the stages.
-    fn people(&self, look: &FrontEndOutput, corners: usize, times: &[StageTimes]) -> String {
+    /// The output as text: counts, and the times of the stages.
+    fn text(&self, look: &FrontEndOutput, corners: usize, times: &[StageTimes]) -> String {
         let [left, right] = look.keypoints().map(<[_]>::len);
         let depths = look.cloud.iter().map(|point| point.position.at.coords.z);
         let (near, far) = depths.fold((f64::INFINITY, 0.0_f64), |(near, far), z| (near.min(z), far.max(z)));
@@ -157,8 +157,8 @@ impl Cloud {
         )
     }
 
-    /// The output for programs: one JSON object.
-    fn machines(
+    /// The output as JSON: one object.
+    fn json(
         &self,
         names: &[PathBuf; 2],
         look: &FrontEndOutput,

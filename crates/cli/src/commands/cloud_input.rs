@@ -10,7 +10,7 @@ use seafix_geometry::StereoRig;
 use seafix_io::read_image;
 use seafix_vision::Image;
 
-use super::{limits::Limits, pairs_of::PairsOf};
+use super::{limits::Limits, pair_source::PairSource};
 use crate::exit::{Failure, INPUT, USAGE};
 
 /// Two images with a rig, or one pair of a data set, a recording or a log.
@@ -29,7 +29,7 @@ pub(crate) struct CloudInput {
     #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "right")]
     pair: usize,
     #[command(flatten)]
-    pairs_of: PairsOf,
+    pair_source: PairSource,
     #[command(flatten)]
     limits: Limits,
 }
@@ -61,7 +61,7 @@ impl CloudInput {
 
     fn of_images(&self, right: &Path, rig: &Path) -> Result<CloudPair, Failure> {
         let input = |fault: Fault| Failure::new(INPUT, fault);
-        self.pairs_of.of_no_recording()?;
+        self.pair_source.of_no_recording()?;
         let Rig { stereo: rig, bits, file, warning, .. } = Rig::from_file(rig).map_err(input)?;
         let limits = self.limits.of_images();
         let images = [
@@ -88,7 +88,7 @@ impl CloudInput {
             let remedy = "give LEFT RIGHT --rig DATASET.toml, or a data set, a recording (.mcap) or a log";
             return Err(Failure::new(USAGE, fault.remedy(remedy)));
         }
-        let pairs = self.pairs_of.open(&self.left, false, self.limits.of_images())?;
+        let pairs = self.pair_source.open(&self.left, false, self.limits.of_images())?;
         let count = pairs.stamps().len();
         if self.pair >= count {
             let fault = Fault::new("no such stereo pair", &self.left).value(self.pair.to_string());

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use seafix_experiment::Plan;
 
-use super::pairs;
+use super::export_pairs;
 use crate::exit::{Ended, Failure, INPUT, OUTPUT, USAGE};
 
 #[derive(Debug, Args)]
@@ -44,7 +44,7 @@ impl Dive {
                 .source
                 .open(trial.resolved.seed, &plan.folder)
                 .map_err(|faults| Failure::faults(INPUT, &faults))?;
-            pairs::write(&*sequence, &self.out, &self.licence)
+            export_pairs::write(&*sequence, &self.out, &self.licence)
         })
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use seafix_experiment::Plan;
 
-use super::pairs;
+use super::export_pairs;
 use crate::exit::{Ended, Failure, INPUT, USAGE};
 
 #[derive(Debug, Args)]
@@ -29,6 +29,6 @@ impl Export {
         let trial = plan.trials.first().ok_or_else(|| Failure::new(USAGE, "the experiment has no trial"))?;
         let sequence =
             trial.source.open(trial.resolved.seed, &plan.folder).map_err(|faults| Failure::faults(INPUT, &faults))?;
-        pairs::write(&*sequence, &self.out, &self.licence)
+        export_pairs::write(&*sequence, &self.out, &self.licence)
     }
 }

@@ -16,6 +16,7 @@ mod diff;
 mod dive;
 mod eval;
 mod export;
+mod export_pairs;
 mod fixes;
 mod generate;
 mod limits;
@@ -23,8 +24,7 @@ mod list;
 mod merge;
 mod model;
 mod odometry;
-mod pairs;
-mod pairs_of;
+mod pair_source;
 mod publish;
 mod recover;
 mod replay;
@@ -63,7 +63,7 @@ pub(crate) enum Command {
     /// Build the model of an object from points marked by hand in one stereo pair, or in pairs of a dive.
     Model(model::Model),
     /// Estimate the trajectory of a stereo rig through a data set, a recording or a log, relative to the first pose.
-    Odometry(odometry::Odometer),
+    Odometry(odometry::OdometryCommand),
     /// Generate coherence problems with truth (coherence-problem/1).
     Generate(generate::Generate),
     /// Compare runs of the same data: results side by side, significance of the differences.

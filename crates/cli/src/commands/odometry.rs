@@ -19,7 +19,7 @@ use seafix_vision::{RightCameraRotation, Threads};
 use serde_json::{Value, json};
 
 use super::{
-    pairs_of::{PairsOf, turned, with_readings},
+    pair_source::{PairSource, turned, with_readings},
     set::built,
 };
 use crate::{
@@ -29,12 +29,12 @@ use crate::{
 };
 
 #[derive(Debug, Args)]
-pub(crate) struct Odometer {
+pub(crate) struct OdometryCommand {
     /// The folder of a data set, a recording of ROS 2 (an MCAP file or a folder of rosbag2) or the log of a trial with
     /// its images; site and truth are not used.
     pairs: PathBuf,
     #[command(flatten)]
-    pairs_of: PairsOf,
+    pair_source: PairSource,
     /// Write the poses world_from_camera to this file in TUM's format; the world frame is the first left camera.
     #[arg(long, value_name = "FILE.tum")]
     out: Option<PathBuf>,
@@ -65,7 +65,7 @@ pub(crate) struct Odometer {
 const LITTLE_AGREEMENT: f64 = 0.45;
 
 /// The result of the odometry over all pairs.
-struct Trip {
+struct Estimate {
     trajectory: OdometryTrajectory,
     /// Stamps of the pairs that the odometry received.
     given: Vec<u64>,
@@ -77,10 +77,10 @@ struct Trip {
     range_offset: Option<RangeOffset>,
 }
 
-impl Odometer {
+impl OdometryCommand {
     pub(crate) fn execute(&self) -> Ended {
         let (odometry, settings) = self.build()?;
-        let mut pairs = self.pairs_of.open(&self.pairs, self.sort_stamps, ImageLimits::default())?;
+        let mut pairs = self.pair_source.open(&self.pairs, self.sort_stamps, ImageLimits::default())?;
         pairs.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         with_readings(&pairs, &*odometry, &self.odometry)?;
         let pool = ThreadPoolBuilder::new()
@@ -98,27 +98,27 @@ impl Odometer {
         if let Some(found) = &right_camera_rotation {
             pairs.rig = found.rig;
         }
-        let mut trip = pool.install(|| self.travel(&*odometry, &pairs))?;
-        let range_offset = trip.range_offset;
+        let mut estimate = pool.install(|| self.estimate(&*odometry, &pairs))?;
+        let range_offset = estimate.range_offset;
         if let Some(found) = range_offset.filter(|found| found.corrected) {
             // The first pairs preceded the correction.
             pairs.rig = pairs.rig.with_range_offset(found.pixels);
-            trip = pool.install(|| self.travel(&*odometry, &pairs))?;
+            estimate = pool.install(|| self.estimate(&*odometry, &pairs))?;
         }
-        if let Some(fault) = trip.motionless(pairs.path()) {
+        if let Some(fault) = estimate.motionless(pairs.path()) {
             return Err(Failure::new(INPUT, fault));
         }
         let reported = right_camera_rotation.as_ref().map(turned);
         let reported = reported.into_iter().chain(range_offset.as_ref().map(offset));
-        let warnings: Vec<String> = reported.chain(trip.warnings()).collect();
+        let warnings: Vec<String> = reported.chain(estimate.warnings()).collect();
         warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         if let Some(out) = out {
-            out.finish(poses(&trip.trajectory))?;
+            out.finish(poses(&estimate.trajectory))?;
         }
         print(&if self.json {
-            machines(&trip, right_camera_rotation.as_ref(), range_offset.as_ref(), &warnings, &settings)
+            json(&estimate, right_camera_rotation.as_ref(), range_offset.as_ref(), &warnings, &settings)
         } else {
-            people(&trip)
+            text(&estimate)
         })?;
         Ok(DONE)
     }
@@ -139,22 +139,22 @@ impl Odometer {
     }
 
     /// Processes all readable pairs.
-    fn travel(&self, odometry: &dyn Odometry, pairs: &StereoPairs) -> Result<Trip, Failure> {
+    fn estimate(&self, odometry: &dyn Odometry, pairs: &StereoPairs) -> Result<Estimate, Failure> {
         let threads = if self.threads > 1 { Threads::Pool } else { Threads::One };
         let mut session = odometry.begin(&pairs.rig, pairs.body_from_camera, threads);
         let progress = Progress::new();
         progress.expect(pairs.stamps().len());
         let (mut given, mut unread, mut odometry_ms) = (Vec::new(), Vec::new(), 0.0);
-        let mut message = HashSet::new();
+        let mut printed = HashSet::new();
         for (index, &stamp_ns) in pairs.stamps().iter().enumerate() {
             let readings = pairs.readings(index).map_err(|fault| Failure::new(INPUT, fault))?;
             readings.iter().for_each(|reading| session.sense(reading));
             match pairs.pair(index) {
                 Err(fault) => {
                     let warning = format!("warning: {fault}");
-                    if !message.contains(&warning) {
+                    if !printed.contains(&warning) {
                         notify(&warning);
-                        message.insert(warning);
+                        printed.insert(warning);
                     }
                     unread.push((stamp_ns, fault));
                 }
@@ -177,7 +177,7 @@ impl Odometer {
             return Err(Failure::new(INPUT, fault));
         }
         let range_offset = session.range_offset();
-        Ok(Trip { trajectory: session.trajectory(), given, unread, odometry_ms, range_offset })
+        Ok(Estimate { trajectory: session.trajectory(), given, unread, odometry_ms, range_offset })
     }
 }
 
@@ -194,7 +194,7 @@ fn offset(found: &RangeOffset) -> String {
     )
 }
 
-impl Trip {
+impl Estimate {
     /// The stamps of skipped pairs with reasons, in order of time.
     fn left_out(&self) -> Vec<(u64, String)> {
         let skipped = self.given.iter().zip(&self.trajectory.outcomes).filter_map(|(stamp, outcome)| match outcome {
@@ -304,54 +304,54 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// The output for people: length, speed, breaks and skipped pairs.
-fn people(trip: &Trip) -> String {
-    let trajectory = &trip.trajectory;
+/// The output as text: length, speed, breaks and skipped pairs.
+fn text(estimate: &Estimate) -> String {
+    let trajectory = &estimate.trajectory;
     let poses = trajectory.waypoints().count();
-    let pairs = trip.given.len() + trip.unread.len();
+    let pairs = estimate.given.len() + estimate.unread.len();
     let (poses, pairs) = (counted(poses, "pose"), counted(pairs, "stereo pair"));
     let mut text = format!("{poses} of {pairs} over {:.2} m", trajectory.length());
-    text += &format!(", {:.1} pairs a second\n", trip.pairs_a_second());
-    if let Some([min, found, sought]) = trip.landmarks() {
+    text += &format!(", {:.1} pairs a second\n", estimate.pairs_a_second());
+    if let Some([min, found, sought]) = estimate.landmarks() {
         text += &format!("{found:.0} of {sought:.0} landmarks tracked in a pair (mean), at least {min:.0}\n");
     }
     for segment in trajectory.segments.iter().filter(|segment| segment.broken.is_some()) {
         text += &format!("broken before {}: {}\n", seconds(segment.poses[0].stamp_ns), why(segment));
     }
-    let left_out = trip.left_out();
+    let left_out = estimate.left_out();
     if !left_out.is_empty() {
         text += &format!("{} skipped\n", counted(left_out.len(), "pair"));
     }
     for (stamp, why) in &left_out {
         text += &format!("  {}: {why}\n", seconds(*stamp));
     }
-    let count = trip.given.len() as f64;
+    let count = estimate.given.len() as f64;
     let stages: Vec<String> = trajectory.times.iter().map(|(stage, ms)| format!("{stage} {:.1}", ms / count)).collect();
     text + &format!("ms a pair: {}\n", stages.join(", "))
 }
 
 /// The output for programs: one JSON object.
-fn machines(
-    trip: &Trip,
+fn json(
+    estimate: &Estimate,
     right_camera_rotation: Option<&RightCameraRotation>,
     range_offset: Option<&RangeOffset>,
     warnings: &[String],
     settings: &Choice,
 ) -> String {
-    let trajectory = &trip.trajectory;
-    let count = trip.given.len() as f64;
+    let trajectory = &estimate.trajectory;
+    let count = estimate.given.len() as f64;
     let segments: Vec<Value> = trajectory.segments.iter().map(segment).collect();
     let left_out: Vec<Value> =
-        trip.left_out().into_iter().map(|(stamp_ns, why)| json!({ "stamp_ns": stamp_ns, "why": why })).collect();
+        estimate.left_out().into_iter().map(|(stamp_ns, why)| json!({ "stamp_ns": stamp_ns, "why": why })).collect();
     let times: serde_json::Map<String, Value> =
         trajectory.times.iter().map(|(stage, ms)| ((*stage).to_owned(), json!(ms / count))).collect();
     let value = json!({
-        "pairs": trip.given.len() + trip.unread.len(),
+        "pairs": estimate.given.len() + estimate.unread.len(),
         "poses": trajectory.waypoints().count(),
         "length": trajectory.length(),
         "segments": segments,
         "left_out": left_out,
-        "landmarks": trip.landmarks().map(|[min, found, sought]| json!({ "min": min, "found": found, "sought": sought })),
+        "landmarks": estimate.landmarks().map(|[min, found, sought]| json!({ "min": min, "found": found, "sought": sought })),
         "agreement": trajectory.agreement(),
         "right_camera_rotation": right_camera_rotation.map(|found| json!({
             "turn_deg": found.turn.map(f64::to_degrees),
@@ -368,7 +368,7 @@ fn machines(
             "corrected": found.corrected,
         })),
         "warnings": warnings,
-        "pairs_a_second": trip.pairs_a_second(),
+        "pairs_a_second": estimate.pairs_a_second(),
         "times_ms": times,
         "odometry": settings,
     });

@@ -1,6 +1,6 @@
 //! `seafix run`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use rayon::ThreadPoolBuilder;
@@ -126,49 +126,8 @@ pub(crate) fn report_on(finished: &seafix_experiment::Finished, threads: usize) 
     let written = pool.install(|| report(&finished.folder, &finished.folder.join("report"), Forms::ALL));
     let written = written.map_err(super::report::failure)?;
     print(&format!("{}\nreport: {}\n", written.summary, written.page.display()))?;
-    if let Some(line) = scale_error(&finished.folder) {
-        notify(&line);
+    if let Some(warning) = written.scale_warning {
+        notify(&format!("warning: {warning}"));
     }
     Ok(())
-}
-
-/// A scale error that the fixes of a run agree about: a focal length, a baseline or a survey that is off.
-fn scale_error(folder: &Path) -> Option<String> {
-    /// The minimum number of fixes and the minimum error.
-    const FEW: usize = 3;
-    const LARGE: f64 = 0.01;
-    let text = std::fs::read_to_string(folder.join("results.csv")).ok()?;
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next()?.split(',').collect();
-    let column = |name: &str| header.iter().position(|column| *column == name);
-    let (value, sigma) = (column("scale_error")?, column("scale_error_sigma")?);
-    let number = |cells: &[String], column: usize| cells.get(column)?.parse::<f64>().ok();
-    let estimates = lines.map(cells).filter_map(|cells| Some((number(&cells, value)?, number(&cells, sigma)?)));
-    let estimates: Vec<(f64, f64)> = estimates.filter(|(_, sigma)| *sigma > 0.0).collect();
-    // The weighted mean, with the standard deviation of independent fixes.
-    let weight: f64 = estimates.iter().map(|(_, sigma)| sigma.powi(-2)).sum();
-    let mean = estimates.iter().map(|(value, sigma)| value * sigma.powi(-2)).sum::<f64>() / weight;
-    let sure = estimates.len() >= FEW && mean.abs() > LARGE && mean.abs() > 5.0 * weight.sqrt().recip();
-    sure.then(|| {
-        let longer = if mean > 0.0 { "longer" } else { "shorter" };
-        format!(
-            "warning: measured distances are {:.1} % {longer} than the model's in {} fixes; check baseline, focal length and survey",
-            100.0 * mean.abs(),
-            estimates.len()
-        )
-    })
-}
-
-/// The cells of a line of `results.csv`, some of them in quotes.
-fn cells(line: &str) -> Vec<String> {
-    let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
-    for letter in line.chars() {
-        match letter {
-            '"' => quoted = !quoted,
-            ',' if !quoted => cells.push(std::mem::take(&mut cell)),
-            letter => cell.push(letter),
-        }
-    }
-    cells.push(cell);
-    cells
 }

@@ -112,7 +112,7 @@ impl Solve {
                             if self.json { print(&json(line))? } else { notify(&format!("error: {error}")) }
                         }
                         Line::Answer(_) if self.json => print(&json(line))?,
-                        Line::Answer(answer) => print(&people(answer))?,
+                        Line::Answer(answer) => print(&text(answer))?,
                     }
                 }
             }
@@ -146,8 +146,8 @@ fn features(points: usize, edges: usize, name: &str) -> String {
     if edges == 0 { points } else { format!("{points} and {}", counted(edges, "edge")) }
 }
 
-/// The output for people: outcome, then pose.
-fn people(answer: &Answer) -> String {
+/// The output as text: outcome, then pose.
+fn text(answer: &Answer) -> String {
     let mut text = format!("{}: {}", answer.file, answer.outcome);
     if let Some(pairs) = &answer.pairs {
         let proved = match (answer.optimal, answer.evidence_gap) {

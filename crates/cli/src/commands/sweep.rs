@@ -74,7 +74,7 @@ impl Sweep {
     pub(crate) fn execute(&self) -> Ended {
         let plan = Plan::read(&self.experiment, &self.set).map_err(|faults| Failure::faults(USAGE, &faults))?;
         let executor = self.executor.executor();
-        let refuse = |path: &Path, error: std::io::Error| {
+        let write_error = |path: &Path, error: std::io::Error| {
             Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()))
         };
         let owner = |folder: &Path, kind| Ownership::of(folder, kind).map_err(|fault| Failure::new(OUTPUT, fault));
@@ -95,19 +95,19 @@ impl Sweep {
             }
         }
         let logs = shards.join(LOGS);
-        fs::create_dir_all(&shards).map_err(|error| refuse(&shards, error))?;
-        marker.write(&shards).map_err(|error| refuse(&shards.join(MARKER), error))?;
-        create_real_folder(&logs).map_err(|error| refuse(&logs, error))?;
+        fs::create_dir_all(&shards).map_err(|error| write_error(&shards, error))?;
+        marker.write(&shards).map_err(|error| write_error(&shards.join(MARKER), error))?;
+        create_real_folder(&logs).map_err(|error| write_error(&logs, error))?;
         let script = shards.join(SCRIPT);
         let text = self.script(&shards, executor.variable())?;
-        PartialFile::write(&script, text.as_bytes()).map_err(|error| refuse(&script, error))?;
+        PartialFile::write(&script, text.as_bytes()).map_err(|error| write_error(&script, error))?;
         let (tasks, threads) = (self.shards as usize, usize::from(self.threads));
         notify(&format!("{tasks} shards of {} in {}", plan.name, shards.display()));
         signals::listen();
         let ran = executor.run(&Array { script, tasks, threads, name: format!("seafix-{}", plan.name), logs });
         signals::end_at_once();
         ran?;
-        if signals::turned_out() {
+        if signals::interrupted() {
             return Err(Failure::new(signals::exit_code(), "interrupted; the same command resumes the sweep"));
         }
         self.merge(&shards, &marker)
@@ -150,12 +150,15 @@ impl Sweep {
 
     fn merge(&self, shards: &Path, marker: &Marker) -> Ended {
         let folders: Vec<PathBuf> = (1..=self.shards).map(|k| shards.join(k.to_string())).collect();
-        let full = |folder: &PathBuf| {
+        let is_finished = |folder: &PathBuf| {
             let text = fs::read_to_string(folder.join("manifest.json")).unwrap_or_default();
             serde_json::from_str::<Value>(&text).is_ok_and(|manifest| manifest["state"] == "shard")
         };
-        let missing: Vec<String> =
-            (1..=self.shards).zip(&folders).filter(|(_, folder)| !full(folder)).map(|(k, _)| k.to_string()).collect();
+        let missing: Vec<String> = (1..=self.shards)
+            .zip(&folders)
+            .filter(|(_, folder)| !is_finished(folder))
+            .map(|(k, _)| k.to_string())
+            .collect();
         if !missing.is_empty() {
             let what = format!(
                 "shards {} did not finish; see their output in {}; the same command resumes them",

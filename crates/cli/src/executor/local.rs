@@ -28,7 +28,7 @@ impl Executor for Local {
             while running.len() >= max {
                 wait(&mut running);
             }
-            if signals::turned_out() {
+            if signals::interrupted() {
                 break;
             }
             running.push(self.begin(array, task)?);
@@ -43,16 +43,17 @@ impl Executor for Local {
 impl Local {
     fn begin(self, array: &Array, task: usize) -> Result<Child, Failure> {
         let path = array.logs.join(format!("{task}.log"));
-        let refuse = |error: std::io::Error| Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()));
+        let write_error =
+            |error: std::io::Error| Failure::new(OUTPUT, format!("cannot write {}: {error}", path.display()));
         if path.is_symlink() {
             let what = format!("cannot write {}: a symbolic link; remove it", path.display());
             return Err(Failure::new(OUTPUT, what));
         }
-        let log = File::create(&path).map_err(refuse)?;
-        let message = log.try_clone().map_err(refuse)?;
+        let log = File::create(&path).map_err(write_error)?;
+        let errors = log.try_clone().map_err(write_error)?;
         let mut command = Command::new("sh");
         command.arg(&array.script).env(self.variable(), task.to_string());
-        let child = command.stdin(Stdio::null()).stdout(log).stderr(message).spawn();
+        let child = command.stdin(Stdio::null()).stdout(log).stderr(errors).spawn();
         child.map_err(|error| Failure::new(OUTPUT, format!("cannot start task {task}: {error}")))
     }
 }

@@ -121,7 +121,7 @@ fn the_complete_cloud_is_written() {
 }
 
 #[test]
-fn images_that_changed_places_are_refused() {
+fn images_that_changed_places_are_rejected() {
     let mut command = program();
     let table = fs::read_to_string(sample("frames.csv")).unwrap();
     let pair: Vec<&str> = table.lines().nth(1).unwrap().split(',').skip(1).collect();
@@ -141,7 +141,7 @@ fn message(images: [&str; 2], rig: impl Fn(String) -> String, code: i32) -> Stri
 
 /// Seen to fail when the two images are not compared: there were 17 points.
 #[test]
-fn one_image_twice_is_refused() {
+fn one_image_twice_is_rejected() {
     let message = message(["left000.png", "left000.png"], |rig| rig, 3);
     assert!(message.contains("identical left and right images") && message.lines().count() == 1, "{message}");
 }
@@ -197,7 +197,7 @@ fn key_points_that_come_to_nothing_are_reported() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_in_one_line() {
+fn what_cannot_be_is_rejected_in_one_line() {
     assert!(rejection(&["--detector", "haris"], 2).contains("did you mean `harris`?"));
     assert!(rejection(&["--features", "0"], 2).contains("features"));
     assert!(rejection(&["--set", "detector.sigmma=2"], 2).contains("did you mean `sigma`?"));
@@ -205,14 +205,14 @@ fn what_cannot_be_is_refused_in_one_line() {
     let folder = TempDir::new().unwrap();
     let rig = folder.path().join("dataset.toml");
     let text = fs::read_to_string(sample("dataset.toml")).unwrap();
-    let refused = |text: &str| {
+    let rejected = |text: &str| {
         fs::write(&rig, text).unwrap();
         let mut command = program();
         let image = sample("frames.csv");
         ended_with(3, command.arg("cloud").args([&image, &image]).arg("--rig").arg(&rig)).error
     };
-    assert!(refused(&text).contains("an image that cannot be decoded"));
-    assert!(refused(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));
+    assert!(rejected(&text).contains("an image that cannot be decoded"));
+    assert!(rejected(&text.replace("fx = ", "fx = -")).contains("dataset.toml:"));
 }
 
 /// The first pair of a recording, of a data set and of a log has the cloud of its two images.
@@ -234,10 +234,10 @@ fn a_recording_has_the_clouds_of_its_images() {
         assert_eq!(points(&[bag, "--pair", pair]), of_dataset);
     }
     assert_eq!(points(&[bag]), json(&[])["points"]);
-    let refused = |arguments: &[&str], code: i32| ended_with(code, program().arg("cloud").args(arguments)).error;
-    let said = refused(&[bag, "--pair", "5"], 2);
+    let rejected = |arguments: &[&str], code: i32| ended_with(code, program().arg("cloud").args(arguments)).error;
+    let said = rejected(&[bag, "--pair", "5"], 2);
     assert!(said.lines().count() == 1 && said.contains("--pair is from 0 to 4"), "{said}");
     let image = format!("{sample}/left000.png");
-    let said = refused(&[&image], 2);
+    let said = rejected(&[&image], 2);
     assert!(said.lines().count() == 1 && said.contains("one image without the other"), "{said}");
 }

@@ -58,7 +58,7 @@ fn a_compressed_file_is_read_like_a_plain_one() {
 /// A file that unpacks to far more than images do ends at the limit; one that was cut off is damaged, and what was
 /// unpacked of it is recovered.
 #[test]
-fn a_bomb_and_a_piece_are_refused_and_the_piece_is_recovered() {
+fn a_bomb_and_a_piece_are_rejected_and_the_piece_is_recovered() {
     let folder = folder();
     let mut bomb = b"\x89MCAP0\r\n".to_vec();
     bomb.resize(64 << 20, 0);

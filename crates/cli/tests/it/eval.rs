@@ -31,7 +31,7 @@ fn walks() -> tempfile::TempDir {
 }
 
 #[test]
-fn a_stretched_walk_has_the_drift_of_its_scale_error() {
+fn a_scaled_walk_has_the_drift_of_its_scale_error() {
     let folder = walks();
     let (code, out, _) = eval(folder.path(), &["truth.tum", "odometry.tum", "--json"]);
     let value: Value = serde_json::from_str(&out).unwrap();
@@ -72,7 +72,7 @@ fn an_aligned_estimate_is_written_and_read_again() {
 }
 
 #[test]
-fn what_cannot_be_compared_is_refused_in_one_line() {
+fn what_cannot_be_compared_is_rejected_in_one_line() {
     let folder = walks();
     walk(folder.path(), "later.tum", |t| format!("{} 0 0 0 0 0 0 1\n", t + 1e6));
     walk(folder.path(), "line.tum", |t| format!("{t} {t} 0 0 0 0 0 1\n"));

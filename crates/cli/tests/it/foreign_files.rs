@@ -58,7 +58,7 @@ pub(crate) fn angle(folder: &TempDir) -> (f64, String) {
     (value["ape"]["max"].as_f64().unwrap(), ended.error)
 }
 
-pub(crate) fn refused(folder: &TempDir, part: &str) {
+pub(crate) fn rejected(folder: &TempDir, part: &str) {
     let mut command = program();
     let ended = ended_with(3, command.current_dir(folder.path()).args(["eval", "reference.tum", "estimate"]));
     assert!(ended.error.contains(part) && ended.error.lines().count() == 1, "{}", ended.error);
@@ -102,9 +102,9 @@ fn tables_of_poses_are_read_by_the_names_of_their_columns() {
         error < 1e-5 && said.contains("warning: stamps that have lost digits") && said.contains("128 ns"),
         "{error} {said}"
     );
-    refused(&walk(csv, ""), "the quaternion may be qx qy qz qw (TUM) or qw qx qy qz (EuRoC)");
-    refused(&walk(csv, "t,x,y,z,q0,q1,q2,q3\n"), "w may be q0 or q3");
-    refused(&walk(csv, "a,b,c,d,e,f,g,h\n"), "a header without the columns of poses");
+    rejected(&walk(csv, ""), "the quaternion may be qx qy qz qw (TUM) or qw qx qy qz (EuRoC)");
+    rejected(&walk(csv, "t,x,y,z,q0,q1,q2,q3\n"), "w may be q0 or q3");
+    rejected(&walk(csv, "a,b,c,d,e,f,g,h\n"), "a header without the columns of poses");
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn kitti_rows_have_twelve_thirteen_or_sixteen_numbers() {
     for folder in [walk(stamped, ""), walk(full, ""), walk(both, "")] {
         assert!(angle(&folder).0 < 1e-5);
     }
-    refused(
+    rejected(
         &walk(|k, ns, p, q| format!("{} 0 0 2 1", full(k, ns, p, q).trim_end_matches(" 0 0 0 1")), ""),
         "no 4×4 matrix of a pose",
     );
@@ -143,7 +143,7 @@ fn rounded_quaternions_are_named_with_their_error() {
     let coarse = |_: usize, ns: u64, [x, y, z]: [f64; 3], [a, b, c, d]: [f64; 4]| {
         format!("{} {x} {y} {z} {a:.1} {b:.1} {c:.1} {d:.1}", seconds(ns))
     };
-    refused(&walk(coarse, ""), "1 decimals, attitudes off by up to 11.5°");
+    rejected(&walk(coarse, ""), "1 decimals, attitudes off by up to 11.5°");
 }
 
 #[test]
@@ -173,11 +173,11 @@ fn positions_without_attitude_give_errors_of_position() {
         assert!((value["ape"]["max"].as_f64().unwrap() - 0.5).abs() < 1e-9, "{value}");
         assert!(value["rpe"]["max"].as_f64().unwrap() < 1e-9 && value["rpe_relation"] == "point_distance", "{value}");
         assert!(value["segments"][0]["translation_percent"]["mean"].as_f64().unwrap() < 1e-6, "{value}");
-        let refused = eval(&["-r", "angle_deg"]);
+        let rejected = eval(&["-r", "angle_deg"]);
         assert!(
-            refused.code == Some(3) && refused.error.contains(&format!("no attitude in {name}: angle_deg needs one")),
+            rejected.code == Some(3) && rejected.error.contains(&format!("no attitude in {name}: angle_deg needs one")),
             "{}",
-            refused.error
+            rejected.error
         );
     }
 }

@@ -26,7 +26,7 @@ fn pairs(count: usize) -> tempfile::TempDir {
 
 /// Fails if a focal length in millimetres is a camera of 179°.
 #[test]
-fn a_focal_length_in_millimetres_is_refused() {
+fn a_focal_length_in_millimetres_is_rejected() {
     let folder = copied();
     edit(&folder, "dataset.toml", |text| text.replace("fx = 500.0", "fx = 6.0").replace("fy = 500.0", "fy = 6.0"));
     checked(

@@ -6,7 +6,7 @@ use tempfile::TempDir;
 
 use crate::{
     ended, ended_with,
-    foreign_files::{START, angle, refused, seconds, tum, walk},
+    foreign_files::{START, angle, rejected, seconds, tum, walk},
     program,
 };
 
@@ -69,22 +69,22 @@ fn exports_of_other_programs_are_read() {
 
 /// Fails if nothing but the number of associated poses is said.
 #[test]
-fn stamps_of_another_clock_are_refused_with_the_offset() {
+fn stamps_of_another_clock_are_rejected_with_the_offset() {
     let later = |k: usize, ns: u64, p: [f64; 3], q: [f64; 4]| tum(k, ns + 7_200_000_000_000, p, q);
     let relative = |k: usize, ns: u64, p: [f64; 3], q: [f64; 4]| tum(k, ns - START, p, q);
     for (folder, offset) in [(walk(later, ""), "-7200"), (walk(relative, ""), "1403636579.763555584")] {
-        refused(&folder, &format!("if both begin together, `--t-offset {offset}` associates 40 poses"));
+        rejected(&folder, &format!("if both begin together, `--t-offset {offset}` associates 40 poses"));
         let mut command = program();
         let command = command.current_dir(folder.path()).args(["eval", "reference.tum", "estimate", "--json"]);
         let found = ended(command.arg(format!("--t-offset={offset}")));
         assert!(found.code == Some(0) && found.out.contains("\"pairs\":40"), "{} {}", found.out, found.error);
     }
-    refused(
+    rejected(
         &walk(|k, _, p, q| format!("{k} {}", rest(p, q, ' ')), ""),
         "the stamps of the estimate count its rows (0, 1, …)",
     );
     let between = |k: usize, ns: u64, p: [f64; 3], q: [f64; 4]| tum(k, ns + 50_000_000, p, q);
-    refused(&walk(between, ""), "the nearest stamps are 0.050 s apart (median)");
+    rejected(&walk(between, ""), "the nearest stamps are 0.050 s apart (median)");
 }
 
 #[test]
@@ -105,9 +105,12 @@ fn lengths_in_other_units_and_directions_of_the_world() {
         let value: serde_json::Value = serde_json::from_str(&found.out).unwrap();
         assert!(value["ape"]["max"].as_f64().unwrap() < 1e-9, "{header} {}", found.error);
     }
-    refused(&walk(scaled(1.0), "t,x [in],y [in],z [in],qx,qy,qz,qw\n"), "a column in the unit `in`, which is not read");
-    refused(&walk(scaled(1.0), "time [min],x,y,z,qx,qy,qz,qw\n"), "a column in the unit `min`");
-    refused(&walk(scaled(1.0), "t,lat,lon,depth,qx,qy,qz,qw\n"), "geographic coordinates, which are no lengths");
+    rejected(
+        &walk(scaled(1.0), "t,x [in],y [in],z [in],qx,qy,qz,qw\n"),
+        "a column in the unit `in`, which is not read",
+    );
+    rejected(&walk(scaled(1.0), "time [min],x,y,z,qx,qy,qz,qw\n"), "a column in the unit `min`");
+    rejected(&walk(scaled(1.0), "t,lat,lon,depth,qx,qy,qz,qw\n"), "geographic coordinates, which are no lengths");
     // The reference is x, y, z; easting is y, northing x, and depth z.
     let survey = |_: usize, ns: u64, [x, y, z]: [f64; 3], _: [f64; 4]| format!("{};{y};{x};{z}", seconds(ns));
     let folder = walk(survey, "time;easting;northing;depth\n");
@@ -123,12 +126,12 @@ fn rows_that_are_no_poses_are_named() {
         0 => format!("{} nan nan nan nan nan nan nan", seconds(ns)),
         _ => tum(k, ns, p, q),
     };
-    refused(&walk(lost, ""), "not a finite number in estimate:1: nan; remove the rows without a pose");
+    rejected(&walk(lost, ""), "not a finite number in estimate:1: nan; remove the rows without a pose");
     let sheet = |_: usize, ns: u64, p: [f64; 3], q: [f64; 4]| format!("{:.4E},{}", ns as f64 * 1e-9, rest(p, q, ','));
-    refused(&walk(sheet, "t,x,y,z,qx,qy,qz,qw\n"), "stamps that do not tell the poses apart");
+    rejected(&walk(sheet, "t,x,y,z,qx,qy,qz,qw\n"), "stamps that do not tell the poses apart");
     let level =
         |_: usize, ns: u64, [x, y, z]: [f64; 3], _: [f64; 4]| format!("{ns},{x},{y},{z},0.1,0,0,0.994987437106620");
-    refused(&walk(level, ""), "quaternions that seem to have w last");
+    rejected(&walk(level, ""), "quaternions that seem to have w last");
     for (bytes, part) in [
         (
             &b"PK\x03\x04\x14\0\x06\0"[..],
@@ -139,7 +142,7 @@ fn rows_that_are_no_poses_are_named() {
     ] {
         let folder = walk(tum, "");
         fs::write(folder.path().join("estimate"), bytes).unwrap();
-        refused(&folder, part);
+        rejected(&folder, part);
     }
 }
 

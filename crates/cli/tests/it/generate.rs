@@ -53,7 +53,7 @@ fn the_object_can_be_left_away() {
 }
 
 #[test]
-fn what_cannot_be_generated_is_refused() {
+fn what_cannot_be_generated_is_rejected() {
     let folder = TempDir::new().unwrap();
     let out = folder.path().join("out");
     let out_name = out.to_str().unwrap();
@@ -77,7 +77,7 @@ fn what_cannot_be_generated_is_refused() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_filled_is_refused() {
+fn a_folder_that_cannot_be_filled_is_rejected() {
     let folder = TempDir::new().unwrap();
     let taken = folder.path().join("taken");
     fs::write(&taken, "a file").unwrap();

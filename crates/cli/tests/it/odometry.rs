@@ -209,7 +209,7 @@ fn a_gap_and_a_leap_break_the_trajectory() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_in_one_line() {
+fn what_cannot_be_is_rejected_in_one_line() {
     let sequence = Sequence::new();
     let rejection = |more: &[&str], code: i32| sequence.rejection(more, code);
     assert!(rejection(&["--set", "window=0"], 2).contains("1 to 100"));
@@ -264,7 +264,7 @@ fn no_motion_is_no_result() {
 }
 
 #[test]
-fn exchanged_images_are_refused() {
+fn exchanged_images_are_rejected() {
     let sequence = Sequence::new();
     for pair in 0..PAIRS {
         let x = STEP * pair as f64;
@@ -277,7 +277,7 @@ fn exchanged_images_are_refused() {
 
 /// Seen to fail when the two images are not compared: a pair without depth was reported as one that cannot be tracked.
 #[test]
-fn one_image_twice_is_left_out_or_refused() {
+fn one_image_twice_is_left_out_or_rejected() {
     let sequence = Sequence::new();
     sequence.put("r3.pgm", view(STEP * 3.0));
     let all = sequence.json(&[]);
@@ -515,7 +515,7 @@ fn a_recording_and_a_log_give_the_trajectory_of_their_images() {
 
 /// A file or folder without stereo pairs is named with what is accepted.
 #[test]
-fn what_has_no_pairs_is_refused() {
+fn what_has_no_pairs_is_rejected() {
     let walls = Sequence::new();
     fs::create_dir(walls.path("empty")).unwrap();
     for (path, reported) in [("missing.mcap", "no such file or folder"), ("empty", "a folder without stereo pairs")] {

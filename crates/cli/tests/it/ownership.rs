@@ -54,7 +54,7 @@ impl Place {
     }
 
     /// The command must be rejected in one line with this code, and all files of the user stay.
-    fn refused(&self, code: i32, part: &str, arguments: &[&str]) {
+    fn rejected(&self, code: i32, part: &str, arguments: &[&str]) {
         let Ended { code: found, error, .. } = self.seafix(arguments);
         assert_eq!(found, Some(code), "{arguments:?}: {error}");
         assert!(error.contains(part) && error.lines().count() == 1, "{arguments:?}: {error}");
@@ -90,23 +90,23 @@ fn a_folder_without_a_marker_is_not_ours() {
     place.user("copy/dive.mcap");
     for out in ["mine", "copy"] {
         for more in [&[][..], &["--overwrite"], &["--resume"]] {
-            place.refused(4, "the output folder is not empty", &[&["run", "e.toml", "--out", out], more].concat());
+            place.rejected(4, "the output folder is not empty", &[&["run", "e.toml", "--out", out], more].concat());
         }
-        place.refused(4, "which no report here has written", &["report", "real", "--out", out]);
+        place.rejected(4, "which no report here has written", &["report", "real", "--out", out]);
     }
-    place.refused(4, "which no report here has written", &["report", "real", "--out", "mine/report"]);
+    place.rejected(4, "which no report here has written", &["report", "real", "--out", "mine/report"]);
     place.user("notes/README.md");
-    place.refused(4, "README.md", &["report", "real", "--out", "notes", "--index"]);
-    place.refused(4, "which no report here has written", &["compare", "real", "other", "--out", "notes"]);
-    place.refused(4, "it is not empty", &["man", "notes"]);
+    place.rejected(4, "README.md", &["report", "real", "--out", "notes", "--index"]);
+    place.rejected(4, "which no report here has written", &["compare", "real", "other", "--out", "notes"]);
+    place.rejected(4, "it is not empty", &["man", "notes"]);
     place.user("swept-shards/logs/1.log");
     let sweep = ["sweep", "e.toml", "--shards", "2", "--out", "swept"];
-    place.refused(4, "folder of the shards is not empty", &sweep);
+    place.rejected(4, "folder of the shards is not empty", &sweep);
     // A lock is not ours by its name.
     place.user("locked/.lock");
-    place.refused(4, "the output folder is not empty", &["run", "e.toml", "--out", "locked"]);
+    place.rejected(4, "the output folder is not empty", &["run", "e.toml", "--out", "locked"]);
     // A run is neither a report nor the folder of one.
-    place.refused(4, "which no report here has written", &["report", "real", "--out", "real"]);
+    place.rejected(4, "which no report here has written", &["report", "real", "--out", "real"]);
     assert!(place.at("real/results.csv").exists());
 }
 
@@ -117,7 +117,7 @@ fn a_file_of_the_user_in_a_run_stays() {
         let mut place = Place::new();
         place.made("out", &[]);
         place.user(&format!("out/{name}"));
-        place.refused(4, "not part of a run", &["run", "e.toml", "--out", "out", "--overwrite"]);
+        place.rejected(4, "not part of a run", &["run", "e.toml", "--out", "out", "--overwrite"]);
         assert!(place.at("out/results.csv").exists());
         // A resumed run and a new report leave it, too.
         for command in [&["run", "e.toml", "--untimed", "--out", "out", "--resume"][..], &["report", "out", "--html"]] {
@@ -131,7 +131,7 @@ fn a_file_of_the_user_in_a_run_stays() {
     place.made("out", &[]);
     assert_eq!(place.seafix(&["report", "out", "--out", "page", "--html"]).code, Some(0));
     place.user("page/report.pdf");
-    place.refused(4, "report.pdf", &["report", "out", "--out", "page"]);
+    place.rejected(4, "report.pdf", &["report", "out", "--out", "page"]);
 }
 
 /// Fails where files are opened by names that may be links.
@@ -145,17 +145,17 @@ fn nothing_is_written_through_a_link() {
         symlink(place.at(to), place.at(name)).unwrap();
     };
     link("mine", "linked");
-    place.refused(4, "a symbolic link", &["run", "e.toml", "--out", "linked", "--overwrite"]);
-    place.refused(4, "a symbolic link", &["report", "out", "--out", "linked"]);
+    place.rejected(4, "a symbolic link", &["run", "e.toml", "--out", "linked", "--overwrite"]);
+    place.rejected(4, "a symbolic link", &["report", "out", "--out", "linked"]);
     link("mine/thesis.txt", "out/.lock");
-    place.refused(4, "not a regular file", &["run", "e.toml", "--out", "out", "--overwrite"]);
+    place.rejected(4, "not a regular file", &["run", "e.toml", "--out", "out", "--overwrite"]);
     fs::remove_file(place.at("out/.lock")).unwrap();
     link("mine", "out/report/figures");
-    place.refused(4, "a file or symbolic link has this name", &["report", "out"]);
-    place.refused(4, "not part of a run", &["run", "e.toml", "--out", "out", "--overwrite"]);
+    place.rejected(4, "a file or symbolic link has this name", &["report", "out"]);
+    place.rejected(4, "not part of a run", &["run", "e.toml", "--out", "out", "--overwrite"]);
     fs::remove_file(place.at("out/report/figures")).unwrap();
     link("mine", "out/pieces");
-    place.refused(4, "not part of a run", &["run", "e.toml", "--out", "out", "--overwrite"]);
+    place.rejected(4, "not part of a run", &["run", "e.toml", "--out", "out", "--overwrite"]);
     fs::remove_file(place.at("out/pieces")).unwrap();
     for name in ["out/results.csv", "out/manifest.json.partial", "out/results.csv.partial", "out/report/report.html"] {
         link("mine/thesis.txt", name);
@@ -163,7 +163,7 @@ fn nothing_is_written_through_a_link() {
     place.made("out", &["--overwrite"]);
     place.unharmed();
     link("mine/thesis.txt", "out/.seafix-run");
-    place.refused(4, "an invalid marker", &["run", "e.toml", "--out", "out", "--overwrite"]);
+    place.rejected(4, "an invalid marker", &["run", "e.toml", "--out", "out", "--overwrite"]);
     // Single files.
     for name in ["saved.mcap.partial", "saved.mcap.partial-1"] {
         link("mine/thesis.txt", name);
@@ -183,7 +183,7 @@ fn a_marker_names_no_file_elsewhere() {
     let marker = fs::read_to_string(place.at("out/.seafix-run")).unwrap();
     for name in ["../thesis.txt", "../mine/*/thesis.txt", "/etc/hostname"] {
         fs::write(place.at("out/.seafix-run"), marker.replace("manifest.json", name)).unwrap();
-        place.refused(4, "an invalid marker", &["run", "e.toml", "--out", "out", "--overwrite"]);
+        place.rejected(4, "an invalid marker", &["run", "e.toml", "--out", "out", "--overwrite"]);
     }
 }
 
@@ -200,7 +200,7 @@ fn the_name_of_a_trial_does_not_leave_the_folder() {
         for k in ["1", "2"] {
             fs::write(place.at(k).join("manifest.json"), manifest.replace(from, to)).unwrap();
         }
-        place.refused(3, "no file name in its folder", &["merge", "1", "2", "--out", "all"]);
+        place.rejected(3, "no file name in its folder", &["merge", "1", "2", "--out", "all"]);
         assert!(!place.at("all").exists());
     }
     place.made("run", &[]);
@@ -209,7 +209,7 @@ fn the_name_of_a_trial_does_not_leave_the_folder() {
     let mut writer = seafix_log::Writer::create(&place.at("foreign.mcap"), &header).unwrap();
     log.frames.iter().for_each(|frame| writer.frame(frame).unwrap());
     writer.finish().unwrap();
-    place.refused(3, "no valid file name", &["replay", "foreign.mcap", "--out", "again"]);
+    place.rejected(3, "no valid file name", &["replay", "foreign.mcap", "--out", "again"]);
 }
 
 /// Fails where `--overwrite` removes a run before it is read.
@@ -220,10 +220,10 @@ fn an_input_is_never_an_output() {
     for k in ["1", "2"] {
         place.made(k, &["--shard", &format!("{k}/2")]);
     }
-    place.refused(4, "an input in the output folder", &["replay", "run/001.mcap", "--out", "run", "--overwrite"]);
-    place.refused(4, "an input in the output folder", &["merge", "1", "2", "--out", "1", "--overwrite"]);
+    place.rejected(4, "an input in the output folder", &["replay", "run/001.mcap", "--out", "run", "--overwrite"]);
+    place.rejected(4, "an input in the output folder", &["merge", "1", "2", "--out", "1", "--overwrite"]);
     assert!(place.at("run/001.mcap").exists() && place.at("1/pieces").exists());
-    place.refused(4, "exists", &["recover", "run/001.mcap", "--out", "run/001.mcap"]);
+    place.rejected(4, "exists", &["recover", "run/001.mcap", "--out", "run/001.mcap"]);
     let set = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../datasets/virtual-sample");
     fs::create_dir(place.at("set")).unwrap();
     for entry in fs::read_dir(set).unwrap().flatten() {
@@ -239,14 +239,14 @@ fn an_input_is_never_an_output() {
         (vec!["eval", "set/truth.tum", "set/prior.tum"], "set/prior.tum"),
     ] {
         let out = ["--out", out];
-        place.refused(4, "an input as output", &[&command[..], &out].concat());
-        place.refused(4, "an input as output", &[&command[..], &out, &["--overwrite"]].concat());
+        place.rejected(4, "an input as output", &[&command[..], &out].concat());
+        place.rejected(4, "an input as output", &[&command[..], &out, &["--overwrite"]].concat());
     }
     assert_eq!(fs::read(place.at("set/truth.tum")).unwrap(), before);
-    place.refused(4, "not empty", &["run", "set", "--out", "set", "--overwrite"]);
+    place.rejected(4, "not empty", &["run", "set", "--out", "set", "--overwrite"]);
     // Another file is replaced on request only.
     let eval = ["eval", "set/truth.tum", "set/prior.tum", "--out", "matched.tum"];
     assert_eq!(place.seafix(&eval).code, Some(0));
-    place.refused(4, "exists", &eval);
+    place.rejected(4, "exists", &eval);
     assert_eq!(place.seafix(&[&eval[..], &["--overwrite"]].concat()).code, Some(0));
 }

@@ -179,7 +179,7 @@ impl Bag {
     }
 
     /// Both `check` and `run` must report all of `parts` in a line and write nothing.
-    fn refused(&self, parts: &[&str]) {
+    fn rejected(&self, parts: &[&str]) {
         let folder = self.write();
         let check = seafix(folder.path(), &["check", "bag.mcap"]);
         let run = seafix(folder.path(), &["run", "e.toml", "--out", "out"]);
@@ -244,13 +244,13 @@ fn a_sound_recording_is_reported_and_run() {
 fn baselines_that_contradict_each_other() {
     let with = |tf: [f64; 3]| Bag { tf: Some(tf), ..Bag::sound() };
     let parts = ["P and the transforms give different poses", "P gives 0.2500 m at [-0.250, 0.000, 0.000]"];
-    with([0.5, 0.0, 0.0]).refused(
+    with([0.5, 0.0, 0.0]).rejected(
         &[&parts[..], &["/tf 0.5000 m", "`right` from `left`", "correct /cam/right/camera_info or the transform"]]
             .concat(),
     );
-    with([-0.25, 0.0, 0.0]).refused(&[&parts[..], &["/tf 0.2500 m at [0.250"]].concat());
-    with([0.0, 0.25, 0.0]).refused(&[&parts[..], &["/tf 0.2500 m at [0.000, -0.250"]].concat());
-    with([0.2532, 0.0, 0.0]).refused(&parts);
+    with([-0.25, 0.0, 0.0]).rejected(&[&parts[..], &["/tf 0.2500 m at [0.250"]].concat());
+    with([0.0, 0.25, 0.0]).rejected(&[&parts[..], &["/tf 0.2500 m at [0.000, -0.250"]].concat());
+    with([0.2532, 0.0, 0.0]).rejected(&parts);
     // A drawing is not a calibration.
     assert_eq!(with([0.2518, 0.01, 0.0]).checked().0, 0);
     // One of them alone contradicts nothing.
@@ -259,7 +259,7 @@ fn baselines_that_contradict_each_other() {
     let (code, said) = silent.checked();
     assert!(code == 0 && said.contains("baseline 0.2500 m"), "{said}");
     silent.tf = None;
-    silent.refused(&["no baseline", "P[3]"]);
+    silent.rejected(&["no baseline", "P[3]"]);
 }
 
 /// The images are those of a pinhole: K and P agree, but a lens model r = f·θ does not.
@@ -270,7 +270,7 @@ fn a_fisheye_lens_is_decided_by_the_pixels() {
         assert!(code == 0 && said.contains("taken as rectified ("), "{said}");
     }
     let bag = Bag { model: "double_sphere", ..Bag::sound() };
-    bag.refused(&[
+    bag.rejected(&[
         "the distortion model `double_sphere` is not supported",
         "/cam/left/camera_info",
         "rectify the images",
@@ -288,7 +288,7 @@ fn a_camera_without_a_distortion_model() {
         assert!(code == 0 && said.contains("rectified: K without distortion is P"), "{said}");
     }
     let bag = Bag { model: "none", d: vec![-0.2, 0.05, 0.0, 0.0, 0.0], ..Bag::sound() };
-    bag.refused(&["the distortion model is `none`, but D has 5 numbers", "/cam/left/camera_info"]);
+    bag.rejected(&["the distortion model is `none`, but D has 5 numbers", "/cam/left/camera_info"]);
 }
 
 /// Some drivers publish K [R | t] of the mounted camera as P, others the baseline as P[3]. Fails if only the places of fx, cx
@@ -296,22 +296,22 @@ fn a_camera_without_a_distortion_model() {
 #[test]
 fn a_projection_that_is_not_of_rectified_images() {
     let bag = Bag { skew: 52.4, tf: None, ..Bag::sound() };
-    bag.refused(&["P is not of the form K [I | t]", "/cam/right/camera_info", "publish P of rectified cameras"]);
+    bag.rejected(&["P is not of the form K [I | t]", "/cam/right/camera_info", "publish P of rectified cameras"]);
     let bag = Bag { p: vec![[[500.0, 0.0], [500.0, -0.25]]; 5], tf: None, ..Bag::sound() };
-    bag.refused(&["units? a baseline of 0.0005 m", "P[3] of ROS is −fx·baseline"]);
+    bag.rejected(&["units? a baseline of 0.0005 m", "P[3] of ROS is −fx·baseline"]);
 }
 
 #[test]
 fn a_camera_that_nobody_calibrated() {
     let bag = Bag { p: vec![[[0.0; 2]; 2]; 5], ..Bag::sound() };
-    bag.refused(&["a camera that is not calibrated: K and P are zero", "/cam/left/camera_info", "calibrate it"]);
+    bag.rejected(&["a camera that is not calibrated: K and P are zero", "/cam/left/camera_info", "calibrate it"]);
 }
 
 #[test]
 fn cameras_that_have_changed_places() {
     let mut bag = Bag::sound();
     bag.images.iter_mut().for_each(|pair| pair.reverse());
-    bag.refused(&["exchanged left and right images", "lie behind the cameras", "`left-info`"]);
+    bag.rejected(&["exchanged left and right images", "lie behind the cameras", "`left-info`"]);
     // With calibrations exchanged too they are a valid rig, which is reported.
     bag.p.iter_mut().for_each(|p| p.reverse());
     bag.tf = Some([-0.25, 0.0, 0.0]);
@@ -319,7 +319,7 @@ fn cameras_that_have_changed_places() {
     assert!(code == 0 && said.contains("warning: a left camera to the right of the right camera"), "{said}");
     let mut bag = Bag::sound();
     bag.images[3][1] = bag.images[3][0].clone();
-    bag.refused(&["identical left and right images", "1 of 5 pairs", "one image twice has no depth"]);
+    bag.rejected(&["identical left and right images", "1 of 5 pairs", "one image twice has no depth"]);
 }
 
 #[test]
@@ -337,14 +337,14 @@ fn an_image_that_cannot_be_read_costs_its_pair() {
     assert!(code == 0 && said.contains("warning: ") && said.contains("note: 4 pairs"), "{said}");
     bag.images[2][0].clear();
     bag.images[4][0] = b"no image".to_vec();
-    bag.refused(&["/cam/right/image_rect", "3 of 5 pairs are unreadable; at least half must be readable"]);
+    bag.rejected(&["/cam/right/image_rect", "3 of 5 pairs are unreadable; at least half must be readable"]);
 }
 
 #[test]
 fn a_calibration_that_changes() {
     let mut bag = Bag::sound();
     bag.p[3][0][0] = 501.0;
-    bag.refused(&[
+    bag.rejected(&[
         "a calibration that changes within the recording",
         "/cam/left/camera_info",
         "1700000000300000000 ns",

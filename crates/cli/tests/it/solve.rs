@@ -98,7 +98,7 @@ fn a_missing_level_has_a_reason() {
 }
 
 #[test]
-fn a_solver_of_pixels_is_refused_on_points_alone() {
+fn a_solver_of_pixels_is_rejected_on_points_alone() {
     let folder = tempfile::tempdir().unwrap();
     let file = problem(&folder);
     for name in ["l-bfgs", "nelder-mead", "p3p-stereo", "stereo-reprojection"] {

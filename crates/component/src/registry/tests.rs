@@ -68,7 +68,7 @@ fn an_unknown_key_is_answered_with_the_nearest() {
 }
 
 #[test]
-fn a_value_out_of_range_is_refused() {
+fn a_value_out_of_range_is_rejected() {
     let error = SHAPES.build(&Choice::named("square").with("side-length", -1.0)).unwrap_err();
     assert_eq!(error.to_string(), "shape `square`: side-length = -1; give a positive length");
 }

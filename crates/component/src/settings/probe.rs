@@ -33,7 +33,7 @@ pub(super) struct Probe<'a> {
 
 impl Probe<'_> {
     /// The message by which a value of the setting is refused; `other` is a further setting of its table.
-    pub(super) fn refused(&self, value: &toml::Value, other: Option<(&'static str, toml::Value)>) -> Option<String> {
+    pub(super) fn rejected(&self, value: &toml::Value, other: Option<(&'static str, toml::Value)>) -> Option<String> {
         let mut table = toml::Value::Table(self.base.clone());
         let default = toml::Value::Table(self.defaults.clone());
         if let (Some((key, value)), Some((_, above))) = (other, self.path.split_last()) {

@@ -64,7 +64,7 @@ pub(super) fn range(probe: &Probe<'_>, form: &Form, siblings: &[Field]) -> Range
             };
             let mut found = number(probe, &values, value, siblings);
             if found.words.is_empty() {
-                let nan = probe.refused(&toml::Value::Float(f64::NAN), None);
+                let nan = probe.rejected(&toml::Value::Float(f64::NAN), None);
                 found.words = nan.as_deref().and_then(remedy).unwrap_or("any number").to_owned();
             }
             found
@@ -109,8 +109,8 @@ impl Bound {
 
 /// The range of a text: an empty one may be refused.
 fn text(probe: &Probe<'_>) -> Range {
-    let empty = probe.refused(&"".into(), None);
-    let filled = empty.is_some() && probe.refused(&"x".into(), None) != empty;
+    let empty = probe.rejected(&"".into(), None);
+    let filled = empty.is_some() && probe.rejected(&"x".into(), None) != empty;
     let own = if filled { "a text, not empty" } else { "a text" };
     let words = empty.as_deref().and_then(remedy).unwrap_or(own).to_owned();
     Range { words, filled, ..Range::default() }
@@ -123,25 +123,25 @@ fn number(
     value: impl Fn(f64, i64) -> toml::Value,
     siblings: &[Field],
 ) -> Range {
-    let [low, high] = extremes.each_ref().map(|value| probe.refused(value, None));
+    let [low, high] = extremes.each_ref().map(|value| probe.rejected(value, None));
     let mut words: Vec<&str> = [&low, &high].into_iter().flatten().filter_map(|message| remedy(message)).collect();
     words.dedup();
     let words = words.join("; ");
     let others: Vec<&Field> = siblings.iter().filter(|field| mentions(&words, field.key)).collect();
     // A value may be refused for another reason than the range, such as a product of two settings.
     let out = |value: &toml::Value, other, extreme: &str| {
-        probe.refused(value, other).is_some_and(|message| remedy(&message) == remedy(extreme))
+        probe.rejected(value, other).is_some_and(|message| remedy(&message) == remedy(extreme))
     };
     // The limit is independent of the settings in the message if it stays when they change.
     let fixed = |inside: toml::Value, outside: toml::Value| {
         others.iter().flat_map(|field| changed(probe, field)).all(|(key, other)| {
-            let refused = |value: &toml::Value| probe.refused(value, Some((key, other.clone()))).is_some();
-            refused(&outside) && !refused(&inside)
+            let rejected = |value: &toml::Value| probe.rejected(value, Some((key, other.clone()))).is_some();
+            rejected(&outside) && !rejected(&inside)
         })
     };
     let in_list = probe.path.last() == Some(&Step::Entry);
-    let bound = |refused: &Option<String>, inside: i64| {
-        let extreme = refused.as_ref()?;
+    let bound = |rejected: &Option<String>, inside: i64| {
+        let extreme = rejected.as_ref()?;
         let mut candidates = numbers(&words, in_list);
         // The outermost number; a number that is not a limit is rejected on both sides.
         candidates.sort_by(|a, b| if inside > 0 { a.total_cmp(b) } else { b.total_cmp(a) });

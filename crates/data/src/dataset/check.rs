@@ -108,9 +108,11 @@ pub fn contradictions(dataset: &Dataset) -> Vec<Fault> {
         let view = View::new(site, &dataset.objects, &dataset.rig, dataset.body_from_camera);
         let priors: Vec<_> = dataset.frames.iter().map(|frame| frame.prior.map(|(pose, _)| pose)).collect();
         let truths: Vec<_> = dataset.frames.iter().map(|frame| frame.truth).collect();
-        let sigma = dataset.frames.iter().find_map(|frame| frame.prior).map(|(_, covariance)| {
-            (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
-        });
+        let sigma = dataset
+            .frames
+            .iter()
+            .find_map(|frame| frame.prior)
+            .map(|(_, covariance)| (covariance.position_sigma(), covariance.attitude_sigma()));
         let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
         let survey = View::new(site, &[], &dataset.rig, dataset.body_from_camera);
         faults.extend(poses_faults([&survey, &view], &priors, &truths, sigma, &measured, &file));

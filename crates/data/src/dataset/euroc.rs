@@ -180,7 +180,7 @@ impl Sheet {
     }
 
     fn numbers_of(&self, key: &str, value: &Yaml) -> Result<Vec<f64>, Fault> {
-        let number = |value: &Yaml| value.as_f64().or_else(|| value.as_i64().map(|full| full as f64));
+        let number = |value: &Yaml| value.as_f64().or_else(|| value.as_i64().map(|integer| integer as f64));
         let numbers = value.as_vec().and_then(|list| list.iter().map(number).collect::<Option<Vec<f64>>>());
         numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite())).ok_or_else(|| {
             self.fault(key, format!("`{key}` is not a list of numbers")).remedy("give a sensor.yaml of EuRoC")

@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_lines_are_refused_by_number() {
+    fn bad_lines_are_rejected_by_number() {
         let message = |text: &str| read(text).unwrap_err().to_string();
         assert!(message("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0\n").starts_with("7 columns in truth.tum:2"));
         assert!(message("1.5,0,0,0,0,0,0,1\n").contains("(TUM) or qw qx qy qz (EuRoC)"));

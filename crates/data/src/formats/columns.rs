@@ -241,7 +241,7 @@ mod tests {
 
     /// Fails if an unknown unit counts as metres, or if the first of three units is that of all.
     #[test]
-    fn units_and_directions_are_obeyed_or_refused() {
+    fn units_and_directions_are_obeyed_or_rejected() {
         let found = |header: &str| columns(header, 1, Path::new("a")).unwrap().unwrap();
         for (header, metres) in [
             ("t,x [ft],y [ft],z [ft]", 0.3048),
@@ -254,22 +254,22 @@ mod tests {
         assert_eq!(found("time,easting [m],northing [m],depth [m]").position, [2, 1, 3]);
         assert_eq!(found("time;up;north;east").position, [3, 2, 1]);
         assert_eq!(found("time,x,y,z,depth").position, [1, 2, 3], "the depth is another quantity");
-        let refused = |header: &str| columns(header, 3, Path::new("a")).unwrap_err().to_string();
-        assert!(refused("t,x [in],y [in],z [in]").starts_with("a column in the unit `in`, which is not read in a:3"));
-        assert!(refused("time [h],x,y,z").contains("the unit `h`"));
-        assert!(refused("t,x [m],y [m],z [mm]").contains("different units"));
+        let rejected = |header: &str| columns(header, 3, Path::new("a")).unwrap_err().to_string();
+        assert!(rejected("t,x [in],y [in],z [in]").starts_with("a column in the unit `in`, which is not read in a:3"));
+        assert!(rejected("time [h],x,y,z").contains("the unit `h`"));
+        assert!(rejected("t,x [m],y [m],z [mm]").contains("different units"));
         assert!(
-            refused("time,lat,lon,depth").contains("geographic coordinates")
-                && refused("t,longitude,latitude").contains("UTM")
+            rejected("time,lat,lon,depth").contains("geographic coordinates")
+                && rejected("t,longitude,latitude").contains("UTM")
         );
     }
 
     #[test]
-    fn an_open_order_is_refused() {
-        let refused = |header: &str| columns(header, 3, Path::new("a")).unwrap_err().to_string();
-        assert!(refused("t x y z q0 q1 q2 q3").contains("may be q0 or q3"));
-        assert!(refused("t x y z qx qy qz").contains("without all four parts"));
-        assert!(refused("t x y z x y z qw qx qy qz").contains("named twice"));
+    fn an_open_order_is_rejected() {
+        let rejected = |header: &str| columns(header, 3, Path::new("a")).unwrap_err().to_string();
+        assert!(rejected("t x y z q0 q1 q2 q3").contains("may be q0 or q3"));
+        assert!(rejected("t x y z qx qy qz").contains("without all four parts"));
+        assert!(rejected("t x y z x y z qw qx qy qz").contains("named twice"));
         assert_eq!(columns("# ground truth of the walk", 1, Path::new("a")), Ok(None));
         assert_eq!((states_w_first("# quaternion order: w, x, y, z"), states_w_first("# poses")), (Some(true), None));
     }

@@ -351,6 +351,6 @@ impl Reader<'_> {
 
 /// A whole number, also with decimals that are zero.
 fn integer(cell: &str) -> Option<u64> {
-    let (full, part) = cell.split_once('.').unwrap_or((cell, ""));
-    full.parse().ok().filter(|_| part.bytes().all(|byte| byte == b'0'))
+    let (integer, fraction) = cell.split_once('.').unwrap_or((cell, ""));
+    integer.parse().ok().filter(|_| fraction.bytes().all(|byte| byte == b'0'))
 }

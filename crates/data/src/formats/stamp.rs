@@ -6,12 +6,12 @@ pub(crate) fn nanoseconds(word: &str) -> Option<u64> {
         let seconds: f64 = word.parse().ok()?;
         return (seconds.is_finite() && (0.0..1.8e10).contains(&seconds)).then(|| (seconds * 1e9).round() as u64);
     }
-    let (full, part) = word.split_once('.').unwrap_or((word, ""));
-    if !part.bytes().all(|b| b.is_ascii_digit()) {
+    let (integer, fraction) = word.split_once('.').unwrap_or((word, ""));
+    if !fraction.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
-    let nanos: u64 = format!("{:0<9.9}", part).parse().ok()?;
-    full.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
+    let nanos: u64 = format!("{:0<9.9}", fraction).parse().ok()?;
+    integer.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nanos)
 }
 
 #[cfg(test)]

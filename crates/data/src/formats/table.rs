@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_rows_are_skipped_and_two_readings_refused() {
+    fn empty_rows_are_skipped_and_two_readings_rejected() {
         let table = read("a,1\n,,\n\nb,2\n,\n").unwrap();
         assert_eq!((table.rows.len(), table.rows[1].line), (2, 4));
         assert!(read("a;1,250\nb;2.5\n").unwrap_err().contains("may be decimal or separate thousands"));

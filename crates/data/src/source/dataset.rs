@@ -153,7 +153,7 @@ impl Sequence for Recorded {
 
     fn prior_sigma(&self) -> Option<(f64, f64)> {
         let (_, covariance) = self.dataset.frames.iter().find_map(|frame| frame.prior)?;
-        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
+        Some((covariance.position_sigma(), covariance.attitude_sigma()))
     }
 
     fn warnings(&self) -> &[Fault] {

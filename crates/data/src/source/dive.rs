@@ -84,7 +84,7 @@ impl Sequence for Dived {
 
     fn prior_sigma(&self) -> Option<(f64, f64)> {
         let (_, covariance) = (0..self.frames()).find_map(|index| self.mission.instant(index).prior)?;
-        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
+        Some((covariance.position_sigma(), covariance.attitude_sigma()))
     }
 
     fn pixel_sigma(&self) -> Option<f64> {

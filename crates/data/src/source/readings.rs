@@ -44,12 +44,12 @@ pub(super) fn tables(mission: &PlannedMission) -> Vec<(String, String)> {
     let noise = Noise::of(mission);
     let with_sigma = |v: &Vector3<f64>, sigma: f64| v.iter().copied().chain([sigma]).collect();
     let doppler = table(&format!("{},sigma", axes("v")), &readings.doppler, mission, |v| with_sigma(v, noise.doppler));
-    let gyro = table(&format!("{},sigma", axes("w")), &readings.attitude, mission, |message| {
-        with_sigma(&message.rate, noise.gyro)
+    let gyro = table(&format!("{},sigma", axes("w")), &readings.attitude, mission, |reading| {
+        with_sigma(&reading.rate, noise.gyro)
     });
-    let attitude = table(&format!("{},qx,qy,qz,qw", axes("w")), &readings.attitude, mission, |message| {
-        let q = message.world_from_body;
-        message.rate.iter().copied().chain([q.i, q.j, q.k, q.w]).collect()
+    let attitude = table(&format!("{},qx,qy,qz,qw", axes("w")), &readings.attitude, mission, |reading| {
+        let q = reading.world_from_body;
+        reading.rate.iter().copied().chain([q.i, q.j, q.k, q.w]).collect()
     });
     let depth = table("depth", &readings.depth, mission, |depth| vec![*depth]);
     let places = mission.waypoints().into_iter().map(|[north, east, height]| format!("{north},{east},{height}\n"));
@@ -79,8 +79,8 @@ fn lbl(mission: &PlannedMission) -> Vec<(&'static str, String)> {
     }
     for answer in mission.readings().lbl {
         let [stamp, arrival] = [answer.time, answer.arrival].map(|time| mission.stamp(time));
-        let (sensor_buffer, fix) = &answer.value;
-        for (k, range) in sensor_buffer.0.iter().take(places.len()).enumerate() {
+        let (received, fix) = &answer.value;
+        for (k, range) in received.0.iter().take(places.len()).enumerate() {
             if let Some(range) = range {
                 put(&mut ranges, format_args!("{stamp},{arrival},{k},{range}"));
             }
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn tables_hold_the_readings_to_the_bit() {
         let mission = mission();
-        let message = mission.readings();
+        let readings = mission.readings();
         let tables: BTreeMap<String, (String, Vec<Vec<String>>)> =
             tables(&mission).into_iter().map(|(name, text)| (name, read(&text))).collect();
         let names: Vec<&str> = tables.keys().map(String::as_str).collect();
@@ -185,32 +185,32 @@ mod tests {
         check!(
             "acoustic.csv",
             "north,east,down,sigma",
-            message.acoustic,
+            readings.acoustic,
             |fix: &seafix_simulation::sensors::AcousticFix| vec![fix.at.x, fix.at.y, fix.at.z, fix.sigma]
         );
-        check!("depth.csv", "depth", message.depth, |depth: &f64| vec![*depth]);
-        check!("doppler.csv", "vx,vy,vz,sigma", message.doppler, |v: &Vector3<f64>| vec![v.x, v.y, v.z, 0.004]);
+        check!("depth.csv", "depth", readings.depth, |depth: &f64| vec![*depth]);
+        check!("doppler.csv", "vx,vy,vz,sigma", readings.doppler, |v: &Vector3<f64>| vec![v.x, v.y, v.z, 0.004]);
         let sigma = mission.settings().sensors.attitude.rate_sigma();
         type Attitude = seafix_simulation::sensors::AttitudeReading;
-        check!("gyro.csv", "wx,wy,wz,sigma", message.attitude, |message: &Attitude| vec![
-            message.rate.x,
-            message.rate.y,
-            message.rate.z,
+        check!("gyro.csv", "wx,wy,wz,sigma", readings.attitude, |reading: &Attitude| vec![
+            reading.rate.x,
+            reading.rate.y,
+            reading.rate.z,
             sigma
         ]);
-        check!("attitude.csv", "wx,wy,wz,qx,qy,qz,qw", message.attitude, |message: &Attitude| {
-            let q = message.world_from_body;
-            vec![message.rate.x, message.rate.y, message.rate.z, q.i, q.j, q.k, q.w]
+        check!("attitude.csv", "wx,wy,wz,qx,qy,qz,qw", readings.attitude, |reading: &Attitude| {
+            let q = reading.world_from_body;
+            vec![reading.rate.x, reading.rate.y, reading.rate.z, q.i, q.j, q.k, q.w]
         });
         // The received ranges, and the position that they determine.
-        let sensor_buffer = message.lbl.iter().map(|answer| answer.value.0.0.iter().flatten().count()).sum::<usize>();
+        let received = readings.lbl.iter().map(|answer| answer.value.0.0.iter().flatten().count()).sum::<usize>();
         assert_eq!(
             (&tables["ranges.csv"].0[..], tables["ranges.csv"].1.len()),
-            ("stamp_ns,arrival_ns,transponder,range", sensor_buffer)
+            ("stamp_ns,arrival_ns,transponder,range", received)
         );
-        let first = message.lbl.iter().flat_map(|a| a.value.0.0).flatten().next().unwrap();
+        let first = readings.lbl.iter().flat_map(|a| a.value.0.0).flatten().next().unwrap();
         assert_eq!(number(&tables["ranges.csv"].1[0][3]), first);
-        let fixes = message.lbl.iter().filter_map(|answer| answer.value.1.as_ref()).collect::<Vec<_>>();
+        let fixes = readings.lbl.iter().filter_map(|answer| answer.value.1.as_ref()).collect::<Vec<_>>();
         assert_eq!(tables["lbl.csv"].1.len(), fixes.len());
         assert_eq!(number(&tables["lbl.csv"].1[0][2]), fixes[0].at.x);
         let places: Vec<Vec<f64>> =

@@ -87,9 +87,9 @@ impl Recorded {
         let of = |poses: &[Stamped<World, Camera>]| -> Vec<_> {
             bag.pairs.iter().map(|(stamp, _)| between(poses, *stamp, settings.gap_ns())).collect()
         };
-        let sigma = covariances.first().map(|covariance: &Covariance6<World, Camera>| {
-            (covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt())
-        });
+        let sigma = covariances
+            .first()
+            .map(|covariance: &Covariance6<World, Camera>| (covariance.position_sigma(), covariance.attitude_sigma()));
         let inspected = &bag.inspected;
         let measured: Vec<_> = inspected.iter().map(|(index, seen)| MeasuredPair::new(&view, *index, seen)).collect();
         let (priors, truths) = (of(&prior), of(&truth));
@@ -131,7 +131,7 @@ impl Sequence for Recorded {
 
     fn prior_sigma(&self) -> Option<(f64, f64)> {
         let covariance = self.covariances.first()?;
-        Some((covariance.position_sigma() / 3f64.sqrt(), covariance.attitude_sigma() / 3f64.sqrt()))
+        Some((covariance.position_sigma(), covariance.attitude_sigma()))
     }
 
     fn warnings(&self) -> &[Fault] {

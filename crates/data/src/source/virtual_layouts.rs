@@ -113,9 +113,9 @@ impl Source for VirtualLayouts {
             let layout = Layout { shape, points, number: number as u64, distance, sigma_px, model_sigma, rig };
             layout.place(seed)
         };
-        let refused =
+        let rejected =
             |error: seafix_simulation::BadDive| vec![Fault::new(error.to_string(), Path::new("the source's settings"))];
-        let placed: Vec<Placed> = (0..self.layouts).map(place).collect::<Result<_, _>>().map_err(refused)?;
+        let placed: Vec<Placed> = (0..self.layouts).map(place).collect::<Result<_, _>>().map_err(rejected)?;
         let bounds = placed.iter().map(|placed| self.bound(placed)).collect();
         let all = placed.iter().enumerate();
         let (objects, stand): (Vec<SiteObject>, Vec<Transform<World, Object>>) =

@@ -125,7 +125,7 @@ fn a_right_mark_that_the_images_contradict_is_reported() {
 }
 
 #[test]
-fn marks_that_mean_no_point_are_refused_with_their_line() {
+fn marks_that_mean_no_point_are_rejected_with_their_line() {
     let sequence = sample();
     let (_, text) = marks(&*sequence, 2, 1.0, true);
     let rejection = |text: &str, base: Option<[&str; 3]>| {

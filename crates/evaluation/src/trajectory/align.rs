@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_and_a_point_are_refused() {
+    fn a_line_and_a_point_are_rejected() {
         let line = [0.0, 1.0, 2.0, 5.0].map(|x| at([x, 2.0 * x, -x]));
         assert!(matches!(align(&line, &line, false), Err(UndeterminedAlignment::OneLine { .. })));
         let point = [at([7.0; 3]); 5];

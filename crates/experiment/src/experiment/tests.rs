@@ -62,6 +62,20 @@ fn the_command_line_has_the_last_word() {
 }
 
 #[test]
+fn a_setting_of_the_pipeline_needs_no_prefix_and_may_have_it() {
+    let experiment: Experiment = toml::from_str("question = 'why'\nsource = 'virtual-points'").unwrap();
+    let settings = ["detector.features=2000", "acceptance.max-p-wrong=5e-3"];
+    let with = |prefix: &str| settings.map(|setting| format!("{prefix}{setting}"));
+    let full = super::changed(experiment.clone(), &with("pipeline.")).unwrap();
+    assert_eq!(super::changed(experiment, &with("")).unwrap(), full);
+    let pipeline = PipelineSettings::default();
+    for prefix in ["", "pipeline."] {
+        let changed = sweep::changed_pipeline(&pipeline, &with(prefix)).unwrap();
+        assert_eq!((&changed.detector, &changed.acceptance), (&full.pipeline.detector, &full.pipeline.acceptance));
+    }
+}
+
+#[test]
 fn faults_name_their_line() {
     let message = |text: &str| plan(text).unwrap_err();
     assert_eq!(

@@ -39,12 +39,12 @@ pub(crate) struct TrialRows {
     pub(crate) cells: Vec<Value>,
 }
 
-/// Writes the rows of all `stretches`, in order, below one header. Every row ends with the cells of its trial on the
+/// Writes all `rows`, in order, below one header. Every row ends with the cells of its trial on the
 /// `axes`.
-pub(crate) fn join_csv(stretches: &[TrialRows], axes: &Axes, to: &Path) -> io::Result<()> {
+pub(crate) fn join_csv(rows: &[TrialRows], axes: &Axes, to: &Path) -> io::Result<()> {
     let mut all = BufWriter::with_capacity(1 << 18, File::create(to)?);
     all.write_all(Table::head(axes).as_bytes())?;
-    for TrialRows { csv, text: (start, length), cells, .. } in stretches {
+    for TrialRows { csv, text: (start, length), cells, .. } in rows {
         let mut piece = File::open(csv)?;
         piece.seek(SeekFrom::Start(*start))?;
         let copied = match csv_end(cells) {
@@ -83,12 +83,12 @@ fn lengthen(mut lines: impl BufRead, end: &[u8], to: &mut impl Write) -> io::Res
 /// The number of rows below which a row group is merged with others.
 const SMALL: usize = ROW_GROUP / 8;
 
-/// Writes the rows of all `stretches`, in order. Large row groups are copied unchanged. Small ones are merged, so that
+/// Writes all `rows`, in order. Large row groups are copied unchanged. Small ones are merged, so that
 /// a table of many small pieces has few row groups.
-pub(crate) fn join_parquet(stretches: &[TrialRows], axes: &Axes, to: &Path) -> Result<(), ParquetError> {
+pub(crate) fn join_parquet(rows: &[TrialRows], axes: &Axes, to: &Path) -> Result<(), ParquetError> {
     let mut all = table::create(to, axes)?;
     let mut waiting = Table::with(axes);
-    for TrialRows { parquet, groups: (first, count), cells, .. } in stretches {
+    for TrialRows { parquet, groups: (first, count), cells, .. } in rows {
         let file = File::open(parquet)?;
         let read = SerializedFileReader::new(file.try_clone()?)?;
         for group in *first..first + count {
@@ -141,7 +141,7 @@ mod tests {
     use std::fs;
 
     fn frame(number: u64, object: &str) -> FrameRecord {
-        let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "absent");
+        let mut target = TargetRecord::rejected(object, "maximum-clique", "kabsch", "absent");
         target.evaluation.visible = (!number.is_multiple_of(3)).then_some(4);
         target.residual_rms = Some(number as f64 / 7.0);
         FrameRecord { frame: number, stamp_ns: 7, targets: vec![target], ..Default::default() }

@@ -258,7 +258,7 @@ mod tests {
     fn a_row_is_a_line_and_unknown_is_empty() {
         let mut table = Table::default();
         for object in ["a,b", "=1+1"] {
-            let mut target = TargetRecord::refused(object, "maximum-clique", "kabsch", "absent");
+            let mut target = TargetRecord::rejected(object, "maximum-clique", "kabsch", "absent");
             target.evaluation.visible = Some(4);
             let frame = FrameRecord { frame: 2, stamp_ns: 7, targets: vec![target], ..Default::default() };
             table.add("001", &frame);

@@ -30,23 +30,23 @@ pub(super) fn assemble(
     observer: &dyn Observer,
 ) -> Result<bool, RunError> {
     let axes = manifest.axis_columns();
-    let mut stretches = Vec::new();
+    let mut rows = Vec::new();
     let mut outputs: Vec<Output> = Vec::new();
     for trial in &manifest.trials {
         let of_trial: Vec<(&Sealed, TrialRows)> =
-            pieces.iter().filter_map(|piece| Some((piece, piece.scale_error(&trial.name)?))).collect();
+            pieces.iter().filter_map(|piece| Some((piece, piece.rows_of(&trial.name)?))).collect();
         let logs = of_trial.iter().map(|(piece, _)| piece.log(&trial.name)).collect();
         outputs.push(Output { path: folder.join(&trial.log), kind: Kind::Log(logs) });
         // The pose graph is complete after the last frame; a navigated source is one piece.
-        if let Some(graph_text) = of_trial.iter().find_map(|(piece, _)| piece.pose_graph(&trial.name)) {
-            outputs.push(Output { path: folder.join(pose_graph(&trial.name)), kind: Kind::PoseGraph(graph_text) });
+        if let Some(graph) = of_trial.iter().find_map(|(piece, _)| piece.pose_graph(&trial.name)) {
+            outputs.push(Output { path: folder.join(pose_graph(&trial.name)), kind: Kind::PoseGraph(graph) });
         }
         let cells = axes.cells(&trial.values);
-        stretches.extend(of_trial.into_iter().map(|(_, rows)| TrialRows { cells: cells.clone(), ..rows }));
+        rows.extend(of_trial.into_iter().map(|(_, own)| TrialRows { cells: cells.clone(), ..own }));
     }
-    manifest.rows = stretches.iter().map(|scale_error| scale_error.rows).sum();
-    outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&stretches, &axes) });
-    outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&stretches, &axes) });
+    manifest.rows = rows.iter().map(|part| part.rows).sum();
+    outputs.push(Output { path: folder.join("results.csv"), kind: Kind::Csv(&rows, &axes) });
+    outputs.push(Output { path: folder.join("results.parquet"), kind: Kind::Parquet(&rows, &axes) });
 
     let hashes: Result<Vec<Option<(String, String)>>, RunError> =
         pool.install(|| outputs.par_iter().map(|output| output.write(observer)).collect());
@@ -81,14 +81,12 @@ impl Output<'_> {
                     return Ok(None);
                 }
             }
-            Kind::PoseGraph(graph_text) => {
-                self.complete(|path| fs::copy(graph_text, path).map(drop).map_err(|error| error.to_string()))?
+            Kind::PoseGraph(graph) => {
+                self.complete(|path| fs::copy(graph, path).map(drop).map_err(|error| error.to_string()))?
             }
-            Kind::Csv(stretches, axes) => {
-                self.complete(|path| join_csv(stretches, axes, path).map_err(|e| e.to_string()))?
-            }
-            Kind::Parquet(stretches, axes) => {
-                self.complete(|path| join_parquet(stretches, axes, path).map_err(|e| e.to_string()))?
+            Kind::Csv(rows, axes) => self.complete(|path| join_csv(rows, axes, path).map_err(|e| e.to_string()))?,
+            Kind::Parquet(rows, axes) => {
+                self.complete(|path| join_parquet(rows, axes, path).map_err(|e| e.to_string()))?
             }
         }
         let name = self.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());

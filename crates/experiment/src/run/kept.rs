@@ -85,12 +85,12 @@ pub fn remake(
         let end = values.map_or_else(String::new, |values| csv_end(&axes.cells(values)));
         let made = rows(&sealed, name).map_err(|error| RunError::unwritable(scratch.0, error))?;
         if !made.lines().all(|line| lines.contains(&(without(line, own) + &end))) {
-            differing.push(format!("{name}: rows of {}", message(group, &piece)));
+            differing.push(format!("{name}: rows of {}", frame_range(group, &piece)));
         }
         changed(&folder.join(format!("{name}.mcap")))?;
         let (made, log) = (Reader::open(&sealed.log(name))?, Reader::open(&folder.join(format!("{name}.mcap")))?);
         if !in_log(made, log)? {
-            differing.push(format!("{name}: logged frames among {}", message(group, &piece)));
+            differing.push(format!("{name}: logged frames among {}", frame_range(group, &piece)));
         }
     }
     Ok(Remade { frames: piece.frames() * group.trials.len(), differing })
@@ -115,14 +115,14 @@ impl Drop for Scratch<'_> {
     }
 }
 
-fn message(group: &group::Group<'_>, piece: &Piece) -> String {
+fn frame_range(group: &group::Group<'_>, piece: &Piece) -> String {
     let number = |index: usize| group.sequence.number(index);
     format!("frames {} to {}", number(piece.first), number(piece.end.max(piece.first + 1) - 1))
 }
 
 /// The rows of a trial as text.
 fn rows(sealed: &Sealed, trial: &str) -> std::io::Result<String> {
-    let Some(TrialRows { csv, text: (start, length), .. }) = sealed.scale_error(trial) else {
+    let Some(TrialRows { csv, text: (start, length), .. }) = sealed.rows_of(trial) else {
         return Ok(String::new());
     };
     let (mut file, mut text) = (File::open(csv)?, String::new());

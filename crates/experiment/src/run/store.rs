@@ -82,7 +82,7 @@ impl Sealed {
     }
 
     /// The rows of a trial, if this piece has any.
-    pub(super) fn scale_error(&self, trial: &str) -> Option<TrialRows> {
+    pub(super) fn rows_of(&self, trial: &str) -> Option<TrialRows> {
         let part = self.seal.trials.iter().find(|part| part.name == trial)?;
         let (csv, parquet) = (self.folder.join(CSV), self.folder.join(PARQUET));
         let cells = Vec::new();

@@ -163,13 +163,13 @@ fn attempts_by_the_model_are_the_same_for_all_features() {
 #[test]
 fn points_are_not_switched_off_without_edges() {
     let folder = TempDir::new().unwrap();
-    let refused = |setting: &str| {
+    let rejected = |setting: &str| {
         let settings = ["pipeline.points=off".to_owned(), setting.to_owned()];
         fs::write(folder.path().join("e.toml"), EXPERIMENT).unwrap();
         let faults = Plan::read(&folder.path().join("e.toml"), &settings).unwrap_err();
         faults.iter().map(|fault| fault.to_string() + "\n").collect::<String>()
     };
-    assert!(refused("pipeline.edges=off").contains("switch one of them on"), "{}", refused("pipeline.edges=off"));
-    assert!(refused("pipeline.solver=kabsch").contains("the solver `kabsch` takes no edges"));
-    assert!(refused("pipeline.search=icp").contains("the search `icp` takes no edges"));
+    assert!(rejected("pipeline.edges=off").contains("switch one of them on"), "{}", rejected("pipeline.edges=off"));
+    assert!(rejected("pipeline.solver=kabsch").contains("the solver `kabsch` takes no edges"));
+    assert!(rejected("pipeline.search=icp").contains("the search `icp` takes no edges"));
 }

@@ -176,8 +176,8 @@ fn a_site_makes_them_sources() {
     let of = |name: &str| columns[0].iter().position(|column| *column == name).unwrap();
     assert!(columns.iter().any(|row| row[of(outcome)] == "fix"), "{table}");
     assert!(columns.iter().all(|row| row[of(wrong)] != "true"), "a wrong fix: {table}");
-    let refused = Plan::read(&file, &["source.site=".to_owned()]).unwrap_err();
-    assert!(refused[0].to_string().contains("the file of a site"), "{}", refused[0]);
+    let rejected = Plan::read(&file, &["source.site=".to_owned()]).unwrap_err();
+    assert!(rejected[0].to_string().contains("the file of a site"), "{}", rejected[0]);
 }
 
 #[test]

@@ -64,7 +64,7 @@ fn a_pose_graph_goes_from_run_to_run() {
 
 /// A pose graph file that is missing, invalid, or another than expected is rejected in one line.
 #[test]
-fn a_pose_graph_that_is_not_meant_is_refused() {
+fn a_pose_graph_that_is_not_meant_is_rejected() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("none.pose-graph"), "{\"format\": 3}\n").unwrap();
     let message = |pose_graph: &str| {

@@ -118,10 +118,10 @@ fn another_detector_needs_the_images() {
     let points = TempDir::new().unwrap();
     let (_, log) = logged(points.path(), EXPERIMENTS[0].1, &[]);
     let plan = replay.plan(&log).unwrap();
-    let refused = run(&plan, &Options { threads: 1, ..Options::into(points.path().join("out")) }, &Silent)
+    let rejected = run(&plan, &Options { threads: 1, ..Options::into(points.path().join("out")) }, &Silent)
         .unwrap_err()
         .to_string();
-    assert!(refused.contains("a log without images"), "{refused}");
+    assert!(rejected.contains("a log without images"), "{rejected}");
 }
 
 #[test]
@@ -156,8 +156,8 @@ fn a_damaged_log_is_not_replayed() {
     assert!(message(&bytes[..bytes.len() - 30]).contains("no footer"));
     let mut flipped = bytes.clone();
     flipped[bytes.len() / 2] ^= 1;
-    let refused = message(&flipped);
-    assert!(refused.contains("damaged") && refused.contains("byte"), "{refused}");
+    let rejected = message(&flipped);
+    assert!(rejected.contains("damaged") && rejected.contains("byte"), "{rejected}");
     assert!(message(b"SQLite format 3\0").contains("ROS 2 bag in SQLite"));
     assert!(!folder.path().join("out").exists());
 }

@@ -87,7 +87,7 @@ fn the_derivative_is_that_of_the_projection() {
 }
 
 #[test]
-fn a_thin_prism_is_opencv_s_and_a_tilted_sensor_refused() {
+fn a_thin_prism_is_opencv_s_and_a_tilted_sensor_rejected() {
     let numbers = [0.31, -0.12, 0.0011, -0.0007, 0.02, 0.28, -0.1, 0.03, 0.0009, -0.0004, -0.0012, 0.0003, 0.0, 0.0];
     let expected = [
         [425.0138285108613, 399.93908587177026],

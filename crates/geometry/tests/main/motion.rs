@@ -70,8 +70,10 @@ fn a_covariance_by_hand() {
     let covariance = Covariance6::<Object, Camera>::isotropic(0.1, 3.0);
     let wanted = Matrix6::from_diagonal(&Vector6::new(0.01, 0.01, 0.01, 9.0, 9.0, 9.0));
     assert!((covariance.matrix - wanted).amax() < 1e-16);
-    assert!((covariance.attitude_sigma() - 0.1 * 3f64.sqrt()).abs() < 1e-15);
-    assert!((covariance.position_sigma() - 3.0 * 3f64.sqrt()).abs() < 1e-15);
+    assert!((covariance.attitude_sigma() - 0.1).abs() < 1e-15);
+    assert!((covariance.position_sigma() - 3.0).abs() < 1e-15);
+    assert!((covariance.attitude_rms() - 0.1 * 3f64.sqrt()).abs() < 1e-15);
+    assert!((covariance.position_rms() - 3.0 * 3f64.sqrt()).abs() < 1e-15);
     let at = covariance.of_point(&Point::new(0.0, 0.0, 3.0));
     assert!((at - Matrix3::from_diagonal(&Vector3::new(9.09, 9.09, 9.0))).amax() < 1e-14);
     let point = UncertainPoint::isotropic(Point::<Camera>::origin(), 3.0);

@@ -191,7 +191,7 @@ fn parallel_rays_meet_nowhere() {
 
 /// A point with a standard deviation as large as its distance is rejected: σ_z = z² σ_d / (f b), √2 σ = σ_d.
 #[test]
-fn a_point_less_known_than_far_is_refused() {
+fn a_point_less_known_than_far_is_rejected() {
     let rig = aside([0.0; 3], [-0.3, 0.0, 0.0]);
     let at = |fraction: f64| {
         // At 30 m the standard deviation of the depth is 6 σ_d m.

@@ -238,7 +238,7 @@ mod tests {
         read_image(&path, size, bits, limits).map_err(|fault| fault.to_string())
     }
 
-    fn refused(name: &str, bytes: &[u8], parts: &[&str]) {
+    fn rejected(name: &str, bytes: &[u8], parts: &[&str]) {
         let message = read(name, bytes, [8, 6], 16).unwrap_err();
         for part in [&[name], parts].concat() {
             assert!(message.contains(part), "no `{part}` in {message}");
@@ -316,16 +316,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_still_image_of_light_is_refused_by_name() {
+    fn what_is_no_still_image_of_light_is_rejected_by_name() {
         let glass: Vec<u8> = (0..48).flat_map(|i| [100, 200 + i]).collect();
-        refused("a.png", &png(&glass, (ColorType::GrayscaleAlpha, BitDepth::Eight)), &["transparent pixels"]);
+        rejected("a.png", &png(&glass, (ColorType::GrayscaleAlpha, BitDepth::Eight)), &["transparent pixels"]);
         // The chunk that announces an animation follows the 33 bytes of signature and header.
         let mut moving = png(&[7; 48], GREY);
         let frames = [0, 0, 0, 8, b'a', b'c', b'T', b'L', 0, 0, 0, 2, 0, 0, 0, 0, 0xF3, 0x8D, 0x93, 0x70];
         moving.splice(33..33, frames);
-        refused("a.png", &moving, &["a moving image"]);
-        refused("a.png", b"GIF", &["PNG, JPEG, TIFF or PNM"]);
-        refused("a.png", b"", &["PNG, JPEG, TIFF or PNM"]);
+        rejected("a.png", &moving, &["a moving image"]);
+        rejected("a.png", b"GIF", &["PNG, JPEG, TIFF or PNM"]);
+        rejected("a.png", b"", &["PNG, JPEG, TIFF or PNM"]);
     }
 
     /// Fails if a format is one among all unknown ones.
@@ -342,12 +342,12 @@ mod tests {
             (b"version https://git-lfs.github.com/spec/v1\noid sha256:0", ["Git LFS", "git lfs pull"]),
             (b"<!DOCTYPE html><html>", ["a page of text", "download the file again"]),
         ] {
-            refused("a.jpg", bytes, &[&["an image of a format that is not read in"], &parts[..]].concat());
+            rejected("a.jpg", bytes, &[&["an image of a format that is not read in"], &parts[..]].concat());
         }
     }
 
     #[test]
-    fn a_truncated_image_is_refused_wherever_it_ends() {
+    fn a_truncated_image_is_rejected_wherever_it_ends() {
         let samples: Vec<u8> = (0..48_usize).map(|i| (i * 37 % 251) as u8).collect();
         for (name, complete) in [("a.png", png(&samples, GREY)), ("a.jpg", jpeg(&samples)), ("a.pgm", pgm(&samples))] {
             assert!(read(name, &complete, [8, 6], 16).is_ok());
@@ -397,9 +397,9 @@ mod tests {
     }
 
     #[test]
-    fn huge_and_empty_sizes_are_refused_from_the_header() {
-        refused("a.pgm", b"P5 0 0 255\n", &["a.pgm"]);
-        refused(
+    fn huge_and_empty_sizes_are_rejected_from_the_header() {
+        rejected("a.pgm", b"P5 0 0 255\n", &["a.pgm"]);
+        rejected(
             "a.pgm",
             b"P5 100000 100000 255\n1234",
             &["an image too large", "100000×100000; the limit is 67108864 pixels"],
@@ -412,11 +412,11 @@ mod tests {
             bytes
         };
         for (width, height) in [(8_000_000, 4_000_000_000), (60_000, 60_000), (0, 6)] {
-            refused("a.png", &header(width, height), &[]);
+            rejected("a.png", &header(width, height), &[]);
         }
         let mut jpeg = self::jpeg(&[7; 48]);
         let frame = jpeg.windows(2).position(|pair| pair == [0xFF, 0xC0]).unwrap();
         jpeg[frame + 5..frame + 9].fill(0xFF);
-        refused("a.jpg", &jpeg, &["an image too large", "65535×65535"]);
+        rejected("a.jpg", &jpeg, &["an image too large", "65535×65535"]);
     }
 }

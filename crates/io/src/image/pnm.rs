@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_ends_early_is_refused() {
+    fn a_file_that_ends_early_is_rejected() {
         let others: [&[u8]; 8] = [
             b"P1 3 2 1 0 1 0 1",
             b"P4 3 2\n\xA0",

@@ -63,9 +63,9 @@ pub struct TargetRecord {
 }
 
 impl TargetRecord {
-    /// The row of `object`, attempted with this search and solver, refused for `reason`, with all that
+    /// The row of `object`, attempted with this search and solver, rejected for `reason`, with all that
     /// is unknown left empty.
-    pub fn refused(object: &str, search: &str, solver: &str, reason: &str) -> Self {
+    pub fn rejected(object: &str, search: &str, solver: &str, reason: &str) -> Self {
         Self {
             object: object.to_owned(),
             search: search.to_owned(),
@@ -96,7 +96,7 @@ impl TargetRecord {
 
     /// The row of a frame that attempted no target, for `reason` (`no-data`, `nothing-in-view`).
     pub fn not_attempted(search: &str, solver: &str, reason: &str) -> Self {
-        Self::refused("", search, solver, reason)
+        Self::rejected("", search, solver, reason)
     }
 
     /// Whether this row is an attempt at a target.

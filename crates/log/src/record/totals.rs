@@ -129,7 +129,7 @@ impl Totals {
     }
 
     /// Attempts that gave no fix.
-    pub fn refused(&self) -> u64 {
+    pub fn rejected(&self) -> u64 {
         self.reasons.values().sum()
     }
 }

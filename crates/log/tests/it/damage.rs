@@ -62,7 +62,7 @@ fn other_files_are_named_for_what_they_are() {
 }
 
 #[test]
-fn another_programs_log_is_refused() {
+fn another_programs_log_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.mcap");
     let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();

@@ -41,7 +41,7 @@ fn where_parts_end_leaves_no_trace() {
 }
 
 #[test]
-fn a_part_of_another_trial_is_refused() {
+fn a_part_of_another_trial_is_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     write(&at("a.mcap"), 0..2, true);

@@ -231,7 +231,7 @@ fn what_has_no_reader_is_not_written() {
 }
 
 #[test]
-fn what_is_no_log_is_refused_and_nothing_is_left() {
+fn what_is_no_log_is_rejected_and_nothing_is_left() {
     let folder = tempfile::tempdir().unwrap();
     let (from, to) = (folder.path().join("x.mcap"), folder.path().join("y.mcap"));
     for bytes in [&b"PK\x03\x04"[..], mcap::MAGIC] {

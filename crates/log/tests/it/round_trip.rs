@@ -112,7 +112,7 @@ fn totals_come_back_after_the_last_frame() {
         totals.add(&frame);
         writer.frame(&frame).unwrap();
     }
-    assert_eq!((totals.frames, totals.attempted, totals.found, totals.refused()), (4, 6, 3, 3));
+    assert_eq!((totals.frames, totals.attempted, totals.found, totals.rejected()), (4, 6, 3, 3));
     assert_eq!(totals.regions, Some([3, 0, 0, 0, 0, 0]), "an error of 10 mm, a level of 30, a limit of 50");
     let mut twice = totals.clone();
     twice.merge(&totals);
@@ -138,7 +138,7 @@ fn a_dropped_writer_leaves_nothing() {
 }
 
 #[test]
-fn records_that_contradict_themselves_are_refused() {
+fn records_that_contradict_themselves_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let mut writer = Writer::create(&folder.path().join("t.mcap"), &synthetic::header()).unwrap();
     writer.frame(&synthetic::frame(1)).unwrap();

@@ -96,7 +96,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
             }),
         })
         .collect();
-    let mut fixed = TargetRecord::refused("A", "maximum-clique", "kabsch", "");
+    let mut fixed = TargetRecord::rejected("A", "maximum-clique", "kabsch", "");
     fixed.outcome = Outcome::Fix;
     fixed.object_from_camera = Some(at(value(1), value(2), -3.0));
     let mut covariance = [[0.0; 6]; 6];
@@ -148,10 +148,10 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
     };
     fixed.times =
         TargetTimes { candidates_ms: Some(0.1), search_ms: Some(0.2), solve_ms: None, total_ms: Some(12.0 + value(9)) };
-    let mut refused = TargetRecord::refused("B", "maximum-clique", "kabsch", "too-few");
-    refused.explanation = "2 points".to_owned();
-    (refused.p_absent, refused.p_wrong) = (Some(0.25), Some(0.5));
-    refused.best = Some(BestPose {
+    let mut rejected = TargetRecord::rejected("B", "maximum-clique", "kabsch", "too-few");
+    rejected.explanation = "2 points".to_owned();
+    (rejected.p_absent, rejected.p_wrong) = (Some(0.25), Some(0.5));
+    rejected.best = Some(BestPose {
         object_from_camera: at(0.1, 0.2, -4.0),
         covariance: Some(covariance),
         pairs: vec![Pair { model: 3, cloud: 2 }, Pair { model: 0, cloud: 4 }],
@@ -173,7 +173,7 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         targets: if number == 3 {
             vec![TargetRecord::not_attempted("maximum-clique", "kabsch", "nothing-in-view")]
         } else {
-            vec![fixed, refused]
+            vec![fixed, rejected]
         },
         times: FrameTimes {
             detect_ms: Some(3.0),

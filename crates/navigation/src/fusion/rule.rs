@@ -43,6 +43,6 @@ pub trait Fusion: Send + Sync + std::fmt::Debug {
     fn passes(&self, here: &ObjectPose, there: &ObjectPose) -> bool {
         /// Maximum ratio of the standard deviations of `there` and `here`.
         const POOR: f64 = 2.0;
-        there.covariance.position_sigma() <= POOR * here.covariance.position_sigma()
+        there.covariance.position_rms() <= POOR * here.covariance.position_rms()
     }
 }

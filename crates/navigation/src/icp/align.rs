@@ -316,7 +316,7 @@ mod tests {
 
     /// A cloud of other ground is rejected for every distance measure.
     #[test]
-    fn other_ground_is_refused() {
+    fn other_ground_is_rejected() {
         for distance in [Distance::Point, Distance::Measured, Distance::Plane] {
             let settings = Icp { distance, ..Icp::default() };
             let key = Ground::new(&settings, &cloud(&Transform::identity(), 1, |_| true));

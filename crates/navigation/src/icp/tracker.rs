@@ -229,8 +229,8 @@ fn registered(settings: &Icp, key: &Ground, last: &Last, ground: &Ground, stamp_
         .motion
         .map_or_else(Transform::identity, |(motion, before)| Transform::exp(&(motion.log() * (seconds / before))));
     let registered = key.register(settings, ground, &(last.key_from_camera * step))?;
-    if !(registered.covariance.position_sigma() <= settings.max_sigma) {
-        return Err(Lost::Weak(registered.covariance.position_sigma()));
+    if !(registered.covariance.position_rms() <= settings.max_sigma) {
+        return Err(Lost::Weak(registered.covariance.position_rms()));
     }
     let motion = last.key_from_camera.inverse() * registered.key_from_now;
     let speed = motion.translation().norm() / seconds;

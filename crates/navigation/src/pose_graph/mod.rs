@@ -175,7 +175,7 @@ impl PoseGraph {
         let closed = self.solve()?;
         for (index, pose_node) in self.pose_nodes.iter_mut().enumerate() {
             pose_node.world_from_camera = *closed.pose_node(index);
-            pose_node.sigma = closed.covariance(index).position_sigma();
+            pose_node.sigma = closed.covariance(index).position_rms();
         }
         Some(closed)
     }

@@ -370,7 +370,7 @@ impl<'a> PlaceRecognizer<'a> {
         }
         let pose = joint(self.rig, &seen, &initial.world_from_camera).ok_or_else(|| few(0))?;
         let motion = RelativeMotion::new(pose.world_from_camera.relabel(), Covariance6::new(pose.covariance));
-        let sigma = motion.covariance.position_sigma();
+        let sigma = motion.covariance.position_rms();
         if !(sigma <= settings.max_sigma) {
             return Err(NotRecognized::Weak(sigma));
         }

@@ -137,7 +137,7 @@ fn a_key_frame_is_recognized_from_another_side_with_a_consistent_covariance() {
 }
 
 /// Checks that `draws` other grounds are rejected.
-fn refused(draws: u64) {
+fn rejected(draws: u64) {
     let (rig, settings) = (rig(), Recognition::default());
     let mut recognizer = PlaceRecognizer::new(&settings, &rig, Threads::One);
     for seed in 0..draws {
@@ -161,8 +161,8 @@ fn refused(draws: u64) {
 }
 
 #[test]
-fn other_ground_is_refused() {
-    refused(30);
+fn other_ground_is_rejected() {
+    rejected(30);
 }
 
 #[test]
@@ -298,7 +298,7 @@ fn a_path_back_over_key_frames_ends_where_it_began() {
 #[test]
 #[ignore = "long: 300 other grounds, 24 dives"]
 fn key_frames_and_returns_in_many_draws() {
-    refused(300);
+    rejected(300);
     returns(24, 2500);
 }
 

@@ -268,9 +268,9 @@ impl<'a> Traverse<'a> {
     fn sigma(&self, estimate: &PoseEstimate) -> f64 {
         let position = |matrix: &nalgebra::Matrix6<f64>| matrix.fixed_view::<3, 3>(3, 3).trace().sqrt();
         let by_odometry =
-            self.last.map(|last| self.pose_graph.pose_nodes[last].sigma.hypot(self.since.covariance.position_sigma()));
+            self.last.map(|last| self.pose_graph.pose_nodes[last].sigma.hypot(self.since.covariance.position_rms()));
         let by_object = estimate.navigated.as_ref().map(|navigated| position(&in_world(navigated, &self.places()).1));
-        let prior_pose = || estimate.prior_pose.map_or(f64::INFINITY, |(_, covariance)| covariance.position_sigma());
+        let prior_pose = || estimate.prior_pose.map_or(f64::INFINITY, |(_, covariance)| covariance.position_rms());
         match (by_odometry, by_object) {
             (Some(a), Some(b)) => a.min(b),
             (Some(a), None) | (None, Some(a)) => a,
@@ -284,7 +284,7 @@ impl<'a> Traverse<'a> {
 
     /// Adds a fix if it is the best of its visit.
     fn fix(&mut self, estimate: &PoseEstimate, navigated: &Navigated) {
-        let sigma = navigated.object_pose.covariance.position_sigma();
+        let sigma = navigated.object_pose.covariance.position_rms();
         let visit =
             self.visits[navigated.object].filter(|visit| self.seconds - visit.seconds <= self.settings.visit_gap);
         if let Some(visit) = visit
@@ -392,7 +392,7 @@ impl<'a> Traverse<'a> {
         };
         let from = near[recognized.keyframe].0;
         let odometry_edge = OdometryEdge { from, to: pose_node, motion: recognized.motion };
-        let sigma = recognized.motion.covariance.position_sigma();
+        let sigma = recognized.motion.covariance.position_rms();
         let pass =
             self.passes.get(&from).copied().filter(|pass| self.seconds - pass.seconds <= self.settings.visit_gap);
         if let Some(pass) = pass
@@ -425,7 +425,7 @@ impl<'a> Traverse<'a> {
             return closed.navigated(known.object, pose_node);
         }
         let all = (0..self.pose_graph.objects.len()).filter_map(|object| closed.navigated(object, pose_node));
-        let sigma = |navigated: &Navigated| navigated.object_pose.covariance.position_sigma();
+        let sigma = |navigated: &Navigated| navigated.object_pose.covariance.position_rms();
         all.min_by(|a, b| sigma(a).total_cmp(&sigma(b)))
     }
 

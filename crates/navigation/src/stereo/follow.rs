@@ -130,9 +130,9 @@ fn expect(
     let deeper = [Vector2::new(by_depth[0], by_depth[1]), Vector2::new(by_depth[2], by_depth[3])];
     let one = |side: usize| {
         let shape = shapes[side];
-        let stretched = shape.norm();
+        let magnification = shape.norm();
         let area = shape.determinant();
-        let likely = stretched < MAX_SCALE_ERROR && area > 1.0 / MAX_SCALE_ERROR && area < MAX_SCALE_ERROR;
+        let likely = magnification < MAX_SCALE_ERROR && area > 1.0 / MAX_SCALE_ERROR && area < MAX_SCALE_ERROR;
         let along = likely.then(|| shape.try_inverse()).flatten()? * deeper[side];
         let along = along.try_normalize(1e-12).unwrap_or_else(Vector2::x);
         let shape = if nearly_still(&shape) { Matrix2::identity() } else { shape };

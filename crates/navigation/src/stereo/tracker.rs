@@ -117,9 +117,9 @@ impl OdometrySession for StereoTracker<'_> {
     }
 
     fn trajectory(&self) -> OdometryTrajectory {
-        let segments = self.segments.iter().map(|scale_error| {
-            let poses = scale_error.poses.iter().map(|pose| self.waypoint(pose));
-            Segment { broken: scale_error.broken.clone(), poses: poses.collect() }
+        let segments = self.segments.iter().map(|segment| {
+            let poses = segment.poses.iter().map(|pose| self.waypoint(pose));
+            Segment { broken: segment.broken.clone(), poses: poses.collect() }
         });
         OdometryTrajectory {
             segments: segments.collect(),
@@ -279,8 +279,8 @@ impl<'a> StereoTracker<'a> {
         }
         self.doubted = 0;
         let covariance = Covariance6::new(pose.covariance);
-        if covariance.position_sigma() > settings.max_sigma {
-            return Err(Lost::Weak(covariance.position_sigma()));
+        if covariance.position_rms() > settings.max_sigma {
+            return Err(Lost::Weak(covariance.position_rms()));
         }
         let motion = last.world_from_camera.inverse() * guess;
         let speed = motion.translation().norm() / seconds;

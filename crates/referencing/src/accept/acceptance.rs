@@ -23,8 +23,9 @@ pub struct Acceptance {
     /// Alert limit: the distance (m, RMS over the model points) beyond which two poses are different answers.
     ///
     /// A pose whose error may exceed the limit by its covariance (two sigma) is rejected. So is a pose of four points
-    /// or more that one wrong match could move beyond it ([`RejectionReason::Hinge`](super::RejectionReason::Hinge));
-    /// a posterior of points weighs such matches instead.
+    /// or more that one wrong match could move beyond it
+    /// ([`RejectionReason::InfluentialPairs`](super::RejectionReason::InfluentialPairs)); a posterior of points weighs
+    /// such matches instead.
     /// The fraction [`alert_fraction`](Self::alert_fraction) of the model's diameter replaces the limit if that is
     /// smaller.
     pub alert_limit: f64,
@@ -117,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         let good = Acceptance::default();
         assert_eq!(good.check(), Ok(()));
         let message = Acceptance { min_points: 2, ..good.clone() }.check().unwrap_err();

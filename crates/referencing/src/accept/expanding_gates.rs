@@ -52,9 +52,9 @@ fn nothing(outcome: &Outcome) -> bool {
             | RejectionReason::Behind { .. }
             | RejectionReason::Prior { .. } => true,
             RejectionReason::Imprecise { .. }
-            | RejectionReason::Hinge { .. }
+            | RejectionReason::InfluentialPairs { .. }
             | RejectionReason::Attitude { .. }
-            | RejectionReason::Stretched { .. }
+            | RejectionReason::ScaleError { .. }
             | RejectionReason::Inconsistent { .. } => false,
         },
     }

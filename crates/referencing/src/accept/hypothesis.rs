@@ -46,7 +46,7 @@ pub(super) fn by_score(a: &Hypothesis, b: &Hypothesis) -> std::cmp::Ordering {
 }
 
 /// The reason for which a hypothesis fails.
-pub(super) enum Fallen {
-    Refused(RejectionReason),
+pub(super) enum Failure {
+    Rejected(RejectionReason),
     Degenerate(Degenerate),
 }

@@ -8,7 +8,7 @@ use crate::{
     observations::Observations,
     solve::likelihood::{
         leave_out::Deletions,
-        mixed::ENOUGH,
+        mixed::MIN_FEATURE_VALUE,
         scale_error::{ScaleError, isotropic},
     },
 };
@@ -57,7 +57,7 @@ impl Redundancy {
         }
         let enough = |spared: usize| {
             let of_edges = spared.min(edges);
-            2 * points.saturating_sub(spared - of_edges) + 3 * (edges - of_edges) >= ENOUGH
+            2 * points.saturating_sub(spared - of_edges) + 3 * (edges - of_edges) >= MIN_FEATURE_VALUE
         };
         match (enough(1), enough(2)) {
             (false, _) => Self::Unmonitored,
@@ -116,7 +116,7 @@ pub struct Integrity {
 
 /// Solution separation and the protection levels that follow from it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Separation {
+pub(super) struct IntegrityTests {
     /// The largest shift of the position (m) without one point; `None` with fewer than four, or if one is
     /// indispensable.
     pub(super) one: Option<f64>,
@@ -132,7 +132,7 @@ pub(super) struct Separation {
     ///
     /// The error is in metres (RMS, one sigma), infinite if the point is indispensable. `None` with fewer than four
     /// points.
-    pub(super) hinge: Option<(usize, f64)>,
+    pub(super) most_influential: Option<(usize, f64)>,
     /// The consistency of the object's parts, as [`Integrity::consistency`].
     pub(super) consistency: Option<Consistency>,
     /// The increase of the fix's covariance by displaced parts, if their evidence is significant.
@@ -161,10 +161,10 @@ pub(super) fn protection(
     transfer: &Transfer,
     alert: f64,
     misidentified: f64,
-) -> Separation {
+) -> IntegrityTests {
     let n = data.points.len() + data.edges.len();
     if Redundancy::of_features(data.points.len(), data.edges.len()) == Redundancy::Unmonitored {
-        return Separation::default();
+        return IntegrityTests::default();
     }
     let left = acceptance.risk - misidentified;
     // A NaN leaves nothing.
@@ -175,20 +175,24 @@ pub(super) fn protection(
     let own = Protection::quiet(covariance, part);
     let even = || isotropic(&data.points, pose).filter(|_| data.points.len() > 3);
     let Some(deletions) = Deletions::near(data, pose) else {
-        return Separation { scale_error: even(), hinge: Some((0, f64::INFINITY)), ..Separation::default() };
+        return IntegrityTests {
+            scale_error: even(),
+            most_influential: Some((0, f64::INFINITY)),
+            ..IntegrityTests::default()
+        };
     };
     let scale_error = deletions.scale_error.or_else(even);
-    let mut watch = Watch { pose, transfer, deletions, level: own, spared: true, hinge: None };
+    let mut exclusions = Exclusions { pose, transfer, deletions, level: own, spared: true, most_influential: None };
     let twice = acceptance.two_wrong_rate > 0.0;
     let fraction = if twice { 0.5 } else { 1.0 } * part;
     let ones = (0..n).map(|out| [out]);
-    let one = watch.farthest(ones, (fraction / acceptance.wrong_match_rate).min(1.0));
+    let one = exclusions.farthest(ones, (fraction / acceptance.wrong_match_rate).min(1.0));
     let two = (twice && n >= 5).then_some(()).and_then(|()| {
         let twos = (0..n).flat_map(|i| (i + 1..n).map(move |j| [i, j]));
-        watch.farthest(twos, (fraction / acceptance.two_wrong_rate).min(1.0))
+        exclusions.farthest(twos, (fraction / acceptance.two_wrong_rate).min(1.0))
     });
-    let available = identified && watch.spared && (!twice || n >= 6);
-    let Watch { deletions, mut level, hinge, .. } = watch;
+    let available = identified && exclusions.spared && (!twice || n >= 6);
+    let Exclusions { deletions, mut level, most_influential, .. } = exclusions;
     let places = deletions.places.clone();
     let hypotheses =
         (rate > 0.0).then(|| Hypotheses::of(&deletions, &places, alert, transfer.rms(covariance))).flatten();
@@ -198,11 +202,19 @@ pub(super) fn protection(
     }
     let significant = consistency.is_some_and(|found| found.bayes_factor > acceptance.max_bayes_factor());
     let spread = hypotheses.filter(|_| significant).map(|all| all.spread(&deletions, pose, covariance, rate));
-    Separation { one, two, protection: available.then_some(level), scale_error, hinge, consistency, spread }
+    IntegrityTests {
+        one,
+        two,
+        protection: available.then_some(level),
+        scale_error,
+        most_influential,
+        consistency,
+        spread,
+    }
 }
 
 /// The exclusion of points from a fix, and the maxima so far.
-struct Watch<'a> {
+struct Exclusions<'a> {
     pose: &'a Transform<Object, Camera>,
     transfer: &'a Transfer,
     deletions: Deletions<'a>,
@@ -210,10 +222,10 @@ struct Watch<'a> {
     /// Whether no excluded set was indispensable.
     spared: bool,
     /// The point whose exclusion moves the model points most.
-    hinge: Option<(usize, f64)>,
+    most_influential: Option<(usize, f64)>,
 }
 
-impl Watch<'_> {
+impl Exclusions<'_> {
     /// Raises the levels for these sets of wrong matches.
     ///
     /// `fraction` is the probability allotted to each set. Returns the largest shift of the position (m); `None` if one
@@ -224,11 +236,11 @@ impl Watch<'_> {
         for out in sets {
             let Some((without, certainty)) = self.deletions.without(&out) else {
                 (self.spared, farthest) = (false, None);
-                self.hang(&out, f64::INFINITY);
+                self.note_influence(&out, f64::INFINITY);
                 continue;
             };
             // If this point is a wrong match, the error is the shift plus the error of the pose without it.
-            self.hang(&out, self.transfer.between(self.pose, &without).hypot(self.transfer.rms(&certainty)));
+            self.note_influence(&out, self.transfer.between(self.pose, &without).hypot(self.transfer.rms(&certainty)));
             let (moved, turned) = apart(self.pose, &without);
             farthest = farthest.map(|farthest| farthest.max(moved));
             // Eigenvalues are computed only if they may raise a level.
@@ -245,11 +257,11 @@ impl Watch<'_> {
     }
 
     /// Keeps the most critical point.
-    fn hang(&mut self, out: &[usize], off: f64) {
+    fn note_influence(&mut self, out: &[usize], off: f64) {
         if let &[point] = out
-            && self.hinge.is_none_or(|(_, max)| !max.is_nan() && !(off <= max))
+            && self.most_influential.is_none_or(|(_, max)| !max.is_nan() && !(off <= max))
         {
-            self.hinge = Some((point, off));
+            self.most_influential = Some((point, off));
         }
     }
 }

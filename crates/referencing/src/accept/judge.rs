@@ -9,7 +9,7 @@ use super::{
     acceptance::Acceptance,
     alert_limit,
     apart::rms_apart,
-    hypothesis::{Fallen, Hypothesis, by_score},
+    hypothesis::{Failure, Hypothesis, by_score},
     integrity::{Integrity, Protection, Redundancy, protection, semi_axes},
     outcome::{BestPose, Fix, Outcome},
     probability::Probability,
@@ -49,7 +49,7 @@ pub(super) struct Judge<'a> {
     /// The support of the pose by the independent pairs of a large putative set.
     pub(super) support: Option<&'a Support>,
     /// Whether the search states how probably wrong matches mislead the pose, or has too many pairs for that.
-    pub(super) weighs_hinges: bool,
+    pub(super) weighs_influential_pairs: bool,
     /// The pose of the search, near which sets with edges are solved; `None` for a search that counts pairs.
     pub(super) near: Option<Transform<Object, Camera>>,
 }
@@ -73,7 +73,7 @@ impl<'a> Judge<'a> {
             searched: false,
             rig,
             support: None,
-            weighs_hinges: false,
+            weighs_influential_pairs: false,
             near: None,
         }
     }
@@ -99,19 +99,19 @@ impl<'a> Judge<'a> {
         if !self.searched || (!edges.is_empty() && self.near.is_some()) {
             return Ok(());
         }
-        self.present(Probability::counted_features(self.problem, pairs, edges).wrong, [pairs, edges])
+        self.check_p_wrong(Probability::counted_features(self.problem, pairs, edges).wrong, [pairs, edges])
     }
 
     /// The outcome of the set and its alternatives: one pose, several, or none.
     ///
     /// `misidentified` is [`Integrity::misidentified`].
     pub(super) fn poses(&self, found: &Identification, misidentified: Option<f64>) -> (Outcome, Option<Alternative>) {
-        let mut stand = Stand::default();
+        let mut tested = Tested::default();
         // The set that the search prefers states the reason if all fail.
-        let mut first_fall: Option<(usize, Fallen)> = None;
-        let mut fell = |place: usize, fall: Fallen| {
-            if first_fall.as_ref().is_none_or(|(first, _)| place < *first) {
-                first_fall = Some((place, fall));
+        let mut first_failure: Option<(usize, Failure)> = None;
+        let mut fail = |place: usize, failure: Failure| {
+            if first_failure.as_ref().is_none_or(|(first, _)| place < *first) {
+                first_failure = Some((place, failure));
             }
         };
         let mut full: Vec<(usize, Hypothesis)> = Vec::new();
@@ -121,7 +121,7 @@ impl<'a> Judge<'a> {
         for (place, (pairs, edges)) in sets.enumerate() {
             match self.hypothesis_of(pairs, edges) {
                 Ok(hypothesis) => full.push((place, hypothesis)),
-                Err(degenerate) => fell(place, Fallen::Degenerate(degenerate)),
+                Err(degenerate) => fail(place, Failure::Degenerate(degenerate)),
             }
         }
         full.sort_by(|(_, a), (_, b)| by_score(a, b));
@@ -129,24 +129,24 @@ impl<'a> Judge<'a> {
         for (place, hypothesis) in full {
             match self.residuals(&hypothesis) {
                 Ok(()) => {
-                    if let Some(fall) = self.admit(hypothesis, &mut stand) {
-                        fell(place, fall);
+                    if let Some(failure) = self.admit(hypothesis, &mut tested) {
+                        fail(place, failure);
                     }
                 }
                 Err(rejection) => {
-                    fell(place, Fallen::Refused(rejection));
+                    fail(place, Failure::Rejected(rejection));
                     rejected.push(hypothesis);
                 }
             }
         }
         for hypothesis in self.thinned(&rejected) {
-            self.admit(hypothesis, &mut stand);
+            self.admit(hypothesis, &mut tested);
         }
-        stand.passed.sort_by(by_score);
-        stand.refused.append(&mut rejected);
-        stand.refused.sort_by(by_score);
+        tested.passed.sort_by(by_score);
+        tested.rejected.append(&mut rejected);
+        tested.rejected.sort_by(by_score);
         let mut different: Vec<Hypothesis> = Vec::new();
-        for hypothesis in stand.passed {
+        for hypothesis in tested.passed {
             if different.iter().all(|known| self.apart(&known.pose, &hypothesis.pose)) {
                 different.push(hypothesis);
             }
@@ -154,17 +154,17 @@ impl<'a> Judge<'a> {
         if different.len() > 1 {
             return (Outcome::Ambiguous(different.into_iter().map(Hypothesis::alternative).collect()), None);
         }
-        match (different.pop(), first_fall) {
+        match (different.pop(), first_failure) {
             (Some(mut best), _) if !best.alternatives.is_empty() => {
                 let alternatives = std::mem::take(&mut best.alternatives);
                 (Outcome::Ambiguous(std::iter::once(best.alternative()).chain(alternatives).collect()), None)
             }
             (Some(best), _) => {
-                let runner_up = stand.refused.into_iter().find(|other| self.apart(&best.pose, &other.pose));
+                let runner_up = tested.rejected.into_iter().find(|other| self.apart(&best.pose, &other.pose));
                 (self.fix(best, misidentified), runner_up.map(Hypothesis::alternative))
             }
-            (None, Some((_, Fallen::Degenerate(why)))) => (Outcome::Degenerate(why), None),
-            (None, Some((_, Fallen::Refused(why)))) => (Outcome::Rejected(why), None),
+            (None, Some((_, Failure::Degenerate(why)))) => (Outcome::Degenerate(why), None),
+            (None, Some((_, Failure::Rejected(why)))) => (Outcome::Rejected(why), None),
             (None, None) => unreachable!("every set either passes or fails"),
         }
     }
@@ -172,20 +172,20 @@ impl<'a> Judge<'a> {
     /// Tests precision, prior and visibility of a hypothesis whose residuals passed; returns the reason if it fails.
     ///
     /// A hypothesis that repeats a better pose is skipped, since it cannot change the result.
-    fn admit(&self, mut hypothesis: Hypothesis, stand: &mut Stand) -> Option<Fallen> {
+    fn admit(&self, mut hypothesis: Hypothesis, tested: &mut Tested) -> Option<Failure> {
         let repeats =
             |known: &Hypothesis| known.score >= hypothesis.score && !self.apart(&known.pose, &hypothesis.pose);
-        if stand.passed.iter().any(repeats) {
+        if tested.passed.iter().any(repeats) {
             return None;
         }
         match self.precise_and_near(&mut hypothesis).and_then(|()| self.seen_from_the_front(&hypothesis)) {
             Ok(()) => {
-                stand.passed.push(hypothesis);
+                tested.passed.push(hypothesis);
                 None
             }
-            Err(fall) => {
-                stand.refused.push(hypothesis);
-                Some(fall)
+            Err(failure) => {
+                tested.rejected.push(hypothesis);
+                Some(failure)
             }
         }
     }
@@ -313,28 +313,28 @@ impl<'a> Judge<'a> {
     ///
     /// The predicted error must be within the limits with two standard deviations. The common errors of neighbouring
     /// pairs, which enlarge the covariance of a large putative set, count with one at least.
-    pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
+    pub(super) fn precise_and_near(&self, hypothesis: &mut Hypothesis) -> Result<(), Failure> {
         let covariance = self.covariance(hypothesis)?;
         let transfer = Transfer::of(&self.anchors, &hypothesis.pose);
         let (rms, limit) = (transfer.rms(&covariance), self.alert_limit);
         let sigmas = self.support.map_or(2.0, |support| (2.0 / support.pairs_per_place.sqrt()).clamp(1.0, 2.0));
         // A NaN is rejected as well.
         if !(sigmas * rms <= limit) {
-            return Err(Fallen::Refused(RejectionReason::Imprecise { rms, limit }));
+            return Err(Failure::Rejected(RejectionReason::Imprecise { rms, limit }));
         }
         let ((_, sigma), limit) = (semi_axes(&covariance), self.acceptance.attitude_limit);
         if !(sigmas * sigma <= limit) {
-            return Err(Fallen::Refused(RejectionReason::Attitude { sigma, limit }));
+            return Err(Failure::Rejected(RejectionReason::Attitude { sigma, limit }));
         }
         self.near(hypothesis)
     }
 
     /// The covariance of the pose, computed once.
-    fn covariance(&self, hypothesis: &mut Hypothesis) -> Result<Covariance6<Object, Camera>, Fallen> {
+    fn covariance(&self, hypothesis: &mut Hypothesis) -> Result<Covariance6<Object, Camera>, Failure> {
         if let Some(known) = hypothesis.covariance {
             return Ok(known);
         }
-        let covariance = self.covariance_of(hypothesis).map_err(Fallen::Degenerate)?;
+        let covariance = self.covariance_of(hypothesis).map_err(Failure::Degenerate)?;
         hypothesis.covariance = Some(covariance);
         Ok(covariance)
     }
@@ -422,7 +422,7 @@ impl<'a> Judge<'a> {
             consistency: left_out.consistency,
         };
         let features = hypothesis.pairs.len() + hypothesis.edges.len();
-        let stands = self.without_any_one(&hypothesis, left_out.hinge, transfer.rms(&covariance));
+        let stands = self.without_any_one(&hypothesis, left_out.most_influential, transfer.rms(&covariance));
         let stands = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity));
         if let Err(rejection) = stands.and_then(|()| self.consistent(&integrity, features, transfer.rms(&covariance))) {
             return Outcome::Rejected(rejection);
@@ -462,9 +462,9 @@ const COVERED: f64 = 0.01;
 
 /// The hypotheses that passed every test, and the rejected ones.
 #[derive(Default)]
-struct Stand {
+struct Tested {
     passed: Vec<Hypothesis>,
-    refused: Vec<Hypothesis>,
+    rejected: Vec<Hypothesis>,
 }
 
 mod conditions;

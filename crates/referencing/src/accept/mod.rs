@@ -88,21 +88,21 @@ pub fn judge(
     let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
     let near = best.map(|best| best.object_from_camera);
     let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
-    let weighs_hinges =
-        support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.hinges.is_empty());
+    let weighs_influential_pairs =
+        support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.influential_pairs.is_empty());
     let labelled = Judge::of_labelled(problem, solver, acceptance, rig);
-    let judge = Judge { largest, searched: true, support, weighs_hinges, near, ..labelled };
+    let judge = Judge { largest, searched: true, support, weighs_influential_pairs, near, ..labelled };
     let a_contrario = AContrario::of(problem, &found.pairs);
     let evidence = Evidence::of(problem, &found, judge.alert_limit, &a_contrario, &acceptance.without);
     let mut probability = evidence.probability();
     let sized = judge.size(&found.pairs, &found.edges);
     let (outcome, runner_up) = match (sized, &found.posterior) {
         (Ok(()), Some(posterior)) => {
-            let (outcome, runner_up, of_outcome) = judge.weighted(&found, posterior, &evidence, probability);
+            let (outcome, runner_up, of_outcome) = judge.accept_posterior(&found, posterior, &evidence, probability);
             probability = of_outcome;
             (outcome, runner_up)
         }
-        (Ok(()), None) => match judge.present(probability.wrong, [&found.pairs, &found.edges]) {
+        (Ok(()), None) => match judge.check_p_wrong(probability.wrong, [&found.pairs, &found.edges]) {
             Ok(()) => judge.poses(&found, None),
             Err(rejection) => (Outcome::Rejected(rejection), None),
         },
@@ -110,7 +110,7 @@ pub fn judge(
     };
     // The search compares the poses of edges with those of a self-symmetry itself.
     let outcome = match found.edges.is_empty() && acceptance.with(AcceptanceTest::SelfSymmetry) {
-        true => judge.distinguished(outcome, found.posterior.is_some(), &mut probability),
+        true => judge.check_self_symmetry(outcome, found.posterior.is_some(), &mut probability),
         false => outcome,
     };
     let (outcome, runner_up) = match (outcome, runner_up) {

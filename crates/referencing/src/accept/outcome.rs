@@ -38,9 +38,16 @@ pub struct Fix {
 }
 
 impl Fix {
-    /// The standard deviation of the camera's position in the object frame (m), √tr Σ.
+    /// The standard deviation of the camera's position along one axis (m): √(tr Σ/3), the RMS over the three axes.
+    ///
+    /// It is the σ that an isotropic prior is given.
     pub fn position_sigma(&self) -> f64 {
         self.covariance.position_sigma()
+    }
+
+    /// The standard deviation of the camera's attitude about one axis (rad): √(tr Σ/3), the RMS over the three axes.
+    pub fn attitude_sigma(&self) -> f64 {
+        self.covariance.attitude_sigma()
     }
 
     /// The covariance (m², camera axes) of an object point as transferred by the fix.
@@ -141,7 +148,7 @@ impl fmt::Display for Outcome {
             (Self::Fix(fix), _) => {
                 write!(
                     f,
-                    "{}: {} points{}, position ± {:.1} mm",
+                    "{}: {} points{}, position ± {:.1} mm on each axis",
                     self.name(),
                     fix.pairs.len(),
                     if fix.edges.is_empty() { String::new() } else { format!(", {} edges", fix.edges.len()) },

@@ -11,7 +11,7 @@ use crate::{
     alternative::Alternative,
     problem::Correspondence,
     search::{
-        consensus::hinges::misled,
+        consensus::influential_pairs::misled,
         identification::Identification,
         posterior::{Explanation, Posterior},
     },
@@ -21,7 +21,7 @@ impl Judge<'_> {
     /// The outcome of a search that weighs evidence, and the probabilities of its pose.
     ///
     /// A pose is accepted if it is improbable to be wrong and no second copy of the object exists.
-    pub(super) fn weighted(
+    pub(super) fn accept_posterior(
         &self,
         found: &Identification,
         posterior: &Posterior,
@@ -40,12 +40,12 @@ impl Judge<'_> {
             let copies = Outcome::Ambiguous(vec![best.alternative(), copy.alternative()]);
             return (copies, None, with_copies.among(2));
         }
-        if let Err(rejection) = self.present(probability.absent, [&found.pairs, &found.edges]) {
+        if let Err(rejection) = self.check_p_wrong(probability.absent, [&found.pairs, &found.edges]) {
             return (Outcome::Rejected(rejection), runner_up, probability);
         }
         if !max.allows(probability.wrong)
-            && max.allows(evidence.without_hinges().wrong)
-            && let Some(rejection) = self.hanging(posterior)
+            && max.allows(evidence.without_influential_pairs().wrong)
+            && let Some(rejection) = self.influential_rejection(posterior)
         {
             return (Outcome::Rejected(rejection), runner_up, probability);
         }
@@ -59,7 +59,7 @@ impl Judge<'_> {
             return (Outcome::Ambiguous(all.map(Explanation::alternative).collect()), None, probability);
         }
         // The protection levels cover single wrong matches by themselves.
-        let (mut outcome, _) = self.poses(found, Some(evidence.without_hinges().wrong));
+        let (mut outcome, _) = self.poses(found, Some(evidence.without_influential_pairs().wrong));
         if let Outcome::Ambiguous(all) = &outcome {
             let probability = probability.among(all.len());
             return (outcome, runner_up, probability);
@@ -81,7 +81,11 @@ impl Judge<'_> {
     }
 
     /// Whether the object's absence, or a pose in general, is improbable enough for a pose of these points and edges.
-    pub(super) fn present(&self, probability: f64, identified: [&[Correspondence]; 2]) -> Result<(), RejectionReason> {
+    pub(super) fn check_p_wrong(
+        &self,
+        probability: f64,
+        identified: [&[Correspondence]; 2],
+    ) -> Result<(), RejectionReason> {
         match self.acceptance.max_p_wrong.allows(probability) {
             true => Ok(()),
             false => Err(self.improbable(probability, identified)),
@@ -89,10 +93,10 @@ impl Judge<'_> {
     }
 
     /// The rejection of a pose by the pairs that most probably mislead it.
-    fn hanging(&self, posterior: &Posterior) -> Option<RejectionReason> {
-        let worst = misled(&posterior.hinges, self.alert_limit).1?;
+    fn influential_rejection(&self, posterior: &Posterior) -> Option<RejectionReason> {
+        let worst = misled(&posterior.influential_pairs, self.alert_limit).1?;
         let points = worst.pairs.iter().map(|pair| self.problem.model[pair.model].id.clone()).collect();
-        Some(RejectionReason::Hinge { points, rms: worst.error(), limit: self.alert_limit })
+        Some(RejectionReason::InfluentialPairs { points, rms: worst.error(), limit: self.alert_limit })
     }
 
     fn improbable(&self, p_wrong: f64, [pairs, edges]: [&[Correspondence]; 2]) -> RejectionReason {

@@ -121,7 +121,7 @@ impl<'a> Evidence<'a> {
     ) -> Self {
         let posterior = found.posterior.as_ref().map(|posterior| posterior.probabilities(&problem.anchors(), limit));
         let misled = found.posterior.as_ref().map_or(0.0, |posterior| posterior.misled(limit));
-        let misled = if without.contains(&AcceptanceTest::Hinge) { 0.0 } else { misled };
+        let misled = if without.contains(&AcceptanceTest::InfluentialPairs) { 0.0 } else { misled };
         let ln_nfa = found.posterior.as_ref().and_then(|posterior| posterior.ln_nfa);
         let counted = match &found.posterior {
             Some(_) => None,
@@ -162,7 +162,7 @@ impl<'a> Evidence<'a> {
     }
 
     /// The probabilities if every pair is the object's or all are clutter.
-    pub(super) fn without_hinges(&self) -> Probability {
+    pub(super) fn without_influential_pairs(&self) -> Probability {
         self.posterior.map_or_else(|| self.probability(), |posterior| self.weighted(&posterior))
     }
 

@@ -64,8 +64,8 @@ pub enum RejectionReason {
         limit: f64,
     },
     /// One wrong match, or two, could move the pose beyond the alert limit.
-    #[error("{}", hinge(.points, .rms, .limit))]
-    Hinge {
+    #[error("{}", influential_message(.points, .rms, .limit))]
+    InfluentialPairs {
         /// The identifiers of the model points, one or two.
         points: Vec<String>,
         /// The error of the model points for these wrong matches (m, RMS, one sigma).
@@ -110,7 +110,7 @@ pub enum RejectionReason {
         100.0 * .scale_error.value.abs(), if .scale_error.value > 0.0 { "longer" } else { "shorter" },
         100.0 * .scale_error.sigma
     )]
-    Stretched {
+    ScaleError {
         /// The estimated scale error.
         scale_error: ScaleError,
         /// The displacement of the object (m) at the scale error plus two standard deviations.
@@ -152,9 +152,9 @@ impl RejectionReason {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
             Self::Absent { .. } => "absent",
-            Self::Residuals { .. } | Self::Behind { .. } | Self::Stretched { .. } | Self::Prior { .. } => "gate",
+            Self::Residuals { .. } | Self::Behind { .. } | Self::ScaleError { .. } | Self::Prior { .. } => "gate",
             Self::Inconsistent { .. } => "inconsistent",
-            Self::Imprecise { .. } | Self::Hinge { .. } | Self::Attitude { .. } => "imprecise",
+            Self::Imprecise { .. } | Self::InfluentialPairs { .. } | Self::Attitude { .. } => "imprecise",
         }
     }
 
@@ -167,10 +167,10 @@ impl RejectionReason {
             Self::Absent { p_wrong, .. } => return improbable(*p_wrong),
             Self::Residuals { .. } => "check calibration, object model and point covariances",
             Self::Imprecise { .. } => "identify more points (`detector.features`) or move closer",
-            Self::Hinge { .. } => "identify more points (`detector.features`)",
+            Self::InfluentialPairs { .. } => "identify more points (`detector.features`)",
             Self::Attitude { .. } => "identify points farther from a common line",
             Self::Behind { .. } => "check the normals of the object model",
-            Self::Stretched { .. } => "check baseline, focal length and survey",
+            Self::ScaleError { .. } => "check baseline, focal length and survey",
             Self::Inconsistent { .. } => "survey the object again, or model the displaced part as an object of its own",
             Self::Prior { .. } => "check the prior's pose and covariance",
         })
@@ -183,9 +183,11 @@ impl RejectionReason {
 fn improbable(p_wrong: f64) -> Cow<'static, str> {
     match larger_limit(p_wrong) {
         Some(limit) => Cow::Owned(format!(
-            "try more features (`detector.features`), edges in the site, a narrower prior, or `max-p-wrong = {limit}`"
+            "try more features (`detector.features`), edges in the site, a prior (or a narrower one), or `acceptance.max-p-wrong={limit}`"
         )),
-        None => Cow::Borrowed("try more features (`detector.features`), edges in the site, or a narrower prior"),
+        None => {
+            Cow::Borrowed("try more features (`detector.features`), edges in the site, or a prior (or a narrower one)")
+        }
     }
 }
 
@@ -217,8 +219,8 @@ fn absent(p_wrong: &f64, max: &MaxPWrong, [identified, model]: [usize; 2], edges
     )
 }
 
-/// The message of [`RejectionReason::Hinge`].
-fn hinge(points: &[String], rms: &f64, limit: &f64) -> String {
+/// The message of [`RejectionReason::InfluentialPairs`].
+fn influential_message(points: &[String], rms: &f64, limit: &f64) -> String {
     let named = points.join("` and `");
     let (number, noun, wrong) = match points.len() {
         1 => ("one point", "point", "is a wrong match"),
@@ -249,8 +251,7 @@ mod tests {
             rejection.to_string(),
             "P(wrong) is 1.8e-3, at most 1.0e-3 is allowed (preset balanced); 4 of 8 points identified"
         );
-        let remedy =
-            "try more features (`detector.features`), edges in the site, a narrower prior, or `max-p-wrong = 5e-3`";
+        let remedy = "try more features (`detector.features`), edges in the site, a prior (or a narrower one), or `acceptance.max-p-wrong=5e-3`";
         assert_eq!(rejection.remedy(), remedy);
         assert!(!absent(0.4).remedy().contains("max-p-wrong"), "no use tolerates such a limit");
     }

@@ -38,7 +38,12 @@ impl Judge<'_> {
     /// probability that the proposer confused the points ([`Judge::mislabeled`]).
     ///
     /// `probability` becomes that of the outcome.
-    pub(super) fn distinguished(&self, mut outcome: Outcome, weighs: bool, probability: &mut Probability) -> Outcome {
+    pub(super) fn check_self_symmetry(
+        &self,
+        mut outcome: Outcome,
+        weighs: bool,
+        probability: &mut Probability,
+    ) -> Outcome {
         let Outcome::Fix(fix) = &mut outcome else { return outcome };
         let max = self.acceptance.max_p_wrong;
         let admitted = self.admitted(&fix.pairs);

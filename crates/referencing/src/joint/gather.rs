@@ -397,14 +397,14 @@ mod tests {
     #[test]
     fn clutter_is_not_taken_for_points() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let (mut added, mut refused) = (0, 0);
+        let (mut added, mut rejected) = (0, 0);
         for _ in 0..300 {
             let gathered = scene([5, 0, 0], 1e-2, 600, &mut rng).gathered();
             added += gathered.added.len();
-            refused += gathered.left_out.len();
+            rejected += gathered.left_out.len();
         }
         assert!(added <= 3, "{added} sets of clutter");
-        assert!(refused > 30, "only {refused} sets of clutter were available for rejection");
+        assert!(rejected > 30, "only {rejected} sets of clutter were available for rejection");
     }
 
     /// Fails if the first of several candidates is taken.

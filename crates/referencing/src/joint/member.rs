@@ -4,7 +4,7 @@ use seafix_geometry::{Camera, Covariance6, Object, Transform};
 
 use crate::{
     observations::{EdgeObservation, Observation, Observations},
-    solve::likelihood::mixed::ENOUGH,
+    solve::likelihood::mixed::MIN_FEATURE_VALUE,
 };
 
 /// The knowledge of an object's pose in the site's frame.
@@ -65,7 +65,7 @@ impl ObjectObservations {
     /// Whether the features of an object can determine its pose: three points, two points and an edge, or two edges.
     pub(super) fn suffices(&self, object: usize) -> bool {
         let [points, edges] = self.count(object);
-        2 * points + 3 * edges >= ENOUGH
+        2 * points + 3 * edges >= MIN_FEATURE_VALUE
     }
 
     /// Removes the features of an object.

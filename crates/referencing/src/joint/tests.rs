@@ -195,11 +195,11 @@ fn a_displaced_object_is_found_where_it_is() {
     // A displaced object alone in view does not determine the pose in the site.
     let points = seen[0].points.iter().filter(|(object, _)| *object == 1).copied().collect();
     let alone = ObjectObservations { points, ..ObjectObservations::default() };
-    let refused = joint_fix(&rig, &members(Placement::Displaced), &[alone]);
-    assert!(matches!(refused, Err(Degenerate::Singular { fraction, min }) if fraction <= min), "{refused:?}");
+    let rejected = joint_fix(&rig, &members(Placement::Displaced), &[alone]);
+    assert!(matches!(rejected, Err(Degenerate::Singular { fraction, min }) if fraction <= min), "{rejected:?}");
     let few = ObjectObservations { points: seen[0].points[..2].to_vec(), ..ObjectObservations::default() };
-    let refused = joint_fix(&rig, &members(Placement::Exact), &[few]);
-    assert_eq!(refused, Err(Degenerate::TooFew { found: 2, needed: 3 }));
+    let rejected = joint_fix(&rig, &members(Placement::Exact), &[few]);
+    assert_eq!(rejected, Err(Degenerate::TooFew { found: 2, needed: 3 }));
 }
 
 /// A survey with errors by its covariance, one error per object for all points and both instants: the normalised error

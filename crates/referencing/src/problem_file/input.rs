@@ -166,7 +166,7 @@ impl CoherenceProblem {
     ) -> Attempt {
         let candidates = match self.candidates_from(prior) {
             Ok(candidates) => candidates,
-            Err(refused) => return Attempt::without(refused),
+            Err(rejected) => return Attempt::without(rejected),
         };
         let of_edges = self.edges.candidates(&self.model, prior);
         let problem = Problem {

@@ -240,20 +240,20 @@ mod tests {
 
     #[test]
     fn covariances_are_symmetric_and_positive_semidefinite() {
-        let refused = |matrix: Matrix3<f64>| {
+        let rejected = |matrix: Matrix3<f64>| {
             let mut parts = parts();
             parts.noise = Noise::Covariances(vec![matrix; 4]);
             parts.checked().err().map(|fault| fault.path)
         };
         let good = Matrix3::new(4.0, 2.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0) * 1e-4;
-        assert_eq!(refused(good), None, "a singular covariance is one");
+        assert_eq!(rejected(good), None, "a singular covariance is one");
         let mut skewed = good;
         skewed[(0, 1)] *= 1.01;
         for bad in [skewed, -Matrix3::identity(), Matrix3::from_diagonal(&[1.0, f64::NAN, 1.0].into())] {
-            assert_eq!(refused(bad), Some(vec!["covariances".to_owned(), "0".to_owned()]), "{bad}");
+            assert_eq!(rejected(bad), Some(vec!["covariances".to_owned(), "0".to_owned()]), "{bad}");
         }
         // Its eigenvalues are 1 and ±√2.
-        assert!(refused(Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, -1.0)).is_some());
+        assert!(rejected(Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, -1.0)).is_some());
         let mut short = parts();
         short.noise = Noise::Covariances(vec![good; 3]);
         assert_eq!(short.checked().unwrap_err().value.as_deref(), Some("3 rows for 4 cloud points"));

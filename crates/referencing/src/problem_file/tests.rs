@@ -155,7 +155,7 @@ fn places(count: usize, of: impl Fn(f64) -> [f64; 3]) -> String {
 
 /// B4 and B7.
 #[test]
-fn coincident_points_are_refused_and_unlikely_values_are_reported() {
+fn coincident_points_are_rejected_and_unlikely_values_are_reported() {
     assert_eq!(
         fault("[1,0,0]", "[0.25,-0.75,1e-7]"),
         "coincident model points in p.json:2:37: points 1 and 2; remove one"
@@ -294,7 +294,7 @@ fn usual_clouds_are_not_warned_of() {
 
 /// Gates with too many pairs to list are rejected before they are listed.
 #[test]
-fn gates_that_hold_too_much_are_refused() {
+fn gates_that_hold_too_much_are_rejected() {
     let cloud = places(2001, |k| [k.sin(), (2.0 * k).sin(), k.cos() + 3.0]);
     let model = places(2001, |k| [k, (3.0 * k).sin(), k.cos()]);
     let changes = [(CLOUD, cloud.as_str()), (MODEL, &model), ("\"shell_half_m\": 0.1", "\"shell_half_m\": 1e9")];
@@ -358,16 +358,16 @@ fn a_displaced_object_is_found_in_larger_gates_or_without() {
 /// B36. A cloud of ten million points is rejected by the size of its file before it is read, and one above the maximum
 /// number by its count.
 #[test]
-fn a_cloud_too_large_to_hold_is_refused() {
+fn a_cloud_too_large_to_hold_is_rejected() {
     let file = std::env::temp_dir().join(format!("seafix-ten-million-{}.json", std::process::id()));
     // Ten million points of twenty bytes; the file has a length and no content.
     std::fs::File::create(&file).and_then(|empty| empty.set_len(200_000_000)).unwrap();
-    let refused = read(&file).expect_err("it is too large").to_string();
+    let rejected = read(&file).expect_err("it is too large").to_string();
     std::fs::remove_file(&file).unwrap();
-    assert!(refused.starts_with("problem file too large in ") && refused.contains("48 MiB"), "{refused}");
+    assert!(rejected.starts_with("problem file too large in ") && rejected.contains("48 MiB"), "{rejected}");
     let points = "[0,0,3],".repeat(500_001);
-    let refused = parse(&GOOD.replace("[-0.5,0.25,3.5]]", &format!("{points}[0,0,3]]"))).unwrap_err().to_string();
-    assert!(refused.starts_with("too many points in `cloud` in p.json:3:10: 500006; at most 500000"), "{refused}");
+    let rejected = parse(&GOOD.replace("[-0.5,0.25,3.5]]", &format!("{points}[0,0,3]]"))).unwrap_err().to_string();
+    assert!(rejected.starts_with("too many points in `cloud` in p.json:3:10: 500006; at most 500000"), "{rejected}");
 }
 
 mod edges;

@@ -311,7 +311,7 @@ impl CoherenceProblem {
         };
         match self.candidates() {
             Err(Rejected::TooLarge { size, .. }) => many(format!("at least {size}")),
-            Err(refused) => many(refused.to_string()),
+            Err(rejected) => many(rejected.to_string()),
             Ok(found) if found.pairs() > max => many(found.pairs().to_string()),
             Ok(found) => {
                 let enough = self.model.len() >= NEEDED && self.cloud.len() >= NEEDED;

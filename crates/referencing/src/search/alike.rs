@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{association::Association, clique, orientation::Sense};
+use super::{association::Association, clique, limits::NEEDED, orientation::Sense};
 use crate::{
     observations::Observations,
     problem::{Correspondence, Problem, Tolerance},
@@ -11,8 +11,6 @@ use crate::{
 
 /// Distance from a line (fraction of the model's extent) below which points determine no rotation about it.
 const SLIM: f64 = 0.05;
-/// Minimum size of a set with information on the pose; fewer pairs agree everywhere.
-const MIN: usize = 3;
 
 /// Proves that every admissible set as large as `best` or larger gives the motion of `best`; returns the pair tests
 /// too.
@@ -40,7 +38,7 @@ pub(super) fn all_alike(
     let places: Vec<Vector3<f64>> = fitting.iter().map(|&i| problem.model[i].at.coords).collect();
     let shared = (best.len() / 3).max(largest_along_a_line(&places));
     let min = best.len().saturating_sub(shared);
-    if shared < MIN || min < MIN {
+    if shared < NEEDED || min < NEEDED {
         return (false, 0);
     }
     let rest = graph.restricted(|pair| !fits(pair));

@@ -200,7 +200,7 @@ impl Run<'_> {
                 pair_tests += 1;
                 self.problem.coherent(self.vertices[vertex], self.vertices[*other]) && {
                     pair_tests += planes.len() as u64;
-                    !planes.iter().any(|plane| self.volumes.refuses(self.sense, plane, *other))
+                    !planes.iter().any(|plane| self.volumes.rejects(self.sense, plane, *other))
                 }
             };
             let kept: Vec<usize> = list.iter().copied().filter(stays).collect();
@@ -228,7 +228,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Backtracking::default().check(), Ok(()));
         assert!(Backtracking { budget: 0, ..Backtracking::default() }.check().is_err());
         assert!(Backtracking { max_pairs: 2, ..Backtracking::default() }.check().is_err());

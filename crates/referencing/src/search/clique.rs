@@ -247,7 +247,7 @@ impl<'a> Search<'a> {
             let mut candidates = BitSet::full(local.vertices.len());
             while let Some(next) = local.best_connected(&candidates) {
                 candidates.remove(next);
-                if self.left > reserve && !self.refuses(&clique, local.vertices[next]) {
+                if self.left > reserve && !self.rejects(&clique, local.vertices[next]) {
                     candidates.intersect(local.adjacency.row(next));
                     clique.push(local.vertices[next]);
                 }
@@ -262,7 +262,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a vertex forms a rejected quadruple with three members of the clique.
-    fn refuses(&mut self, clique: &[usize], vertex: usize) -> bool {
+    fn rejects(&mut self, clique: &[usize], vertex: usize) -> bool {
         if self.sense == Sense::Any {
             return false;
         }
@@ -270,7 +270,7 @@ impl<'a> Search<'a> {
             let members = decisive_members(clique);
             self.left = self.left.saturating_sub((members.len() * members.len() / 2) as u64);
             let pairs = members.iter().enumerate().flat_map(|(k, &a)| members[..k].iter().map(move |&b| (a, b)));
-            if pairs.into_iter().any(|(a, b)| features.refuses([a, b, vertex], self.sense)) {
+            if pairs.into_iter().any(|(a, b)| features.rejects([a, b, vertex], self.sense)) {
                 return true;
             }
             if vertex >= self.points {
@@ -280,7 +280,7 @@ impl<'a> Search<'a> {
         let points = self.points_of(clique);
         let members = decisive_members(&points);
         self.left = self.left.saturating_sub(Quadruples::count(members.len()));
-        self.quadruples.refused(&self.volumes, self.sense, members, vertex)
+        self.quadruples.rejected(&self.volumes, self.sense, members, vertex)
     }
 
     /// The members that are pairs of points.
@@ -350,7 +350,7 @@ impl<'a> Search<'a> {
             for candidate in candidates.iter().collect::<Vec<_>>() {
                 let third = local.vertices[candidate];
                 let members = decisive_members(clique);
-                let first = members.iter().position(|&other| features.refuses([other, added, third], self.sense));
+                let first = members.iter().position(|&other| features.rejects([other, added, third], self.sense));
                 if first.is_some() {
                     candidates.remove(candidate);
                 }
@@ -371,7 +371,7 @@ impl<'a> Search<'a> {
             if fourth >= self.points {
                 continue;
             }
-            let first = planes.iter().position(|plane| self.volumes.refuses(self.sense, plane, fourth));
+            let first = planes.iter().position(|plane| self.volumes.rejects(self.sense, plane, fourth));
             if first.is_some() {
                 candidates.remove(candidate);
             }

@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(CompleteEnumeration::default().check(), Ok(()));
         assert!(CompleteEnumeration { budget: 0, ..CompleteEnumeration::default() }.check().is_err());
         assert!(CompleteEnumeration { max_pairs: 2, ..CompleteEnumeration::default() }.check().is_err());

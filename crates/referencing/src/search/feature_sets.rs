@@ -37,7 +37,7 @@ pub(super) fn grow(features: &Features<'_>, ranked: &[usize], sense: Sense, pair
         if of_points && sense != Sense::Any {
             let members = decisive_members(&points);
             *pair_tests += Quadruples::count(members.len());
-            if quadruples.refused(&volumes, sense, members, next) {
+            if quadruples.rejected(&volumes, sense, members, next) {
                 continue;
             }
         }
@@ -57,7 +57,7 @@ fn contradicts(features: &Features<'_>, taken: &[usize], next: usize, sense: Sen
     let members = decisive_members(taken);
     members.iter().enumerate().any(|(k, &a)| {
         *pair_tests += k as u64;
-        members[..k].iter().any(|&b| features.refuses([a, b, next], sense))
+        members[..k].iter().any(|&b| features.rejects([a, b, next], sense))
     })
 }
 

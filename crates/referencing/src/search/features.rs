@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     problem::{Correspondence, Problem},
-    solve::likelihood::mixed::ENOUGH,
+    solve::likelihood::mixed::MIN_FEATURE_VALUE,
     space_line::SpaceLine,
 };
 
@@ -47,7 +47,7 @@ impl FeatureSet {
 
 /// Whether this number of points and edges can determine a pose.
 pub(super) fn enough(points: usize, edges: usize) -> bool {
-    2 * points + 3 * edges >= ENOUGH
+    2 * points + 3 * edges >= MIN_FEATURE_VALUE
 }
 
 /// The vertices: the pairs of points, then the pairs of edges, twice each, once for each direction.
@@ -166,7 +166,7 @@ impl<'a> Features<'a> {
     }
 
     /// Whether three vertices contradict the sense; points alone never do.
-    pub(super) fn refuses(&self, three: [usize; 3], sense: Sense) -> bool {
+    pub(super) fn rejects(&self, three: [usize; 3], sense: Sense) -> bool {
         if three.iter().all(|&v| v < self.points.len()) {
             return false;
         }
@@ -178,7 +178,7 @@ impl<'a> Features<'a> {
                 Feature::Point(self.problem.model[model].at.coords, seen.at.coords, &seen.covariance)
             }
         };
-        handedness::refuses(three.map(feature), sense)
+        handedness::rejects(three.map(feature), sense)
     }
 }
 

@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Gicp::default().check(), Ok(()));
         assert!(Gicp { keep: 0.0, ..Gicp::default() }.check().is_err());
         assert!(Gicp { keep: f64::NAN, ..Gicp::default() }.check().is_err());

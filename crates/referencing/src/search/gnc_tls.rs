@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(GncTls::default().check(), Ok(()));
         assert!(GncTls { growth: 1.0, ..GncTls::default() }.check().is_err());
         assert!(GncTls { max_pairs: 2, ..GncTls::default() }.check().is_err());

@@ -61,7 +61,7 @@ pub(super) fn admits(
     }
     let members = decisive_members(taken);
     *pair_tests += Quadruples::count(members.len());
-    !quadruples.refused(volumes, sense, members, next)
+    !quadruples.rejected(volumes, sense, members, next)
 }
 
 /// The answer of a strategy with these ranked pairs: the admissible set that grows from them.

@@ -53,7 +53,7 @@ impl Places {
 ///
 /// The model's volume exceeds three standard deviations of the measured one and the model's errors, and the measured
 /// volume has the other sign.
-pub(super) fn refuses(features: [Feature<'_>; 3], sense: Sense) -> bool {
+pub(super) fn rejects(features: [Feature<'_>; 3], sense: Sense) -> bool {
     let Some(sign) = sense.sign() else { return false };
     let (mut model, mut seen) = (Places::default(), Places::default());
     let (mut points, mut edges) = (SmallVec::<[&Matrix3<f64>; 3]>::new(), SmallVec::<[&DirectedEdge; 3]>::new());
@@ -148,9 +148,9 @@ mod tests {
                 ("one point", [edge(0), edge(1), point(1)]),
                 ("three edges", [edge(0), edge(1), edge(2)]),
             ] {
-                assert_eq!(refuses(triple, Sense::Proper), mirrored, "{name}");
-                assert_eq!(refuses(triple, Sense::Mirrored), !mirrored, "{name}");
-                assert!(!refuses(triple, Sense::Any), "{name}");
+                assert_eq!(rejects(triple, Sense::Proper), mirrored, "{name}");
+                assert_eq!(rejects(triple, Sense::Mirrored), !mirrored, "{name}");
+                assert!(!rejects(triple, Sense::Any), "{name}");
             }
         }
     }

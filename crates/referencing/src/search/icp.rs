@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Icp::default().check(), Ok(()));
         assert!(Icp { keep: 0.0, ..Icp::default() }.check().is_err());
         assert!(Icp { keep: f64::NAN, ..Icp::default() }.check().is_err());

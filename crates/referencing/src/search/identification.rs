@@ -117,10 +117,10 @@ impl Identification {
 }
 
 /// Remedy for too few points of the object in the cloud.
-pub(crate) const MORE_POINTS: &str =
-    "bring more of the object into view, detect more features (`detector.features`), or widen the prior";
+pub(crate) const MORE_POINTS: &str = "bring more of the object into view, detect more features (`detector.features`), or widen the prior if there is one";
 /// Remedy for too few points and edges of the object in the cloud.
-const MORE_FEATURES: &str = "bring more of the object into view, detect more features and lines, or widen the prior";
+const MORE_FEATURES: &str =
+    "bring more of the object into view, detect more features and lines, or widen the prior if there is one";
 /// Remedy for too many candidates.
 pub(crate) const FEWER: &str = "give a prior pose or smaller gates, or decimate the cloud";
 

@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(InterpretationTree::default().check(), Ok(()));
         assert!(InterpretationTree { enough: 0.0, ..InterpretationTree::default() }.check().is_err());
         assert!(InterpretationTree { budget: 0, ..InterpretationTree::default() }.check().is_err());

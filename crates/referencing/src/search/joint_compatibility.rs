@@ -218,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(JointCompatibility::default().check(), Ok(()));
         assert!(JointCompatibility { confidence: 1.0, ..JointCompatibility::default() }.check().is_err());
         assert!(JointCompatibility { budget: 0, ..JointCompatibility::default() }.check().is_err());

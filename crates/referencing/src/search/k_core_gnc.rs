@@ -198,7 +198,7 @@ mod tests {
     use crate::search::bitset::BitMatrix;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(KCoreGnc::default().check(), Ok(()));
         assert!(KCoreGnc { growth: 1.0, ..KCoreGnc::default() }.check().is_err());
         assert!(KCoreGnc { max_pairs: 2, ..KCoreGnc::default() }.check().is_err());

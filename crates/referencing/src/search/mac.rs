@@ -203,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Mac::default().check(), Ok(()));
         assert!(Mac { budget: 0, ..Mac::default() }.check().is_err());
         assert!(Mac { max_edges: 0, ..Mac::default() }.check().is_err());

@@ -138,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Magsac::default().check(), Ok(()));
         assert!(Magsac { confidence: 1.0, ..Magsac::default() }.check().is_err());
         assert!(Magsac { budget: 0, ..Magsac::default() }.check().is_err());

@@ -25,8 +25,6 @@ use crate::{
 const MAX_TIES: usize = 64;
 /// Maximum number of rounds of fitting and exchanging members.
 const MAX_ROUNDS: usize = 8;
-/// Minimum number of features with information on the pose.
-const MIN: usize = 3;
 
 /// The answer to a problem with edges.
 pub(super) fn search(settings: &MaximumClique, problem: &Problem<'_>) -> Result<Identification, Rejected> {
@@ -206,7 +204,7 @@ fn all_alike(
     let undetermined = largest_along_a_line(&places) + largest_family(&directions);
     let common = (best.len() / 3).max(undetermined);
     let min = best.len().saturating_sub(common);
-    if common < MIN || min < MIN {
+    if common < NEEDED || min < NEEDED {
         return (false, 0);
     }
     let rest = features.filtered(|all, v| !fits(all, v));

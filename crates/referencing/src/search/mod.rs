@@ -47,7 +47,7 @@ mod structural_coherence;
 mod volumes;
 mod weighted_clique;
 
-pub use consensus::{Hinge, StructuredClutter, Support};
+pub use consensus::{InfluentialPairs, StructuredClutter, Support};
 pub use identification::{Identification, Rejected, Search};
 pub use maximum_clique::MaximumClique;
 #[cfg(test)]

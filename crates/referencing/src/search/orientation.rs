@@ -53,7 +53,7 @@ impl Sense {
     }
 
     /// Whether four pairs contradict the sense.
-    pub(crate) fn refuses(self, problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
+    pub(crate) fn rejects(self, problem: &Problem<'_>, four: [Correspondence; 4]) -> bool {
         match self {
             Self::Any => false,
             Self::Proper => mirrored(problem, four),
@@ -155,7 +155,7 @@ pub(crate) fn unmirrored(problem: &Problem<'_>, mut pairs: Vec<Correspondence>, 
                     let plane = volumes.plane([b, c, d]);
                     for a in others.iter().copied().chain(rest).filter(|a| ![b, c, d].contains(a)) {
                         pair_tests += 1;
-                        if volumes.refuses(Sense::Proper, &plane, a) {
+                        if volumes.rejects(Sense::Proper, &plane, a) {
                             opposed.push([a, b, c, d].map(|i| i as u32));
                             if opposed.len() >= MAX_LISTED {
                                 break 'quadruples;

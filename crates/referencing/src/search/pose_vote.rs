@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(PoseVote::default().check(), Ok(()));
         assert!(PoseVote { radius: 0.0, ..PoseVote::default() }.check().is_err());
         assert!(PoseVote { tries: 0, ..PoseVote::default() }.check().is_err());

@@ -3,7 +3,7 @@
 use seafix_geometry::{Camera, Object, Transform};
 
 use super::consensus::{
-    hinges::{Hinge, misled},
+    influential_pairs::{InfluentialPairs, misled},
     structured_clutter::StructuredClutter,
     support::Support,
 };
@@ -81,11 +81,11 @@ pub struct Posterior {
     pub resembling: Option<f64>,
     /// The support of independent pairs, in place of all evidence of clutter; `None` but for a large putative set.
     pub support: Option<Support>,
-    /// The pairs of the best pose, one or two of which may be wrong matches.
+    /// The pairs of the best pose that may be wrong matches: each single pair, and each two of a pose of 5 to 20 points.
     ///
-    /// Empty unless the pose has four points or more, no edges, and an evidence of at least 3.8 nats; for a large putative
-    /// set also with more than forty pairs.
-    pub hinges: Vec<Hinge>,
+    /// Empty for three points, for edges, and for an evidence below 3.8 nats. A large putative set has no limit of
+    /// evidence, but one of forty pairs.
+    pub influential_pairs: Vec<InfluentialPairs>,
 }
 
 /// Evidence (nats) that makes a pose beside the best a second copy of the object in any case, complete or partial.
@@ -217,7 +217,7 @@ impl Posterior {
 
     /// The probability that a wrong match puts the best pose off by more than `limit` (m), if it is near the true one.
     pub fn misled(&self, limit: f64) -> f64 {
-        misled(&self.hinges, limit).0
+        misled(&self.influential_pairs, limit).0
     }
 
     /// The probabilities of a large putative set, from the support of independent pairs.

@@ -26,7 +26,7 @@ impl Quadruples {
         (pairs(members) * members.saturating_sub(2) / 3) as u64
     }
 
-    pub(super) fn refused(&mut self, volumes: &Volumes<'_>, sense: Sense, members: &[usize], vertex: usize) -> bool {
+    pub(super) fn rejected(&mut self, volumes: &Volumes<'_>, sense: Sense, members: &[usize], vertex: usize) -> bool {
         let Some(sign) = sense.sign() else { return false };
         let origin = volumes.place(vertex);
         for (axis, column) in self.places.iter_mut().enumerate() {
@@ -116,9 +116,9 @@ mod tests {
     /// The sets have up to forty members, some with a point on the wrong side. Fails if triples without the third
     /// member alone are tested, if a plane is taken for that of other members, and with a wrong sign in a normal.
     #[test]
-    fn what_is_refused_makes_a_four_that_contradicts() {
+    fn what_is_rejected_makes_a_four_that_contradicts() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let (mut quadruples, mut refused) = (Quadruples::default(), 0);
+        let (mut quadruples, mut rejected) = (Quadruples::default(), 0);
         for n in (1..40).chain([2, 5, 39, 3]) {
             let mut place = || Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
             let model: Vec<ModelPoint> = (0..=n).map(|_| ModelPoint::exact("", place().into())).collect();
@@ -145,10 +145,10 @@ mod tests {
                 let by_itself = (0..n).any(|i| {
                     (0..i).any(|k| (0..k).any(|l| volumes.contradict(sense, [members[i], members[k], members[l], 0])))
                 });
-                assert_eq!(quadruples.refused(&volumes, sense, &members, 0), by_itself, "{n} members, {sense:?}");
-                refused += usize::from(by_itself);
+                assert_eq!(quadruples.rejected(&volumes, sense, &members, 0), by_itself, "{n} members, {sense:?}");
+                rejected += usize::from(by_itself);
             }
         }
-        assert!((45..80).contains(&refused), "{refused}");
+        assert!((45..80).contains(&rejected), "{rejected}");
     }
 }

@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Ransac::default().check(), Ok(()));
         assert!(Ransac { confidence: 1.0, ..Ransac::default() }.check().is_err());
         assert!(Ransac { budget: 0, ..Ransac::default() }.check().is_err());

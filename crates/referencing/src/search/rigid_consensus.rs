@@ -15,9 +15,9 @@ use super::{
         edge_nfa::ln_nfa,
         edge_terms::EdgeTerms,
         graph::ConsistencyGraph,
-        hinges::{Hinge, hinges},
+        influential_pairs::{InfluentialPairs, influential_pairs},
         joined::Joined,
-        likelihood::{Mode, Terms},
+        likelihood::{Mode, PairTerms},
         mirror::mirror_image,
         prior_terms::PriorTerms,
         proof::{Proved, prove},
@@ -34,7 +34,8 @@ use super::{
     posterior::Posterior,
 };
 use crate::{
-    a_contrario::coordinates::shuffled, ablation::SearchMechanism, problem::Problem, solve::likelihood::mixed::ENOUGH,
+    a_contrario::coordinates::shuffled, ablation::SearchMechanism, problem::Problem,
+    solve::likelihood::mixed::MIN_FEATURE_VALUE,
 };
 use beside::Beside;
 use context::Context;
@@ -169,7 +170,7 @@ const STRONG: f64 = 3.8;
 /// Maximum number of poses whose evidence is weighed with the local density of clutter.
 const MAX_COMPARED: usize = 64;
 /// Maximum number of pairs of a large putative set that are examined for wrong matches, for the time it takes: O(k²).
-const MAX_HINGES: usize = 40;
+const MAX_INFLUENTIAL: usize = 40;
 /// Rounding error (nats) of sums in different order.
 const ROUNDING: f64 = 1e-9;
 impl Search for RigidConsensus {
@@ -178,7 +179,7 @@ impl Search for RigidConsensus {
     }
 
     fn search(&self, problem: &Problem<'_>, _rng: &mut dyn Rng) -> Result<Identification, Rejected> {
-        let enough = |edges: usize| 2 * problem.candidates.with_candidates() + 3 * edges >= ENOUGH;
+        let enough = |edges: usize| 2 * problem.candidates.with_candidates() + 3 * edges >= MIN_FEATURE_VALUE;
         let (edges, has_edges) = (problem.edges.with_candidates(), !problem.edges.model.is_empty());
         match feasible(problem, self.max_pairs) {
             Err(Rejected::TooFew { .. }) if enough(edges) => {}
@@ -194,7 +195,7 @@ impl Search for RigidConsensus {
         };
         let Some(prior_terms) = PriorTerms::of(problem) else { return Err(nothing) };
         let graph = ConsistencyGraph::of(problem, &prior_terms);
-        let terms = Terms::of(problem, &prior_terms, &graph);
+        let terms = PairTerms::of(problem, &prior_terms, &graph);
         // A large putative set is judged by its independent pairs.
         let large = self.with(SearchMechanism::IndependentPairs)
             && problem.edges.with_candidates() == 0
@@ -241,13 +242,13 @@ impl Search for RigidConsensus {
         };
         pair_tests += beside.pair_tests;
         let complete = swept.complete && beside.copies.complete;
-        let gap = |proved: Proved| Some(proved.bound - best.ln_even).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
+        let gap = |proved: Proved| Some(proved.bound - best.ln_uniform).filter(|gap| *gap > ROUNDING).unwrap_or(0.0);
         let evidence_gap = proved.map(gap);
         // The returned set is coherent throughout: among twenty true points some two usually differ by more than the
         // tolerance, and the worst fitting are dropped. The posterior keeps them.
         let mut pairs = grow(problem, &best.closest_first(&terms, &graph), Sense::Proper, &mut pair_tests);
         let identified = context.edge_pairs(best);
-        if 2 * pairs.len() + 3 * identified.len() < ENOUGH {
+        if 2 * pairs.len() + 3 * identified.len() < MIN_FEATURE_VALUE {
             let size = pairs.len() + identified.len();
             return if complete { Err(nothing) } else { so_far(problem, true, ended(size, pair_tests)) };
         }
@@ -276,7 +277,7 @@ impl Search for RigidConsensus {
                 ln_nfa,
                 resembling,
                 support: independent.and_then(|of| of.support(&swept.modes)),
-                hinges: hinges_of(&context, best, (!large).then_some(&mut clutter_density)),
+                influential_pairs: influential_pairs_of(&context, best, (!large).then_some(&mut clutter_density)),
             }),
             pairs,
         })
@@ -336,11 +337,15 @@ fn add_shifted_and_turned(context: &Context<'_>, pattern: Option<&Pattern>, swep
 }
 
 /// The pairs of the best pose that may be clutter, if their number can be examined.
-fn hinges_of(context: &Context<'_>, best: &Mode, density: Option<&mut ClutterDensity>) -> Vec<Hinge> {
+fn influential_pairs_of(
+    context: &Context<'_>,
+    best: &Mode,
+    density: Option<&mut ClutterDensity>,
+) -> Vec<InfluentialPairs> {
     let large = density.is_none();
-    let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_HINGES);
+    let few = best.members.len() > NEEDED && (!large || best.members.len() <= MAX_INFLUENTIAL);
     match few && best.edges.is_empty() && (large || best.ln_evidence >= STRONG) {
-        true => hinges(context.problem, context.parts, density, best),
+        true => influential_pairs(context.problem, context.parts, density, best),
         false => Vec::new(),
     }
 }

@@ -217,7 +217,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Sc2Pcr::default().check(), Ok(()));
         assert!(Sc2Pcr { seeds: 0.0, ..Sc2Pcr::default() }.check().is_err());
         assert!(Sc2Pcr { second: 31, ..Sc2Pcr::default() }.check().is_err());

@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Spectral::default().check(), Ok(()));
         assert!(Spectral { iterations: 0, ..Spectral::default() }.check().is_err());
         assert!(Spectral { max_edges: 0, ..Spectral::default() }.check().is_err());

@@ -51,7 +51,7 @@ impl Default for StructuralCoherence {
 
 impl Component for StructuralCoherence {
     const NAME: &'static str = "structural-coherence";
-    const SUMMARY: &'static str = "the paper's enumeration of ordered samples, longest first";
+    const SUMMARY: &'static str = "the enumeration of ordered samples of Bobkov et al. 2021, longest first";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of \
                                   autonomous underwater vehicles to man-made objects using stereo images, 2021, Sec. 2.2";
     const PROPERTIES: seafix_component::Properties = &[
@@ -97,11 +97,11 @@ enum Product {
     /// The first coherent choice.
     Coherent(Vec<Correspondence>),
     /// No coherent choice; no point after this place of the sample was examined.
-    Refused { deepest: usize },
+    Rejected { deepest: usize },
 }
 
 /// The rejection of all samples that begin with the same points.
-struct Refused {
+struct RejectedSamples {
     /// The last of these points; no later one is examined.
     deepest: usize,
     /// Cost for one choice of candidates of the later points: pair tests, and sampling.
@@ -189,17 +189,17 @@ impl<'a> Enumeration<'a> {
             let (pair_tests, sampled) = (self.pair_tests, self.sampled);
             let deepest = match self.product_of(&sample)? {
                 Product::Coherent(found) => return Ok(Some(found)),
-                Product::Refused { deepest } => deepest,
+                Product::Rejected { deepest } => deepest,
             };
             // All later samples with the same beginning fail the same tests: they are counted without being made.
             let after = self.choices(&sample[deepest + 1..]);
             let fraction = |spent: u64| (u128::from(spent) / after) as u64;
-            let refused = Refused {
+            let rejected = RejectedSamples {
                 deepest,
                 pair_tests: fraction(self.pair_tests - pair_tests),
                 sampled: fraction(self.sampled - sampled),
             };
-            self.pass_over(&refused, &mut sample)?;
+            self.pass_over(&rejected, &mut sample)?;
             if !self.next(&mut sample, deepest) {
                 return Ok(None);
             }
@@ -246,7 +246,7 @@ impl<'a> Enumeration<'a> {
                     break;
                 }
                 if pairs.pop().is_none() {
-                    return Ok(Product::Refused { deepest });
+                    return Ok(Product::Rejected { deepest });
                 }
             }
         }
@@ -304,21 +304,21 @@ impl<'a> Enumeration<'a> {
     /// Counts the later samples with the same beginning, up to the deepest place examined.
     ///
     /// They are not examined, except the one in which the budget ends.
-    fn pass_over(&mut self, refused: &Refused, sample: &mut [usize]) -> Result<(), Spent> {
-        if refused.deepest + 1 == sample.len() {
+    fn pass_over(&mut self, rejected: &RejectedSamples, sample: &mut [usize]) -> Result<(), Spent> {
+        if rejected.deepest + 1 == sample.len() {
             return Ok(());
         }
         // This sample is already counted among those that begin like it up to `place`.
-        let (mut place, mut counted) = (refused.deepest, self.choices(&sample[refused.deepest + 1..]));
-        let each = u128::from(refused.pair_tests + refused.sampled);
+        let (mut place, mut counted) = (rejected.deepest, self.choices(&sample[rejected.deepest + 1..]));
+        let each = u128::from(rejected.pair_tests + rejected.sampled);
         loop {
             let left = u128::from(self.left());
             let more = self.continuations(sample, place, left.saturating_add(counted));
-            let choices = more.saturating_mul(self.choices(&sample[refused.deepest + 1..=place])) - counted;
+            let choices = more.saturating_mul(self.choices(&sample[rejected.deepest + 1..=place])) - counted;
             if choices.saturating_mul(each) <= left {
-                self.pair_tests += choices as u64 * refused.pair_tests;
-                self.sampled += choices as u64 * refused.sampled;
-                if place == refused.deepest {
+                self.pair_tests += choices as u64 * rejected.pair_tests;
+                self.sampled += choices as u64 * rejected.sampled;
+                if place == rejected.deepest {
                     return Ok(());
                 }
                 self.next(sample, place);

@@ -44,7 +44,7 @@ impl<'a> Volumes<'a> {
     }
 
     /// Whether the plane's three vertices and `fourth` contradict the sense.
-    pub(super) fn refuses(&self, sense: Sense, plane: &Plane, fourth: usize) -> bool {
+    pub(super) fn rejects(&self, sense: Sense, plane: &Plane, fourth: usize) -> bool {
         let Some(sign) = sense.sign() else { return false };
         let (a, d) = (&self.at[plane.three[0]], &self.at[fourth]);
         let product = plane.normals[0].dot(&(d[0] - a[0])) * plane.normals[1].dot(&(d[1] - a[1]));
@@ -54,7 +54,7 @@ impl<'a> Volumes<'a> {
 
     /// Whether four vertices contradict the sense, by the exact test.
     pub(super) fn contradict(&self, sense: Sense, four: [usize; 4]) -> bool {
-        sense.refuses(self.problem, four.map(|v| self.vertices[v]))
+        sense.rejects(self.problem, four.map(|v| self.vertices[v]))
     }
 
     /// Product of two volumes (m⁶) below which its sign is not trusted.

@@ -175,7 +175,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(WeightedClique::default().check(), Ok(()));
         assert!(WeightedClique { iterations: 0, ..WeightedClique::default() }.check().is_err());
         assert!(WeightedClique { max_pairs: 2, ..WeightedClique::default() }.check().is_err());

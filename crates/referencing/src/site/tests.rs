@@ -123,7 +123,7 @@ fn two_points_are_too_few() {
 }
 
 #[test]
-fn a_collinear_base_is_refused_with_its_sine() {
+fn a_collinear_base_is_rejected_with_its_sine() {
     let found = faults("at = [0.0, -1.0, 0.0]", "at = [1.0, -0.0005, 0.0]");
     assert!(found[0].starts_with("object `plate`: collinear base in site.toml:8: sine 5.00e-4 at P1"), "{found:?}");
 }
@@ -136,7 +136,7 @@ fn a_nearly_collinear_base_is_a_warning() {
 }
 
 #[test]
-fn points_in_one_place_are_refused_by_both_names() {
+fn points_in_one_place_are_rejected_by_both_names() {
     let found = faults("at = [0.5, 0.5, -1.0]", "at = [1.0, 0.0, 1e-7]");
     assert_eq!(found, ["object `frame`: coincident points in site.toml:40: `C` and `D`; remove one"]);
 }
@@ -256,7 +256,7 @@ fn edges_are_read_and_written_in_a_format_of_their_own() {
 }
 
 #[test]
-fn an_invalid_edge_is_refused_in_one_line() {
+fn an_invalid_edge_is_rejected_in_one_line() {
     let good = with_edges();
     for (from, to, parts) in [
         ("seafix-site/1.1", "seafix-site/1", ["format", "format = \"seafix-site/1.1\""]),

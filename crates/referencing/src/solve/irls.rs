@@ -55,7 +55,7 @@ impl Default for Irls {
 
 impl Component for Irls {
     const NAME: &'static str = "irls";
-    const SUMMARY: &'static str = "robust least squares: Huber, Cauchy, or the paper's un-squared sum";
+    const SUMMARY: &'static str = "robust least squares: Huber, Cauchy, or the un-squared sum of Bobkov et al. 2021";
     const SOURCE: &'static str = "Holland, Welsch, Robust regression using iteratively reweighted least-squares, 1977";
     const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
 

@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Kabsch::default().check(), Ok(()));
         for bad in [-0.1, 1.0, f64::NAN] {
             assert!(Kabsch { min_ratio: bad }.check().is_err(), "{bad}");

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Mahalanobis::default().check(), Ok(()));
         for (starts, fits) in [(0, false), (1, true), (5, true), (6, false)] {
             assert_eq!(Mahalanobis { starts, ..Mahalanobis::default() }.check().is_ok(), fits, "{starts}");

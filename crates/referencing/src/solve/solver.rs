@@ -44,7 +44,7 @@ use crate::{
 /// assert!((pose.translation() - Vector3::new(0.0, 0.0, -3.0)).norm() < 1e-12);
 ///
 /// // The mean of four points has half of their standard deviation along each of the three axes.
-/// let sigma = MeanTranslation.covariance(&data, &pose)?.position_sigma();
+/// let sigma = MeanTranslation.covariance(&data, &pose)?.position_rms();
 /// assert!((sigma - 0.005 * 3f64.sqrt()).abs() < 1e-6);
 /// # Ok::<(), Degenerate>(())
 /// ```

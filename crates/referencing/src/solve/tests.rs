@@ -85,7 +85,7 @@ fn kabsch_has_the_smallest_residual_of_all_poses() {
 }
 
 #[test]
-fn what_determines_no_pose_is_refused_with_its_number() {
+fn what_determines_no_pose_is_rejected_with_its_number() {
     let line = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1e-5, 0.0]];
     for solver in solvers() {
         assert_eq!(solver.solve(&seen(&SPREAD[..2], 0.01)), Err(Degenerate::TooFew { found: 2, needed: 3 }));
@@ -290,7 +290,7 @@ fn truncated_squares_leave_outliers_out() {
 
 /// All solvers, with pixels, reject the same degenerate geometry with the failed number.
 #[test]
-fn degenerate_views_are_refused_with_the_number_that_failed() {
+fn degenerate_views_are_rejected_with_the_number_that_failed() {
     let rig = rig();
     let view = |places: &[[f64; 3]]| {
         let pose = motion();

@@ -49,7 +49,7 @@ impl Default for Triad {
 
 impl Component for Triad {
     const NAME: &'static str = "triad";
-    const SUMMARY: &'static str = "auxiliary frames on three identified points, Eq. (3) to (5)";
+    const SUMMARY: &'static str = "auxiliary frames on three identified points, Bobkov et al. 2021, Eq. (3) to (5)";
     const SOURCE: &'static str = "Bobkov, Kudryashov, Inzartsev, Method for the coordination of referencing of autonomous \
          underwater vehicles to man-made objects using stereo images, 2021";
     const PROPERTIES: seafix_component::Properties = &[("features", "points alone")];
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_out_of_range_are_refused() {
+    fn settings_out_of_range_are_rejected() {
         assert_eq!(Triad::default().check(), Ok(()));
         for bad in [-0.1, 1.0, f64::NAN] {
             assert!(Triad { min_sine: bad, ..Triad::default() }.check().is_err(), "{bad}");
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_are_refused_with_the_sine_of_the_angle_at_the_first_point() {
+    fn axes_are_rejected_with_the_sine_of_the_angle_at_the_first_point() {
         let [a, b] = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]].map(Vector3::from);
         let at = |sine: f64| axes(&a, &b, &Vector3::new(3.0, 3.0 * sine, 0.0));
         assert!(at(2e-9).is_ok());

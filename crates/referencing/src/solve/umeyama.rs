@@ -123,7 +123,7 @@ mod tests {
     use seafix_geometry::{Point, UncertainPoint};
 
     #[test]
-    fn a_model_in_millimetres_is_refused_by_its_scale() {
+    fn a_model_in_millimetres_is_rejected_by_its_scale() {
         let points = [[0.0, 0.0, 3.0], [1.0, 0.0, 3.0], [0.0, 1.0, 3.5], [1.0, 1.0, 2.5]].map(|at| Observation {
             measured: UncertainPoint::isotropic(Point::from(at), 0.01),
             pixels: None,

@@ -43,7 +43,7 @@ fn counted(log: &Log, group: &str, span: [u64; 2]) -> Option<usize> {
             "found" => totals.found,
             "wrong" => totals.wrong,
             "unjudged" => totals.unjudged,
-            "refused" => totals.refused(),
+            "refused" => totals.rejected(),
             "judged" => totals.judged,
             _ => totals.reasons.get(group.strip_prefix("refused:")?).copied().unwrap_or(0),
         };

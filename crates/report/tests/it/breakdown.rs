@@ -18,8 +18,8 @@ fn what_comes_after_a_break_does_not_count() {
         let header = header(index + 1, distance, "kabsch");
         let mut writer = Writer::create(&folder.path().join(format!("{}.mcap", header.trial)), &header).unwrap();
         for place in 0..8 {
-            let refused = distance == 4.0 && place == 0;
-            let mut frame = blind(&header, if refused { 5 } else { 0 }, distance);
+            let rejected = distance == 4.0 && place == 0;
+            let mut frame = blind(&header, if rejected { 5 } else { 0 }, distance);
             (frame.frame, frame.stamp_ns) = (place, 100 * place);
             writer.frame(&frame).unwrap();
         }

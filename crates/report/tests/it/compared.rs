@@ -45,7 +45,7 @@ fn runs_of_the_same_data_are_compared() {
 
 /// Seen to fail where the data of the runs are not checked.
 #[test]
-fn runs_of_other_data_are_refused() {
+fn runs_of_other_data_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let runs = [run(folder.path(), "a", "triad", 1), run(folder.path(), "b", "kabsch", 2)];
     match compare(&runs, false, None, None) {

@@ -73,7 +73,7 @@ fn latex_compiles() {
 }
 
 #[test]
-fn a_newer_log_is_refused_with_both_versions() {
+fn a_newer_log_is_rejected_with_both_versions() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("001.mcap");
     let mut writer = mcap::Writer::new(fs::File::create(&path).unwrap()).unwrap();
@@ -82,14 +82,14 @@ fn a_newer_log_is_refused_with_both_versions() {
     let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
     writer.write_to_known_channel(&header, b"").unwrap();
     writer.finish().unwrap();
-    let refused = report(folder.path(), &folder.path().join("report"), Forms::ALL).unwrap_err().to_string();
-    assert!(refused.contains("seafix.v3.TrialHeader") && refused.contains("seafix.v2.TrialHeader"), "{refused}");
+    let rejected = report(folder.path(), &folder.path().join("report"), Forms::ALL).unwrap_err().to_string();
+    assert!(rejected.contains("seafix.v3.TrialHeader") && rejected.contains("seafix.v2.TrialHeader"), "{rejected}");
     assert!(!folder.path().join("report").exists(), "no report is written");
 }
 
 /// Seen to fail where the manifest is not read.
 #[test]
-fn a_newer_manifest_is_refused_with_both_versions() {
+fn a_newer_manifest_is_rejected_with_both_versions() {
     let folder = tempfile::tempdir().unwrap();
     write_run(folder.path(), &[5.0]);
     let out = folder.path().join("report");
@@ -98,9 +98,9 @@ fn a_newer_manifest_is_refused_with_both_versions() {
         fs::write(folder.path().join("manifest.json"), manifest).unwrap();
         let made = report(folder.path(), &out, Forms::ALL);
         assert_eq!(made.is_ok(), known, "{format}");
-        let Err(refused) = made else { continue };
-        let refused = refused.to_string();
-        assert!(refused.contains(&format!("seafix-manifest/{format}")), "{refused}");
-        assert!(refused.contains("reads seafix-manifest/2"), "{refused}");
+        let Err(rejected) = made else { continue };
+        let rejected = rejected.to_string();
+        assert!(rejected.contains(&format!("seafix-manifest/{format}")), "{rejected}");
+        assert!(rejected.contains("reads seafix-manifest/2"), "{rejected}");
     }
 }

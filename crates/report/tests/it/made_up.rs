@@ -153,9 +153,9 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
         .collect();
     let solver = &header.components[2].name;
     let worse = if solver == "triad" { 2.0 } else { 1.0 };
-    let refused = number % 6 == 5;
+    let rejected = number % 6 == 5;
     let wrong = number == 3 && distance > 4.5 && solver == "triad";
-    let mut row = TargetRecord::refused(
+    let mut row = TargetRecord::rejected(
         &target.id,
         "maximum-clique",
         solver,
@@ -165,11 +165,11 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
     row.times = TargetTimes {
         candidates_ms: Some(0.05),
         search_ms: Some(0.4 + 0.1 * noise(seed)),
-        solve_ms: (!refused).then_some(0.012),
+        solve_ms: (!rejected).then_some(0.012),
         total_ms: Some(120.0 + 10.0 * noise(seed)),
     };
     row.evaluation = Evaluation { wrong: Some(false), visible: Some(9), identified: Some(2), ..Evaluation::default() };
-    if !refused {
+    if !rejected {
         let scale = worse * 0.001 * distance * distance * (1.0 + noise(seed + 3));
         row.outcome = Outcome::Fix;
         row.reason.clear();
@@ -231,8 +231,8 @@ pub(crate) fn blind(header: &TrialHeader, number: u64, distance: f64) -> FrameRe
                 object: target.id.clone(),
                 point: ["panel", "valve over of <2>"][k as usize].to_owned(),
                 at: [0.1, 0.0, distance],
-                believed: (!refused).then(|| [0.1 + 0.01 * worse * noise(seed + k), 0.0, distance]),
-                nees: (!refused).then(|| 3.0 + 2.0 * noise(seed + 9 + k)),
+                believed: (!rejected).then(|| [0.1 + 0.01 * worse * noise(seed + k), 0.0, distance]),
+                nees: (!rejected).then(|| 3.0 + 2.0 * noise(seed + 9 + k)),
             })
             .collect(),
     }

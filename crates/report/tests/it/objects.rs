@@ -64,12 +64,12 @@ fn each_object_has_its_own_attempts() {
             let own = || frames.iter().flat_map(|frame| &frame.targets).filter(|row| row.object == object);
             let (fixes, n) = (own().filter(|row| row.outcome == Outcome::Fix), own().count());
             let (wrong, found): (Vec<_>, Vec<_>) = fixes.partition(|row| row.evaluation.wrong == Some(true));
-            let refused = n - found.len() - wrong.len();
+            let rejected = n - found.len() - wrong.len();
             let errors = |take: fn(&seafix_log::Evaluation) -> Option<f64>| {
                 median(found.iter().filter_map(|row| take(&row.evaluation)).collect()) * 1e3
             };
             let (tre, position) = (errors(|e| e.tre_rms), errors(|e| e.position_error));
-            let line = format!(",{object},{n},{},{refused},{},", found.len(), wrong.len());
+            let line = format!(",{object},{n},{},{rejected},{},", found.len(), wrong.len());
             let medians = table.lines().filter_map(|l| l.split_once(&line)?.1.split(',').next()?.parse::<f64>().ok());
             let medians: Vec<f64> = medians.collect();
             assert!(medians.len() == 2 && medians.iter().all(|of| (of - tre).abs() < 1e-9), "{line} {tre} in {table}");

@@ -59,8 +59,8 @@ fn numbers_are_those_of_the_log() {
     let summary = summary(folder.path()).unwrap();
     assert_eq!(summary.rows.len(), 4);
     for row in &summary.rows {
-        assert_eq!(row.found + row.refused + row.wrong, row.attempted);
-        assert_eq!(row.reasons.values().sum::<usize>(), row.refused);
+        assert_eq!(row.found + row.rejected + row.wrong, row.attempted);
+        assert_eq!(row.reasons.values().sum::<usize>(), row.rejected);
         let log = read(&folder.path().join(format!("{}.mcap", row.trial))).unwrap();
         let fixes = log.frames.iter().flat_map(|frame| &frame.targets);
         let mut tre: Vec<f64> = fixes

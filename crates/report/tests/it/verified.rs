@@ -106,8 +106,8 @@ fn what_is_no_report_is_left_alone() {
     fs::create_dir_all(other.join("figures")).unwrap();
     for name in ["figures/mine.svg", "summary.txt", "report.txt"] {
         fs::write(other.join(name), b"mine").unwrap();
-        let refused = report(folder.path(), &other, Forms::ALL).unwrap_err().to_string();
-        assert!(refused.contains("it holds `figures`, which no report here has written"), "{refused}");
+        let rejected = report(folder.path(), &other, Forms::ALL).unwrap_err().to_string();
+        assert!(rejected.contains("it holds `figures`, which no report here has written"), "{rejected}");
         assert_eq!(fs::read(other.join(name)).unwrap(), b"mine");
     }
     let own = folder.path().join("report");
@@ -130,8 +130,8 @@ fn a_lost_log_is_missed() {
         fs::write(folder.path().join("manifest.json"), text).unwrap();
         report(folder.path(), &folder.path().join("report"), Forms::ALL)
     };
-    let refused = manifest("finished").unwrap_err().to_string();
-    assert!(refused.contains("its log not-there.mcap is missing"), "{refused}");
+    let rejected = manifest("finished").unwrap_err().to_string();
+    assert!(rejected.contains("its log not-there.mcap is missing"), "{rejected}");
     manifest("interrupted").unwrap();
 }
 
@@ -164,8 +164,8 @@ fn outcomes_add_up_and_every_attempt_counts_once() {
     for row in &summary.rows {
         let log = read(&folder.path().join(format!("{}.mcap", row.trial))).unwrap();
         let attempts = log.frames.iter().flat_map(|frame| &frame.targets).filter(|target| target.attempted()).count();
-        assert_eq!(row.found + row.refused + row.wrong, attempts);
-        assert_eq!(row.reasons.values().sum::<usize>(), row.refused);
+        assert_eq!(row.found + row.rejected + row.wrong, attempts);
+        assert_eq!(row.reasons.values().sum::<usize>(), row.rejected);
     }
     let table = fs::read_to_string(folder.path().join("report/tables/outcomes.csv")).unwrap();
     assert_eq!(table.lines().count(), 1 + summary.rows.len());

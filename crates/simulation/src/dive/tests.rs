@@ -258,7 +258,7 @@ fn points_are_the_truth_with_pixel_noise() {
 }
 
 #[test]
-fn numbers_that_make_no_dive_are_refused() {
+fn numbers_that_make_no_dive_are_rejected() {
     for (dive, start) in [
         (Dive { distance: f64::NAN, ..small() }, "distance = NaN; "),
         (Dive { tilt_deg: [10.0, 5.0], ..small() }, "tilt-deg[1] = 5; "),

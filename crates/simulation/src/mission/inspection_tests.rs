@@ -174,7 +174,7 @@ fn a_gate_is_not_entered_where_it_is_empty() {
 /// An inspection without a clear view is rejected with place and remedy; so is a site or an object without points of
 /// interest.
 #[test]
-fn what_cannot_be_examined_is_refused() {
+fn what_cannot_be_examined_is_rejected() {
     let message = |mission: &Mission| mission.plan(3, 0, Path::new("")).unwrap_err()[0].to_string();
     let far = message(&mission("drill-centre", Route { clearance: 3.0, ..Route::default() }));
     assert!(far.contains("no clear view of `tree-a/valve-1` at north "), "{far}");

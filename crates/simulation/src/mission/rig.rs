@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_field_that_no_flat_port_has_is_refused_with_its_angle() {
+    fn a_field_that_no_flat_port_has_is_rejected_with_its_angle() {
         let flat = Port { kind: PortKind::Flat, ..Port::default() };
         let plan = RigPlan { port: flat, focal_in: FocalIn::Water, ..RigPlan::default() };
         let message = plan.check().unwrap_err();

@@ -122,15 +122,15 @@ fn prior_poses_come_from_the_sensors_when_asked() {
         let instant = plan.instant(index);
         let (pose, covariance) = instant.prior.unwrap();
         let miss = (pose.translation() - instant.truth().world_from_camera.translation()).norm();
-        assert!(miss < 4.0 * covariance.position_sigma(), "{miss} of {}", covariance.position_sigma());
-        assert!((0.05..1.0).contains(&covariance.position_sigma()));
+        assert!(miss < 4.0 * covariance.position_rms(), "{miss} of {}", covariance.position_rms());
+        assert!((0.05..1.0).contains(&covariance.position_rms()));
     }
     let deaf = DeviceFault { device: FaultyDevice::Acoustic, kind: FaultKind::Off, from: 0.0, to: 1e6, amount: 0.0 };
     assert!(planned(&Mission { faults: vec![deaf], ..mission }).instant(0).prior.is_none());
 }
 
 #[test]
-fn a_path_through_an_object_is_refused_with_place_and_time() {
+fn a_path_through_an_object_is_rejected_with_place_and_time() {
     let low = Route { kind: RouteKind::Orbit, altitude: 0.6, radius: 0.8, ..Route::default() };
     let faults = Mission { route: low, vehicle: Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() }, ..small() }
         .plan(1, 0, Path::new(""))
@@ -162,7 +162,7 @@ fn frames_of_points() {
 }
 
 #[test]
-fn a_lamp_in_the_middle_of_a_large_body_is_refused() {
+fn a_lamp_in_the_middle_of_a_large_body_is_rejected() {
     // A block of 4 m around the first lamp leaves no surface within 1.5 m of it.
     let mut plan = crate::scene::built_in("drill-centre").unwrap();
     let rail = Vehicle { kind: VehicleKind::Rail, ..Vehicle::default() };
@@ -245,7 +245,7 @@ fn a_sensor_away_from_the_centre_measures_the_motion_of_its_place() {
 }
 
 #[test]
-fn numbers_that_make_no_mission_are_refused() {
+fn numbers_that_make_no_mission_are_rejected() {
     let message = |mission: Mission| mission.plan(1, 0, Path::new("")).unwrap_err()[0].to_string();
     let water = |attenuation| Water { attenuation, ..Water::default() };
     assert!(message(Mission { water: water(-1.0), ..small() }).starts_with("water.attenuation = -1; give a number"));

@@ -163,7 +163,7 @@ fn factors_of_magnitude_zero_are_factors_left_out() {
 }
 
 #[test]
-fn a_refused_port_of_water_is_the_pinhole() {
+fn a_rejected_port_of_water_is_the_pinhole() {
     let scene = scene(&built_in("drill-centre").unwrap());
     let pose = above(scene.objects[3].centroid(), 3.0, 0.1);
     let radiance = |port: Port| {

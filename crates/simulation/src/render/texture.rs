@@ -356,8 +356,8 @@ fn pebbles(x: usize, y: usize, cells: u32, seed: u32) -> f32 {
     let radius = 0.1 + 0.3 * fraction(3) * fraction(3);
     let room = 1.0 - 2.0 * radius;
     let (du, dv) = (u - i as f32 - radius - room * fraction(8), v - j as f32 - radius - room * fraction(16));
-    let scale_error = 1.0 + 0.7 * fraction(20);
-    let (along, across) = if h & 0x800_0000 == 0 { (du, dv * scale_error) } else { (du * scale_error, dv) };
+    let elongation = 1.0 + 0.7 * fraction(20);
+    let (along, across) = if h & 0x800_0000 == 0 { (du, dv * elongation) } else { (du * elongation, dv) };
     let distance = (along * along + across * across).sqrt();
     let inside = ((radius - distance) / (0.25 * radius) + 0.5).clamp(0.0, 1.0);
     inside * (0.9 * fraction(24) - 0.5 + 0.15 * (du * 0.76 + dv * 0.65) / radius)

@@ -222,7 +222,7 @@ fn exact_ranges_determine_the_position() {
 }
 
 #[test]
-fn transponders_that_give_no_position_are_refused() {
+fn transponders_that_give_no_position_are_rejected() {
     let message = |transponders: Vec<[f64; 3]>| Lbl { transponders, ..Lbl::default() }.check().unwrap_err();
     assert_eq!(message(vec![[0.0; 3]; 2]), "sensors.lbl.transponders = 2; give 3 to 8 positions, or none");
     let twice = message(vec![[0.0; 3], [50.0, 0.0, 0.0], [0.0; 3]]);

@@ -52,7 +52,7 @@ struct Wanted {
 
 /// Numbers of rejected places about a point, by cause.
 #[derive(Debug, Clone, Copy, Default)]
-struct Refused {
+struct Rejected {
     touching: usize,
     outside: usize,
     hidden: usize,
@@ -162,7 +162,7 @@ impl<'a> Ground<'a> {
 
     /// The view of a point nearest to its normal.
     fn view(&self, point: &Wanted) -> Result<Stand, String> {
-        let mut refused = Refused::default();
+        let mut rejected = Rejected::default();
         let across = across_of(&point.normal);
         let other = point.normal.cross(&across);
         for degrees in (0..=OBLIQUE_DEG).step_by(RING_DEG as usize) {
@@ -171,7 +171,7 @@ impl<'a> Ground<'a> {
             for place in 0..if degrees == 0 { 1 } else { PLACES } {
                 let (y, x) = libm::sincos(std::f64::consts::TAU * f64::from(place) / f64::from(PLACES));
                 let from = point.normal * cosine + (across * x + other * y) * sine;
-                if let Some((off, stand)) = self.stand(point, &from, &mut refused)
+                if let Some((off, stand)) = self.stand(point, &from, &mut rejected)
                     && best.is_none_or(|(min, _)| off < min - 1e-9)
                 {
                     best = Some((off, stand));
@@ -181,7 +181,7 @@ impl<'a> Ground<'a> {
                 return Ok(stand);
             }
         }
-        let Refused { touching, outside, hidden, under } = refused;
+        let Rejected { touching, outside, hidden, under } = rejected;
         Err(format!(
             "route: no clear view of `{}` at north {:.2}, east {:.2}, depth {:.2} m from {} m within \
              {OBLIQUE_DEG}° of its normal: {touching} viewpoints are within {} m of a bounding box, a body or the \
@@ -192,7 +192,7 @@ impl<'a> Ground<'a> {
     }
 
     /// The best view from the direction `from`, with the point's angle to the optical axis (rad).
-    fn stand(&self, point: &Wanted, from: &Vector3<f64>, refused: &mut Refused) -> Option<(f64, Stand)> {
+    fn stand(&self, point: &Wanted, from: &Vector3<f64>, rejected: &mut Rejected) -> Option<(f64, Stand)> {
         let at = point.at + from * self.route.stand_off;
         let ahead = -from.xy();
         let straight = if ahead.norm() > 1e-6 { libm::atan2(ahead.y, ahead.x) } else { 0.0 };
@@ -208,12 +208,12 @@ impl<'a> Ground<'a> {
             .collect();
         seeing.sort_by(|a, b| a.0.total_cmp(&b.0));
         if seeing.is_empty() {
-            refused.outside += 1;
+            rejected.outside += 1;
             return None;
         }
         seeing.retain(|(_, stand)| self.clear(stand));
         if seeing.is_empty() {
-            refused.touching += 1;
+            rejected.touching += 1;
             return None;
         }
         seeing.retain(|(_, stand)| {
@@ -225,12 +225,12 @@ impl<'a> Ground<'a> {
             })
         });
         if seeing.is_empty() {
-            refused.hidden += 1;
+            rejected.hidden += 1;
             return None;
         }
         seeing.retain(|(_, stand)| self.clear_along(stand, &self.above(stand, self.cruise)));
         if seeing.is_empty() {
-            refused.under += 1;
+            rejected.under += 1;
         }
         seeing.first().copied()
     }

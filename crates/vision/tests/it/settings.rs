@@ -55,7 +55,7 @@ fn range<T: ?Sized>(registry: &Registry<T>, name: &str, key: &str, inside: &[f64
 }
 
 #[test]
-fn harris_refuses_what_finds_nothing() {
+fn harris_rejects_what_finds_nothing() {
     range(&DETECTORS, "harris", "sigma", &[0.3, 100.0], &[0.0, 0.01, 0.29, -1.0, 101.0]);
     range(&DETECTORS, "harris", "k", &[0.0, 0.24], &[-0.04, 0.25]);
     range(&DETECTORS, "harris", "quality", &[0.0, 1.0], &[-0.1, 1.1]);
@@ -138,7 +138,7 @@ fn dog_and_sift_refuse_what_they_cannot_do() {
 }
 
 #[test]
-fn zncc_patch_refuses_what_is_no_window() {
+fn zncc_patch_rejects_what_is_no_window() {
     range(&DESCRIPTORS, "zncc-patch", "step", &[0.1, 100.0], &[0.0, -1.0, 101.0]);
     range(&DESCRIPTORS, "zncc-patch", "sigma", &[0.0, 100.0], &[-1.0, 101.0]);
     for window in [1, 10, 53] {
@@ -161,7 +161,7 @@ fn epipolar_band_needs_a_band() {
 }
 
 #[test]
-fn zncc_band_refuses_what_matches_nothing() {
+fn zncc_band_rejects_what_matches_nothing() {
     range(&MATCHERS, "zncc-band", "epipolar-px", &[0.1, 100.0], &[0.0, -1.0, 101.0]);
     range(&MATCHERS, "zncc-band", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
     range(&MATCHERS, "zncc-band", "min-correlation", &[-1.0, 1.0], &[-1.1, 1.1]);
@@ -188,7 +188,7 @@ fn fitted_corners_refuse_what_finds_nothing() {
 }
 
 #[test]
-fn mutual_ratio_refuses_what_matches_nothing() {
+fn mutual_ratio_rejects_what_matches_nothing() {
     range(&MATCHERS, "mutual-ratio", "ratio", &[0.1, 1.0], &[0.0, -1.0, 1.1]);
     range(&MATCHERS, "mutual-ratio", "max-distance", &[0.1, 2.0], &[0.0, -0.7, 2.1]);
     assert!(
@@ -198,7 +198,7 @@ fn mutual_ratio_refuses_what_matches_nothing() {
 }
 
 #[test]
-fn lucas_kanade_refuses_what_follows_nothing() {
+fn lucas_kanade_rejects_what_follows_nothing() {
     range(&MATCHERS, "lucas-kanade", "epipolar-px", &[0.1, 1000.0], &[0.0, -1.0, 1001.0]);
     range(&MATCHERS, "lucas-kanade", "min-depth", &[0.1, 49.0], &[0.0, -0.1]);
     range(&MATCHERS, "lucas-kanade", "max-depth", &[0.2], &[0.1, 0.0]);
@@ -256,7 +256,7 @@ fn triangulators_refuse_what_gives_no_point() {
 }
 
 #[test]
-fn junction_refuses_a_window_that_is_none() {
+fn junction_rejects_a_window_that_is_none() {
     range(&LOCATORS, "junction", "sigma", &[0.3, 100.0], &[0.0, 0.01, 0.29, -2.5, 101.0]);
 }
 

@@ -16,8 +16,8 @@ pub(super) struct Matched {
     pub(super) reference: Vec<Pose>,
     pub(super) estimate: Vec<Pose>,
     pub(super) stamps: Option<Vec<u64>>,
-    /// The first index of every stretch without a break, from 0; motions between stretches are unknown.
-    pub(super) stretches: Vec<usize>,
+    /// The first index of every section without a break, from 0; motions between sections are unknown.
+    pub(super) sections: Vec<usize>,
     /// The numbers of poses of the two files.
     pub(super) of: (usize, usize),
     /// The fraction of the reference's time between the first and the last matched pose.
@@ -35,13 +35,13 @@ impl Matched {
     /// The distance of the last poses (m) of the trajectories with equal first poses; `None` after a break.
     pub(super) fn end(&self) -> Option<f64> {
         let trajectory = |poses: &[Pose]| poses[0].to(&poses[poses.len() - 1]).position;
-        (self.stretches.len() == 1).then(|| (trajectory(&self.reference) - trajectory(&self.estimate)).norm())
+        (self.sections.len() == 1).then(|| (trajectory(&self.reference) - trajectory(&self.estimate)).norm())
     }
 
-    /// The stretches without a break, as ranges of indices.
-    pub(super) fn stretches(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
-        let ends = self.stretches.iter().skip(1).copied().chain([self.reference.len()]);
-        self.stretches.iter().copied().zip(ends).map(|(from, to)| from..to)
+    /// The sections without a break, as ranges of indices.
+    pub(super) fn sections(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let ends = self.sections.iter().skip(1).copied().chain([self.reference.len()]);
+        self.sections.iter().copied().zip(ends).map(|(from, to)| from..to)
     }
 }
 
@@ -83,7 +83,7 @@ impl Eval {
         let lacks = |trajectory: &Trajectory, file: &Path| (!trajectory.has_attitude).then(|| file.to_owned());
         let without_attitude = lacks(&reference, &self.reference).or(lacks(&estimate, self.estimate()));
         let of = (reference.poses.len(), estimate.poses.len());
-        let refuse = |what: String| {
+        let input_error = |what: String| {
             let (a, b) = (self.reference.display(), self.estimate().display());
             Err(Failure::new(INPUT, format!("{what} in {a} and {b}")))
         };
@@ -95,7 +95,7 @@ impl Eval {
             }
             (a, b) if of.0 == of.1 => ((0..of.0).map(|i| (i, i)).collect(), a.clone().or_else(|| b.clone())),
             _ => {
-                return refuse(format!(
+                return input_error(format!(
                     "cannot associate {} and {} poses without stamps; give stamps, or equal numbers of poses,",
                     of.0, of.1
                 ));
@@ -110,7 +110,7 @@ impl Eval {
         };
         if belong.len() < 2 {
             let found = format!("only {} of {} and {} poses are associated", belong.len(), of.0, of.1);
-            let (Some(a), Some(b)) = (&reference.stamps, &estimate.stamps) else { return refuse(found) };
+            let (Some(a), Some(b)) = (&reference.stamps, &estimate.stamps) else { return input_error(found) };
             let (left, right) = (self.reference.display(), self.estimate().display());
             let why = unassociated::reason(a, b, tolerance, offset);
             return Err(Failure::new(INPUT, format!("{found} in {left} and {right}: {why}")));
@@ -120,7 +120,7 @@ impl Eval {
             between(&reference.breaks, before.0, now.0) || between(&estimate.breaks, before.1, now.1)
         };
         let broken = (1..belong.len()).filter(|&k| broken(&belong[k - 1], &belong[k]));
-        let stretches = std::iter::once(0).chain(broken).collect();
+        let sections = std::iter::once(0).chain(broken).collect();
         let mut both: Vec<(Pose, Pose)> =
             belong.iter().map(|&(i, j)| (reference.poses[i], estimate.poses[j])).collect();
         if let (SyncMethod::Interpolation, Some(a), Some(b)) = (self.sync_method, &reference.stamps, &estimate.stamps) {
@@ -134,7 +134,7 @@ impl Eval {
             }
         }
         let (reference, estimate) = both.into_iter().unzip();
-        Ok(Matched { reference, estimate, stamps, stretches, of, covered, without_attitude })
+        Ok(Matched { reference, estimate, stamps, sections, of, covered, without_attitude })
     }
 
     /// Removes the poses of the reference outside the evaluated time.

@@ -214,7 +214,7 @@ impl Eval {
         let delta = self.delta()?;
         let mut matched = self.matched()?;
         let measures = self.measures(&matched)?;
-        if let [0] = matched.stretches[..] {
+        if let [0] = matched.sections[..] {
             let has_attitude = matched.without_attitude.is_none();
             let fault = trajectory_fault(&matched.reference, &matched.estimate, has_attitude, self.estimate());
             fault.iter().for_each(|fault| notify(&format!("warning: {fault}")));
@@ -231,11 +231,11 @@ impl Eval {
         let along = if self.pairs_from_reference { &matched.reference } else { &matched.estimate };
         // Motions across a break are unknown and not evaluated.
         let (mut both, mut segments) = (Vec::new(), Vec::new());
-        for scale_error in matched.stretches() {
-            let from = scale_error.start;
-            let own = pairs(&along[scale_error.clone()], delta, self.all_pairs, self.delta_tol);
+        for section in matched.sections() {
+            let from = section.start;
+            let own = pairs(&along[section.clone()], delta, self.all_pairs, self.delta_tol);
             both.extend(own.into_iter().map(|(i, j)| (from + i, from + j)));
-            let (reference, estimate) = (&matched.reference[scale_error.clone()], &matched.estimate[scale_error]);
+            let (reference, estimate) = (&matched.reference[section.clone()], &matched.estimate[section]);
             let own = match matched.without_attitude {
                 None => drift(reference, estimate, &self.segments),
                 Some(_) => drift_of_positions(reference, estimate, &self.segments),
@@ -255,11 +255,11 @@ impl Eval {
             alignment,
             relation: measures.rpe,
         };
-        if matched.stretches.len() > 1 {
+        if matched.sections.len() > 1 {
             notify(&format!(
                 "warning: the trajectory is broken {}; RPE and drift are computed between the breaks, and APE is valid only if \
                  the rig did not move in them",
-                times(matched.stretches.len() - 1)
+                times(matched.sections.len() - 1)
             ));
         }
         if matched.covered < MOSTLY {
@@ -278,7 +278,7 @@ impl Eval {
             ));
         }
         if let Some(file) = &self.out {
-            let breaks = matched.stretches[1..].to_vec();
+            let breaks = matched.sections[1..].to_vec();
             let trajectory = Trajectory {
                 stamps: matched.stamps.clone(),
                 poses: matched.estimate.clone(),
@@ -290,7 +290,7 @@ impl Eval {
             let file_out = AtomicFile::begin(file, self.replacing, &inputs)?;
             file_out.finish(trajectory.print(Format::of_name(file)))?;
         }
-        print(&if self.json { self.machine(&matched, &found) } else { self.people(&matched, &found) })?;
+        print(&if self.json { self.json(&matched, &found) } else { self.text(&matched, &found) })?;
         Ok(DONE)
     }
 
@@ -299,15 +299,15 @@ impl Eval {
         let Name(relation) = self.relation;
         let ape = relation.is_absolute().then_some(relation);
         let Some(file) = &matched.without_attitude else { return Ok(Measures { ape, rpe: relation }) };
-        let refuse = |what: &str| {
+        let usage_error = |what: &str| {
             let remedy = "positions allow trans_part (APE), point_distance and point_distance_error_ratio";
             Err(Failure::new(INPUT, format!("no attitude in {}: {what}; {remedy}", file.display())))
         };
         if self.align_origin {
-            return refuse("--align-origin needs one; use --align");
+            return usage_error("--align-origin needs one; use --align");
         }
         if matches!(self.delta_unit, Unit::D | Unit::R) {
-            return refuse("a --delta of an angle needs one; give frames or metres");
+            return usage_error("a --delta of an angle needs one; give frames or metres");
         }
         match relation {
             Relation::Translation => {
@@ -315,7 +315,7 @@ impl Eval {
                 Ok(Measures { ape, rpe: Relation::PointDistance })
             }
             Relation::PointDistance | Relation::PointDistanceRatio => Ok(Measures { ape, rpe: relation }),
-            _ => refuse(&format!("{} needs one", relation.name())),
+            _ => usage_error(&format!("{} needs one", relation.name())),
         }
     }
 
@@ -325,9 +325,9 @@ impl Eval {
     }
 
     fn delta(&self) -> Result<Delta, Failure> {
-        let refuse = |what: &str| Err(Failure::new(USAGE, format!("invalid --delta {}: {what}", self.delta)));
+        let usage_error = |what: &str| Err(Failure::new(USAGE, format!("invalid --delta {}: {what}", self.delta)));
         if !(self.delta > 0.0 && self.delta.is_finite()) {
-            return refuse("give a number above zero");
+            return usage_error("give a number above zero");
         }
         if !(self.delta_tol >= 0.0 && self.delta_tol.is_finite()) {
             return Err(Failure::new(
@@ -339,12 +339,12 @@ impl Eval {
             return Err(Failure::new(USAGE, format!("invalid --segments {wrong}; give lengths above zero, in metres")));
         }
         match self.delta_unit {
-            Unit::F if self.delta.fract() != 0.0 => refuse("give a whole number of frames"),
+            Unit::F if self.delta.fract() != 0.0 => usage_error("give a whole number of frames"),
             Unit::F => Ok(Delta::Frames(self.delta as usize)),
             Unit::M => Ok(Delta::Metres(self.delta)),
-            Unit::D if self.delta > 180.0 => refuse("give an angle of at most 180 degrees"),
+            Unit::D if self.delta > 180.0 => usage_error("give an angle of at most 180 degrees"),
             Unit::D => Ok(Delta::Radians(self.delta.to_radians())),
-            Unit::R if self.delta > std::f64::consts::PI => refuse("give an angle of at most pi"),
+            Unit::R if self.delta > std::f64::consts::PI => usage_error("give an angle of at most pi"),
             Unit::R => Ok(Delta::Radians(self.delta)),
         }
     }

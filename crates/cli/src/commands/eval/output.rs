@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::{Errors, Eval, Name, Unit, matched::Matched};
 
 impl Eval {
-    pub(super) fn people(&self, matched: &Matched, found: &Errors) -> String {
+    pub(super) fn text(&self, matched: &Matched, found: &Errors) -> String {
         let Name(relation) = self.relation;
         let n = matched.reference.len();
         let mut text = format!(
@@ -25,7 +25,7 @@ impl Eval {
             Some(alignment) if self.scale => format!("alignment  similarity, scale {:.6}\n", alignment.scale),
             Some(_) => "alignment  rigid\n".to_owned(),
         };
-        text += &match matched.stretches.len() {
+        text += &match matched.sections.len() {
             1 => String::new(),
             count => format!("segments   {count}, with breaks between them\n"),
         };
@@ -94,7 +94,7 @@ impl Eval {
         self.segments.iter().map(|&length| of(length)).collect()
     }
 
-    pub(super) fn machine(&self, matched: &Matched, found: &Errors) -> String {
+    pub(super) fn json(&self, matched: &Matched, found: &Errors) -> String {
         let segments: Vec<Value> = self
             .segments(found)
             .iter()
@@ -118,7 +118,7 @@ impl Eval {
             "rpe": summary(&found.rpe),
             "rpe_relation": found.relation.name(),
             "segments": segments,
-            "breaks": matched.stretches[1..].iter().map(|&at| match &matched.stamps {
+            "breaks": matched.sections[1..].iter().map(|&at| match &matched.stamps {
                 Some(stamps) => json!({ "pose": at, "stamp_ns": stamps[at] }),
                 None => json!({ "pose": at }),
             }).collect::<Vec<Value>>(),

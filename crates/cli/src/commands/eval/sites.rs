@@ -48,7 +48,7 @@ pub(super) fn execute(reference: &Path, built: Option<&Path>, as_json: bool) -> 
             compared.missing, compared.object
         ));
     }
-    print(&if as_json { machines(&compared) } else { people(&compared) })?;
+    print(&if as_json { json(&compared) } else { text(&compared) })?;
     Ok(DONE)
 }
 
@@ -97,7 +97,7 @@ fn compare(surveyed: &SiteObject, built: &SiteObject, file: &Path) -> Result<Com
 /// The significance of a scale other than one, in standard deviations, that deserves a sentence.
 const SIGNIFICANT: f64 = 3.0;
 
-fn people(compared: &[Compared]) -> String {
+fn text(compared: &[Compared]) -> String {
     let line = |compared: &Compared| {
         let Compared { object, points, found, .. } = compared;
         let worst = found.differences[found.worst].norm() * 1e3;
@@ -125,7 +125,7 @@ fn people(compared: &[Compared]) -> String {
     compared.iter().map(line).collect()
 }
 
-fn machines(compared: &[Compared]) -> String {
+fn json(compared: &[Compared]) -> String {
     let object = |compared: &Compared| -> Value {
         let Compared { object, points, missing, found } = compared;
         json!({

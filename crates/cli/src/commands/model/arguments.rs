@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{
-    super::{limits::Limits, pairs_of::PairsOf},
+    super::{limits::Limits, pair_source::PairSource},
     dive_arguments::DiveArguments,
 };
 use crate::{
@@ -36,7 +36,7 @@ pub(crate) struct Model {
     #[command(flatten)]
     pub(super) dive: DiveArguments,
     #[command(flatten)]
-    pub(super) pairs_of: PairsOf,
+    pub(super) pair_source: PairSource,
     /// The id of the object.
     #[arg(long, default_value = "object")]
     pub(super) id: String,
@@ -68,8 +68,8 @@ pub(crate) struct Model {
 /// The outputs of a model.
 pub(super) struct Printed {
     pub(super) site: String,
-    pub(super) people: String,
-    pub(super) machines: String,
+    pub(super) text: String,
+    pub(super) json: String,
     pub(super) warnings: Vec<String>,
 }
 
@@ -81,10 +81,10 @@ impl Model {
             AtomicFile::begin(path, self.replacing, inputs)?.finish(&printed.site)?;
         }
         match (self.json, &self.out) {
-            (true, _) => print(&printed.machines)?,
-            (false, Some(_)) => print(&printed.people)?,
+            (true, _) => print(&printed.json)?,
+            (false, Some(_)) => print(&printed.text)?,
             (false, None) => {
-                printed.people.lines().for_each(notify);
+                printed.text.lines().for_each(notify);
                 print(&printed.site)?;
             }
         }

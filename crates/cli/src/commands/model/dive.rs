@@ -8,7 +8,7 @@ use seafix_vision::LineFrontEnd;
 use serde_json::{Value, json};
 
 use super::{
-    super::pairs_of::turned,
+    super::pair_source::turned,
     arguments::{Model, Printed},
     page, pair,
 };
@@ -20,7 +20,7 @@ use crate::{
 
 /// The pairs of a dive, with their rig as the images show it; warnings are printed.
 pub(super) fn opened(model: &Model) -> Result<StereoPairs, Failure> {
-    let mut pairs = model.pairs_of.open(&model.left, false, model.limits.of_images())?;
+    let mut pairs = model.pair_source.open(&model.left, false, model.limits.of_images())?;
     pairs.warnings.iter().for_each(|warning| notify(&format!("warning: {warning}")));
     if let Some(fault) = pairs.swapped() {
         return Err(Failure::new(INPUT, fault));
@@ -45,21 +45,21 @@ pub(super) fn execute(
     let arguments = &model.dive;
     let dive = opened(model)?;
     let odometry = arguments.odometry(&dive)?;
-    let text = read_text(marks).map_err(|fault| Failure::new(INPUT, fault))?;
+    let content = read_text(marks).map_err(|fault| Failure::new(INPUT, fault))?;
     let inputs = [&*model.left, marks];
     let (halves, pictures) = (arguments.half, arguments.page.is_some());
     let corner_sigma = arguments.corner_sigma;
     let from_dive =
         ModelFromDive { by_hand, calibration, corner_sigma, edges, odometry: odometry.as_deref(), halves, pictures };
     if dive.stamps().len() == 1 {
-        let built = from_dive.of_only_pair(&dive, &text, marks).map_err(faults)?;
+        let built = from_dive.of_only_pair(&dive, &content, marks).map_err(faults)?;
         return model.finish(&pair::printed(&built), &inputs);
     }
     // An output that cannot be written is reported before the work.
     let page = arguments.page.as_deref().map(|path| AtomicFile::begin(path, model.replacing, &inputs)).transpose()?;
     let progress = Progress::new();
     progress.expect(dive.stamps().len());
-    let built = arguments.pool()?.install(|| from_dive.model(&dive, &text, marks, &mut || progress.step("")));
+    let built = arguments.pool()?.install(|| from_dive.model(&dive, &content, marks, &mut || progress.step("")));
     progress.end();
     let built = built.map_err(faults)?;
     if let Some(page) = page {
@@ -67,8 +67,8 @@ pub(super) fn execute(
     }
     let printed = Printed {
         site: built.site.to_toml(),
-        people: people(&built),
-        machines: machines(&built),
+        text: text(&built),
+        json: json(&built),
         warnings: built.warnings.iter().map(ToString::to_string).collect(),
     };
     model.finish(&printed, &inputs)
@@ -95,8 +95,8 @@ fn views(model: &DiveModel) -> Result<String, String> {
     page::page(&model.site.name, &introduction, &entries)
 }
 
-/// The output for people: position, standard deviation and views of each point.
-fn people(model: &DiveModel) -> String {
+/// The output as text: position, standard deviation and views of each point.
+fn text(model: &DiveModel) -> String {
     let mut text = format!(
         "{:16} {:>9} {:>9} {:>9}  {:>7} {:>6} {:>9} {:>9}\n",
         "point", "x mm", "y mm", "z mm", "σ mm", "views", "parallax", "rejected"
@@ -135,7 +135,7 @@ fn people(model: &DiveModel) -> String {
 }
 
 /// The output for programs: one JSON object.
-fn machines(model: &DiveModel) -> String {
+fn json(model: &DiveModel) -> String {
     let point = |point: &DivePoint| -> Value {
         json!({
             "id": point.id,

@@ -7,7 +7,7 @@ use seafix_component::Choice;
 use seafix_data::{CalibrationSigma, ModelFromDive, StereoPairs};
 use seafix_navigation::{ODOMETRIES, Odometry};
 
-use super::super::pairs_of::with_readings;
+use super::super::pair_source::with_readings;
 use crate::exit::{Failure, OUTPUT, USAGE};
 
 #[derive(Debug, Args)]

@@ -56,7 +56,7 @@ impl Model {
                 dive::execute(self, marks, by_hand, calibration, self.dive.edges.then_some(&lines))
             }
             (None, Some(right), Some(rig), Some(points)) => {
-                self.pairs_of.of_no_recording()?;
+                self.pair_source.of_no_recording()?;
                 pair::execute(self, &PairFiles { left: &self.left, right, rig, points }, &by_hand)
             }
             // The parser of the command line requires the others without --marks.

@@ -41,8 +41,8 @@ pub(super) fn execute(model: &Model, files: &PairFiles<'_>, by_hand: &ModelByHan
 pub(super) fn printed(model: &HandModel) -> Printed {
     Printed {
         site: model.site.to_toml(),
-        people: people(model),
-        machines: machines(model),
+        text: text(model),
+        json: json(model),
         warnings: model.warnings.iter().map(ToString::to_string).collect(),
     }
 }
@@ -59,8 +59,8 @@ fn found(point: &HandPoint) -> [&'static str; 2] {
     [left, right]
 }
 
-/// The output for people: position, standard deviation and method of each point.
-fn people(model: &HandModel) -> String {
+/// The output as text: position, standard deviation and method of each point.
+fn text(model: &HandModel) -> String {
     let mut text = format!(
         "{:16} {:>9} {:>9} {:>9}  {:>7} {:>7}  {:9} right\n",
         "point", "x mm", "y mm", "z mm", "σ mm", "depth m", "left"
@@ -80,7 +80,7 @@ fn people(model: &HandModel) -> String {
 }
 
 /// The output for programs: one JSON object.
-fn machines(model: &HandModel) -> String {
+fn json(model: &HandModel) -> String {
     let point = |point: &HandPoint| -> Value {
         let [left, right] = found(point);
         json!({

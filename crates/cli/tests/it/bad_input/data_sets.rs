@@ -2,19 +2,19 @@
 
 use std::fs;
 
-use super::{SITE, Sample, refused};
+use super::{SITE, Sample, rejected};
 use crate::{ended_with, program};
 
 /// Each of these changes of the description is rejected with its own message.
-fn each_refused(changes: &[(&str, &str, &[&str])]) {
+fn each_rejected(changes: &[(&str, &str, &[&str])]) {
     for (from, to, parts) in changes {
-        Sample::new().change("dataset.toml", from, to).refused(3, &[&["dataset.toml:"], *parts].concat());
+        Sample::new().change("dataset.toml", from, to).rejected(3, &[&["dataset.toml:"], *parts].concat());
     }
 }
 
 #[test]
 fn cameras_in_one_place() {
-    each_refused(&[
+    each_rejected(&[
         ("-0.25]", "0.0]", &["baseline is 0.0e0 m"]),
         ("-0.25]", "-9e-7]", &["baseline is 9.0e-7 m"]),
         ("-0.25]", "nan]", &[]),
@@ -32,14 +32,14 @@ fn cameras_that_cannot_be() {
         ("fx = 50.0\nfy = 50.0\ncx = 64.5\ncy = 23.5", ["cx = 64.5", "must lie in the image"]),
         ("fx = 50.0\nfy = 50.0\ncx = 31.5\ncy = -1.0", ["cy = -1", "must lie in the image"]),
     ] {
-        each_refused(&[(&sound, &left(numbers), &parts)]);
+        each_rejected(&[(&sound, &left(numbers), &parts)]);
     }
-    each_refused(&[("[rig.left]\nsize = [64, 48]", "[rig.left]\nsize = [0, 48]", &["size = [0, 48]"])]);
+    each_rejected(&[("[rig.left]\nsize = [64, 48]", "[rig.left]\nsize = [0, 48]", &["size = [0, 48]"])]);
 }
 
 #[test]
 fn a_rig_that_is_no_rotation() {
-    each_refused(&[
+    each_rejected(&[
         ("[[1.0, 0.0, 0.0, -0.25]", "[[1.1, 0.0, 0.0, -0.25]", &["orthonormal"]),
         ("[[1.0, 0.0, 0.0, -0.25]", "[[1.00001, 0.0, 0.0, -0.25]", &["orthonormal"]),
         ("[[1.0, 0.0, 0.0, -0.25]", "[[-1.0, 0.0, 0.0, -0.25]", &[]),
@@ -50,7 +50,7 @@ fn a_rig_that_is_no_rotation() {
 #[test]
 fn a_quaternion_off_unit_length() {
     for q in ["0 0 0 0", "0 0 0 1.0011", "0 0 0 0.9989", "0 0 0 nan"] {
-        Sample::new().put("prior.tum", &format!("1.0 0 0 -3 {q}\n")).refused(3, &["prior.tum:1"]);
+        Sample::new().put("prior.tum", &format!("1.0 0 0 -3 {q}\n")).rejected(3, &["prior.tum:1"]);
     }
     let sample = Sample::new();
     sample.put("prior.tum", "1.0 0 0 -3 0 0 0 1.0009\n");
@@ -76,14 +76,14 @@ fn a_collinear_base() {
     Sample::new()
         .change("site.toml", "at = [0.0, -1.0, 0.0]", "at = [1.0, 0.0, 0.0]")
         .change("site.toml", "[0.0, -1.0, 0.0]", "[1.0, 0.0, 0.0]")
-        .refused(3, &["site.toml:8", "collinear"]);
+        .rejected(3, &["site.toml:8", "collinear"]);
 }
 
 #[test]
 fn a_coordinate_that_is_no_number() {
     Sample::new()
         .change("site.toml", "at = [2.0, 0.0, 0.0]", "at = [2.0, nan, 0.0]")
-        .refused(3, &["site.toml:", "C", "NaN"]);
+        .rejected(3, &["site.toml:", "C", "NaN"]);
 }
 
 #[test]
@@ -103,26 +103,26 @@ fn the_sound_sample_runs() {
 fn an_unknown_key_of_a_data_set() {
     Sample::new()
         .change("dataset.toml", "licence =", "license =")
-        .refused(3, &["dataset.toml:3", "`license`", "`licence`"]);
+        .rejected(3, &["dataset.toml:3", "`license`", "`licence`"]);
 }
 
 #[test]
 fn a_missing_file() {
     Sample::new()
         .change("dataset.toml", "site.toml", "sight.toml")
-        .refused(3, &["dataset.toml:5", "sight.toml", "does not exist"]);
+        .rejected(3, &["dataset.toml:5", "sight.toml", "does not exist"]);
 }
 
 #[test]
 fn a_path_that_leads_out() {
-    Sample::new().change("frames.csv", "a.pgm,b.pgm", "../a.pgm,b.pgm").refused(3, &["frames.csv:2", "leads out"]);
+    Sample::new().change("frames.csv", "a.pgm,b.pgm", "../a.pgm,b.pgm").rejected(3, &["frames.csv:2", "leads out"]);
 }
 
 #[test]
 fn an_output_folder_that_is_not_empty() {
     let sample = Sample::new();
     let folder = sample.folder.path().to_str().unwrap();
-    refused(&["run", folder, "--out", folder], 4, &["not empty", "--out"]);
+    rejected(&["run", folder, "--out", folder], 4, &["not empty", "--out"]);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::{experiment, refused};
+use super::{experiment, rejected};
 use crate::program;
 
 #[test]
@@ -62,7 +62,7 @@ fn dives_that_cannot_be() {
         let out = folder.path().join("out");
         // The code is 2 for settings, 3 for a site or a route over it.
         let code = if parts[0].starts_with("e.toml") { 2 } else { 3 };
-        refused(&["dive", &file, "--out", out.to_str().unwrap()], code, &parts);
+        rejected(&["dive", &file, "--out", out.to_str().unwrap()], code, &parts);
         assert!(!out.exists(), "{text}");
         if parts[0].contains("geometry") {
             let geometry = folder.path().join(parts[0].trim_end_matches(':'));

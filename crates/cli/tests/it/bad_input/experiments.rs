@@ -4,20 +4,20 @@ use std::path::Path;
 
 use tempfile::TempDir;
 
-use super::{experiment, refused};
+use super::{experiment, rejected};
 use crate::program;
 
 /// Seen to fail when lines are counted one too far.
 #[test]
 fn an_unknown_key_of_an_experiment() {
     let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n[pipeline]\nsolvr = 'triad'\n");
-    refused(&["run", &file], 2, &["e.toml:4", "`solvr`", "`solver`"]);
+    rejected(&["run", &file], 2, &["e.toml:4", "`solvr`", "`solver`"]);
 }
 
 #[test]
 fn an_unknown_component() {
     let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n[pipeline]\nsolver = 'kabsh'\n");
-    refused(&["run", &file], 2, &["e.toml:4", "no solver is called `kabsh`, did you mean `kabsch`?"]);
+    rejected(&["run", &file], 2, &["e.toml:4", "no solver is called `kabsh`, did you mean `kabsch`?"]);
 }
 
 /// Seen to fail when lines are counted one too far.
@@ -25,7 +25,7 @@ fn an_unknown_component() {
 fn an_unknown_setting() {
     let (_folder, file) =
         experiment("question = 'why'\nsource = 'virtual-points'\n[pipeline.solver]\nname = 'triad'\nchose = 'first'\n");
-    refused(&["run", &file], 2, &["e.toml:5", "did you mean `choose`?"]);
+    rejected(&["run", &file], 2, &["e.toml:5", "did you mean `choose`?"]);
 }
 
 /// B32. A type error, a date in place of a number, a duplicate key: rejected with the line, and nothing is written.
@@ -55,7 +55,7 @@ fn a_setting_of_another_type_or_twice() {
         ("[pipeline]\nsearch = 'icp'\n[pipeline]\n", ["e.toml:5", "duplicate key", "pipeline"]),
     ] {
         let (_folder, file) = experiment(&format!("question = 'why'\nsource = 'virtual-points'\n{text}"));
-        refused(&["run", &file, "--out", out.to_str().unwrap()], 2, &parts);
+        rejected(&["run", &file, "--out", out.to_str().unwrap()], 2, &parts);
         assert!(!out.exists(), "{text}");
     }
 }
@@ -181,7 +181,7 @@ fn an_unknown_filter_among_filters() {
     let (_folder, file) = experiment(
         "question = 'why'\nsource = 'virtual-points'\n[pipeline]\nfilters = [\n  'clahe',\n  { name = 'medain' },\n]\n",
     );
-    refused(&["run", &file], 2, &["e.toml:6", "no filter is called `medain`, did you mean `median`?"]);
+    rejected(&["run", &file], 2, &["e.toml:6", "no filter is called `medain`, did you mean `median`?"]);
 }
 
 /// Seen to fail when lines are counted one too far.
@@ -189,7 +189,7 @@ fn an_unknown_filter_among_filters() {
 fn a_value_out_of_range() {
     let (_folder, file) = experiment("question = 'why'\n[source]\nname = 'virtual-points'\ndistance = -1.0\n");
     let run = Path::new(&file).with_file_name("out");
-    refused(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:4", "distance = -1", "from 1 to 30"]);
+    rejected(&["run", &file, "--out", run.to_str().unwrap()], 2, &["e.toml:4", "distance = -1", "from 1 to 30"]);
     assert!(!run.exists());
 }
 
@@ -216,12 +216,12 @@ fn settings_of_the_pipeline_out_of_range() {
     ] {
         let (_folder, file) = experiment("question = 'why'\nsource = 'virtual-points'\n");
         let set = format!("pipeline.{setting}");
-        refused(&["run", &file, "--set", &set, "--out", out.to_str().unwrap()], 2, &["; give "]);
+        rejected(&["run", &file, "--set", &set, "--out", out.to_str().unwrap()], 2, &["; give "]);
         assert!(!out.exists(), "{setting}");
     }
 }
 
 #[test]
 fn an_experiment_that_is_not_there() {
-    refused(&["run", "nowhere.toml"], 2, &["nowhere.toml"]);
+    rejected(&["run", "nowhere.toml"], 2, &["nowhere.toml"]);
 }

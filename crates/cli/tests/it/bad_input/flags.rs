@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use tempfile::TempDir;
 
-use super::refused;
+use super::rejected;
 
 /// A setting that a component rejects is attributed to the change on the command line that made it so.
 #[test]
@@ -33,6 +33,6 @@ fn a_rejected_change_is_attributed_to_the_flag() {
     for (command, settings, reported) in cases {
         let mut arguments: Vec<&str> = command.iter().map(String::as_str).collect();
         settings.iter().for_each(|setting| arguments.extend(["--set", setting]));
-        refused(&arguments, 2, &[reported, &format!(" in --set: {}", settings[0])]);
+        rejected(&arguments, 2, &[reported, &format!(" in --set: {}", settings[0])]);
     }
 }

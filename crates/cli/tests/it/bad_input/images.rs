@@ -4,12 +4,12 @@ use std::{fs, path::Path};
 
 use tempfile::TempDir;
 
-use super::{Sample, pgm, refused};
+use super::{Sample, pgm, rejected};
 use crate::program;
 
 #[test]
 fn images_of_another_size() {
-    Sample::new().put("a.pgm", &pgm(32, 48)).refused(3, &["a.pgm", "32×48, calibrated 64×48"]);
+    Sample::new().put("a.pgm", &pgm(32, 48)).rejected(3, &["a.pgm", "32×48, calibrated 64×48"]);
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn pairs_of_another_size_are_left_out_and_counted() {
 fn a_truncated_image() {
     let sample = Sample::new();
     fs::write(sample.path("a.pgm"), b"\x89PNG\r\n\x1a\n\0\0").unwrap();
-    sample.refused(3, &["a.pgm", "PNG, JPEG, TIFF or PNM"]);
+    sample.rejected(3, &["a.pgm", "PNG, JPEG, TIFF or PNM"]);
 }
 
 /// The sample with one image replaced by these bytes.
@@ -63,11 +63,11 @@ fn png_header(width: u32, height: u32) -> Vec<u8> {
 #[test]
 fn images_of_no_size_and_of_any() {
     with_image(b"P5 60000 60000 255\n1")
-        .refused(3, &["a.pgm", "60000×60000", "the limit is 67108864 pixels", "max-pixels"]);
-    with_image(b"P5 0 0 255\n").refused(3, &["a.pgm"]);
-    with_image(&png_header(8_000_000, 4_000_000_000)).refused(3, &["a.pgm"]);
-    with_image(&png_header(0, 48)).refused(3, &["a.pgm"]);
-    with_image(b"").refused(3, &["a.pgm"]);
+        .rejected(3, &["a.pgm", "60000×60000", "the limit is 67108864 pixels", "max-pixels"]);
+    with_image(b"P5 0 0 255\n").rejected(3, &["a.pgm"]);
+    with_image(&png_header(8_000_000, 4_000_000_000)).rejected(3, &["a.pgm"]);
+    with_image(&png_header(0, 48)).rejected(3, &["a.pgm"]);
+    with_image(b"").rejected(3, &["a.pgm"]);
 }
 
 #[test]
@@ -75,7 +75,7 @@ fn the_limits_of_images_are_settings() {
     let sample = Sample::new();
     let (folder, out) = (sample.folder.path().to_str().unwrap(), sample.path("out"));
     let run = |set: &str, code, parts: &[&str]| {
-        refused(&["run", folder, "--set", set, "--out", out.to_str().unwrap()], code, parts);
+        rejected(&["run", folder, "--set", set, "--out", out.to_str().unwrap()], code, parts);
         assert!(!out.exists(), "something was written");
     };
     run("source.max-pixels=3071", 3, &["a.pgm", "64×48; the limit is 3071 pixels"]);
@@ -103,7 +103,7 @@ fn one_image_for_both_cameras() {
     let (code, said) = checked(&sample);
     let reported = said.contains("identical left and right images in") && said.contains("1 of 1 pairs");
     assert!(code == Some(1) && reported && !said.contains("in order"), "{said}");
-    sample.refused(3, &["a.pgm", "identical left and right images", "one image twice has no depth"]);
+    sample.rejected(3, &["a.pgm", "identical left and right images", "one image twice has no depth"]);
     // Two uniform images are equal without being a mistake.
     let dark = format!("P2\n64 48\n255\n{}", "9\n".repeat(64 * 48));
     sample.put("a.pgm", &dark).put("b.pgm", &dark);
@@ -114,12 +114,12 @@ fn one_image_for_both_cameras() {
 fn samples_above_maxval() {
     let text = pgm(64, 48).replacen("255", "100", 1);
     let line = 4 + (0..64 * 48).position(|i| (i * 7919) % 251 > 100).unwrap();
-    with_image(text.as_bytes()).refused(3, &[&format!("a.pgm:{line}: "), "MAXVAL is 100; write the image again"]);
+    with_image(text.as_bytes()).rejected(3, &[&format!("a.pgm:{line}: "), "MAXVAL is 100; write the image again"]);
     let mut bytes = b"P5 64 48 200\n".to_vec();
     bytes.extend([7; 64 * 48]);
     let at = bytes.len() - 60;
     bytes[at] = 201;
-    with_image(&bytes).refused(3, &["a sample above MAXVAL", "a.pgm: 201 at (4, 47), MAXVAL is 200"]);
+    with_image(&bytes).rejected(3, &["a sample above MAXVAL", "a.pgm: 201 at (4, 47), MAXVAL is 200"]);
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn what_has_no_end_is_not_read() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for path in [Path::new("/dev/zero"), &pipe, folder.path()] {
         let (path, rig) = (path.to_str().unwrap(), rig.to_str().unwrap());
-        refused(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is not a file", "; name a file"]);
+        rejected(&["cloud", path, path, "--rig", rig], 3, &[path, "a path that is not a file", "; name a file"]);
     }
-    refused(&["cloud", "a.pgm", "a.pgm", "--rig", "/dev/zero"], 3, &["/dev/zero", "text file too large"]);
+    rejected(&["cloud", "a.pgm", "a.pgm", "--rig", "/dev/zero"], 3, &["/dev/zero", "text file too large"]);
 }

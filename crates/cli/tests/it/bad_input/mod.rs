@@ -96,9 +96,9 @@ impl Sample {
     }
 
     /// Runs the data set; it must fail with `code`, report every one of `parts`, and write nothing.
-    fn refused(&self, code: i32, parts: &[&str]) {
+    fn rejected(&self, code: i32, parts: &[&str]) {
         let out = self.path("out");
-        refused(&["run", self.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()], code, parts);
+        rejected(&["run", self.folder.path().to_str().unwrap(), "--out", out.to_str().unwrap()], code, parts);
         assert!(!out.exists(), "something was written");
     }
 }
@@ -116,7 +116,7 @@ fn other(width: usize, height: usize) -> String {
 }
 
 /// The command must fail with `code` and one line for each fault; together they contain every one of `parts`.
-fn refused(arguments: &[&str], code: i32, parts: &[&str]) {
+fn rejected(arguments: &[&str], code: i32, parts: &[&str]) {
     let output = program().args(arguments).output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(code), "{message}");

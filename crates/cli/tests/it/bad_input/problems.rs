@@ -4,7 +4,7 @@ use std::fs;
 
 use tempfile::TempDir;
 
-use super::refused;
+use super::rejected;
 use crate::program;
 
 #[test]
@@ -109,5 +109,5 @@ fn problems_that_are_hardly_meant() {
 
 #[test]
 fn an_unknown_search_of_solve() {
-    refused(&["solve", "--search", "maximum-click", "x.json"], 2, &["did you mean `maximum-clique`?"]);
+    rejected(&["solve", "--search", "maximum-click", "x.json"], 2, &["did you mean `maximum-clique`?"]);
 }

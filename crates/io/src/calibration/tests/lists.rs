@@ -84,7 +84,7 @@ fn kalibr_s_report_is_not_its_calibration() {
 
 /// The last row of a motion is 0 0 0 1. Fails if any sixteen numbers are a motion.
 #[test]
-fn a_motion_by_columns_is_refused() {
+fn a_motion_by_columns_is_rejected() {
     let (r, t) = (turn(), step());
     let columns = format!("  T_cn_cnm1:\n  - [{}]\n", list(&[r[(0, 0)], r[(1, 0)], r[(2, 0)], 0.0]))
         + &format!("  - [{}]\n", list(&[r[(0, 1)], r[(1, 1)], r[(2, 1)], 0.0]))

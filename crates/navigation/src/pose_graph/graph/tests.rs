@@ -140,7 +140,7 @@ fn a_loop_never_makes_a_pose_less_certain() {
             let gain = before.covariance(k).matrix - after.covariance(k).matrix;
             let size = before.covariance(k).matrix.norm();
             assert!(gain.symmetric_eigenvalues().min() > -1e-2 * size, "{seed} {k}");
-            assert!(after.covariance(k).position_sigma() <= before.covariance(k).position_sigma() * 1.001);
+            assert!(after.covariance(k).position_rms() <= before.covariance(k).position_rms() * 1.001);
         }
     }
 }
@@ -161,7 +161,7 @@ fn a_wrong_loop_is_given_up_and_moves_nothing() {
         let solved = graph.solve().unwrap();
         let kept = loops.iter().all(|one| !solved.given_up(*one));
         let moved = solved.pose(21).error_to(right.pose(21));
-        let still = moved.fixed_rows::<3>(3).norm() < right.covariance(21).position_sigma();
+        let still = moved.fixed_rows::<3>(3).norm() < right.covariance(21).position_rms();
         wrong += usize::from(!(solved.given_up(injected) && kept && still));
     }
     assert!(wrong <= 1, "{wrong} of 1000");

@@ -7,7 +7,7 @@ use super::Judge;
 use crate::{
     ablation::AcceptanceTest,
     accept::{
-        hypothesis::{Fallen, Hypothesis},
+        hypothesis::{Failure, Hypothesis},
         integrity::Integrity,
         rejection::RejectionReason,
     },
@@ -18,7 +18,7 @@ use crate::{
 
 impl Judge<'_> {
     /// Whether the pose agrees with the prior.
-    pub(super) fn near(&self, hypothesis: &mut Hypothesis) -> Result<(), Fallen> {
+    pub(super) fn near(&self, hypothesis: &mut Hypothesis) -> Result<(), Failure> {
         let covariance = self.covariance(hypothesis)?;
         let Some(prior) = self.problem.prior else { return Ok(()) };
         let off = match &prior.bound {
@@ -33,12 +33,12 @@ impl Judge<'_> {
         if off <= 1.0 || !self.acceptance.with(AcceptanceTest::Prior) {
             Ok(())
         } else {
-            Err(Fallen::Refused(RejectionReason::Prior { off }))
+            Err(Failure::Rejected(RejectionReason::Prior { off }))
         }
     }
 
     /// Whether the camera sees the identified points from their visible sides.
-    pub(super) fn seen_from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Fallen> {
+    pub(super) fn seen_from_the_front(&self, hypothesis: &Hypothesis) -> Result<(), Failure> {
         if self.faces(hypothesis) {
             return Ok(());
         }
@@ -48,7 +48,7 @@ impl Judge<'_> {
         let worst = points.max_by(|a, b| angle(a).total_cmp(&angle(b)));
         let (point, angle) = worst.map_or_else(Default::default, |worst| (worst.id.clone(), angle(worst)));
         let max = ModelPoint::max_incidence_angle();
-        Err(Fallen::Refused(RejectionReason::Behind { point, angle, max }))
+        Err(Failure::Rejected(RejectionReason::Behind { point, angle, max }))
     }
 
     /// The distance of the identified model points from their prior positions, relative to its limit.
@@ -87,12 +87,12 @@ impl Judge<'_> {
     pub(super) fn without_any_one(
         &self,
         hypothesis: &Hypothesis,
-        hinge: Option<(usize, f64)>,
+        most_influential: Option<(usize, f64)>,
         all: f64,
     ) -> Result<(), RejectionReason> {
-        let Some((place, rms)) =
-            hinge.filter(|_| self.searched && !self.weighs_hinges && self.acceptance.with(AcceptanceTest::Hinge))
-        else {
+        let Some((place, rms)) = most_influential.filter(|_| {
+            self.searched && !self.weighs_influential_pairs && self.acceptance.with(AcceptanceTest::InfluentialPairs)
+        }) else {
             return Ok(());
         };
         // A NaN is rejected as well.
@@ -103,7 +103,7 @@ impl Judge<'_> {
             None => self.problem.model[hypothesis.pairs[place].model].id.clone(),
             Some(edge) => self.problem.edges.model[hypothesis.edges[edge].model].id.clone(),
         };
-        Err(RejectionReason::Hinge { points: vec![point], rms, limit: self.alert_limit })
+        Err(RejectionReason::InfluentialPairs { points: vec![point], rms, limit: self.alert_limit })
     }
 
     /// Whether the scale error is insignificant, or its effect within the alert limit.
@@ -129,7 +129,7 @@ impl Judge<'_> {
         let max = scale_error.value.abs() + UNDERSTATED * scale_error.sigma;
         let off = max * (hypothesis.pose.inverse() * Point::from(centre)).coords.norm();
         match sure && off > self.alert_limit {
-            true => Err(RejectionReason::Stretched { scale_error, off, limit: self.alert_limit }),
+            true => Err(RejectionReason::ScaleError { scale_error, off, limit: self.alert_limit }),
             false => Ok(()),
         }
     }

@@ -116,16 +116,16 @@ impl Scene {
     }
 
     /// The result of the tests of precision and prior for the solver's pose.
-    fn precise_and_near(&self, solver: &Fixed) -> Result<(), Fallen> {
+    fn precise_and_near(&self, solver: &Fixed) -> Result<(), Failure> {
         self.judge(solver, |judge| judge.precise_and_near(&mut self.hypothesis(solver.pose, 0.0)))
     }
 }
 
-fn refused(fallen: Result<(), Fallen>) -> Option<RejectionReason> {
+fn rejected(fallen: Result<(), Failure>) -> Option<RejectionReason> {
     match fallen {
         Ok(()) => None,
-        Err(Fallen::Refused(rejection)) => Some(rejection),
-        Err(Fallen::Degenerate(why)) => panic!("{why}"),
+        Err(Failure::Rejected(rejection)) => Some(rejection),
+        Err(Failure::Degenerate(why)) => panic!("{why}"),
     }
 }
 
@@ -175,17 +175,18 @@ fn three_points_of_much_clutter_are_random() {
 
 /// Fails if a NaN passes, and if the limit is not the setting's.
 #[test]
-fn a_larger_probability_than_the_setting_is_refused() {
+fn a_larger_probability_than_the_setting_is_rejected() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
-    let present =
-        |scene: &Scene, p: f64| scene.judge(&Kabsch::default(), |judge| judge.present(p, [&scene.pairs()[..4], &[]]));
-    let refused = |p_wrong, max| Err(RejectionReason::Absent { p_wrong, max, identified: 4, model: 6, edges: [0, 0] });
-    assert_eq!((present(&scene, 0.0), present(&scene, 1e-3)), (Ok(()), Ok(())));
-    assert_eq!(present(&scene, 1.001e-3), refused(1.001e-3, MaxPWrong::Balanced));
-    assert!(present(&scene, f64::NAN).is_err());
+    let checked = |scene: &Scene, p: f64| {
+        scene.judge(&Kabsch::default(), |judge| judge.check_p_wrong(p, [&scene.pairs()[..4], &[]]))
+    };
+    let rejected = |p_wrong, max| Err(RejectionReason::Absent { p_wrong, max, identified: 4, model: 6, edges: [0, 0] });
+    assert_eq!((checked(&scene, 0.0), checked(&scene, 1e-3)), (Ok(()), Ok(())));
+    assert_eq!(checked(&scene, 1.001e-3), rejected(1.001e-3, MaxPWrong::Balanced));
+    assert!(checked(&scene, f64::NAN).is_err());
     scene.acceptance.max_p_wrong = MaxPWrong::Strict;
-    assert_eq!((present(&scene, 1e-5), present(&scene, 1.1e-5)), (Ok(()), refused(1.1e-5, MaxPWrong::Strict)));
-    let message = present(&scene, 1.8e-3).expect_err("it is larger").to_string();
+    assert_eq!((checked(&scene, 1e-5), checked(&scene, 1.1e-5)), (Ok(()), rejected(1.1e-5, MaxPWrong::Strict)));
+    let message = checked(&scene, 1.8e-3).expect_err("it is larger").to_string();
     assert_eq!(message, "P(wrong) is 1.8e-3, at most 1.0e-5 is allowed (preset strict); 4 of 6 points identified");
 }
 
@@ -213,7 +214,7 @@ fn residuals_pass_up_to_the_quantile_of_their_freedom() {
 fn a_pose_passes_whose_two_standard_deviations_are_within_the_limits() {
     let scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
     let of = |attitude: f64, position: f64| {
-        refused(scene.precise_and_near(&Fixed::at(Transform::identity(), attitude, position)))
+        rejected(scene.precise_and_near(&Fixed::at(Transform::identity(), attitude, position)))
     };
     assert_eq!((of(0.0, 0.0288), of(0.0349, 0.0)), (None, None));
     match of(0.0, 0.0290) {
@@ -240,7 +241,7 @@ fn the_common_errors_of_a_large_set_count_once_in_its_precision() {
         scene.judge(&solver, |judge| {
             let judge = Judge { support: Some(&support), anchors: judge.anchors.clone(), ..*judge };
             let fallen = judge.precise_and_near(&mut scene.hypothesis(solver.pose, 0.0));
-            refused(fallen).is_none()
+            rejected(fallen).is_none()
         })
     };
     for (pairs_per_place, largest) in [(1.0, 0.05), (2.25, 0.05), (4.0, 0.05), (16.0, 0.025)] {
@@ -256,7 +257,7 @@ fn a_gaussian_prior_lets_through_what_both_covariances_allow() {
     scene.acceptance.alert_limit = 10.0;
     let bound = PriorBound::Gaussian(Covariance6::isotropic(0.02, 0.05));
     scene.prior = Some(Prior { object_from_camera: Transform::identity(), bound });
-    let of = |x: f64| refused(scene.precise_and_near(&Fixed::at(camera_at(x, 0.0, 0.0), 1e-4, 0.12)));
+    let of = |x: f64| rejected(scene.precise_and_near(&Fixed::at(camera_at(x, 0.0, 0.0), 1e-4, 0.12)));
     assert_eq!((of(0.0), of(0.616)), (None, None));
     for x in [0.6165, -1.2] {
         match of(x) {
@@ -275,7 +276,7 @@ fn a_box_lets_through_its_half_size_and_the_noise() {
     scene.prior = Some(Prior { object_from_camera: Transform::identity(), bound: PriorBound::Box(0.3) });
     let of = |at: [f64; 3]| {
         let pose = camera_at(at[0], at[1], at[2]);
-        refused(scene.precise_and_near(&Fixed::at(pose, 0.0, 0.01)))
+        rejected(scene.precise_and_near(&Fixed::at(pose, 0.0, 0.01)))
     };
     let limit = 0.3 + 0.01 * 10.827_566_170_662_733_f64.sqrt();
     for axis in 0..3 {
@@ -346,13 +347,13 @@ fn other_poses_of_a_set_are_ranked_by_what_they_are_worse() {
 ///
 /// Fails if no pose is rejected for visibility.
 #[test]
-fn a_pose_behind_its_points_is_refused_with_the_worst_of_them() {
+fn a_pose_behind_its_points_is_rejected_with_the_worst_of_them() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &camera_at(0.0, 0.0, -3.0));
     scene.model.iter_mut().for_each(|point| point.normal = Some(-Vector3::z()));
     let pose = camera_at(0.0, 0.0, -3.0);
     let of = |scene: &Scene| {
         let hypothesis = scene.hypothesis(pose, 0.0);
-        scene.judge(&Kabsch::default(), |judge| refused(judge.seen_from_the_front(&hypothesis)))
+        scene.judge(&Kabsch::default(), |judge| rejected(judge.seen_from_the_front(&hypothesis)))
     };
     assert_eq!(of(&scene), None);
     scene.model[1].normal = Some(Vector3::new(1.0, 0.0, 1.0));
@@ -384,12 +385,12 @@ fn poses_up_to_the_alert_limit_apart_are_one() {
 #[test]
 fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
-    let of = |scene: &Scene, hinge: Option<(usize, f64)>, all: f64| {
+    let of = |scene: &Scene, most_influential: Option<(usize, f64)>, all: f64| {
         let hypothesis = scene.hypothesis(Transform::identity(), 0.0);
-        scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, hinge, all))
+        scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, most_influential, all))
     };
     assert_eq!((of(&scene, None, 0.04), of(&scene, Some((2, 0.05)), 0.04)), (Ok(()), Ok(())));
-    let rejection = |rms| RejectionReason::Hinge { points: vec!["V2".into()], rms, limit: 0.10 };
+    let rejection = |rms| RejectionReason::InfluentialPairs { points: vec!["V2".into()], rms, limit: 0.10 };
     assert_eq!(of(&scene, Some((2, 0.0501)), 0.04), Err(rejection(0.0501)));
     assert_eq!(of(&scene, Some((2, 0.0514)), 0.049), Ok(()));
     assert_eq!(of(&scene, Some((2, 0.0515)), 0.049), Err(rejection(0.0515)));

@@ -3,7 +3,7 @@
 use super::{
     bits::{Held, each_held, groups, shared},
     graph::ConsistencyGraph,
-    likelihood::Terms,
+    likelihood::PairTerms,
     prior_terms::PriorTerms,
 };
 
@@ -40,7 +40,7 @@ impl After {
 /// every model point that may join.
 pub(in crate::search) struct Bounds<'a> {
     graph: &'a ConsistencyGraph,
-    terms: &'a Terms,
+    terms: &'a PairTerms,
     /// Greatest gain of each model point by rank, at least `grows`.
     top: Vec<f64>,
     /// Minimum gain of a pair for which the bound still grows.
@@ -58,7 +58,7 @@ pub(in crate::search) struct Bounds<'a> {
 impl<'a> Bounds<'a> {
     /// Pruning bounds, from the properties of average sets.
     pub(in crate::search) fn of(
-        (terms, prior_terms, graph): (&'a Terms, &PriorTerms, &'a ConsistencyGraph),
+        (terms, prior_terms, graph): (&'a PairTerms, &PriorTerms, &'a ConsistencyGraph),
         min: usize,
     ) -> Self {
         let of_number =
@@ -70,7 +70,7 @@ impl<'a> Bounds<'a> {
     ///
     /// `ln_posterior_volume` (k) is an upper bound of the log posterior volume of k pairs relative to the prior.
     pub(in crate::search) fn proved(
-        (terms, graph): (&'a Terms, &'a ConsistencyGraph),
+        (terms, graph): (&'a PairTerms, &'a ConsistencyGraph),
         ln_posterior_volume: &[f64],
     ) -> Self {
         let mut bounds = Self::with((terms, graph), 0, |k| terms.ln_fraction[k] + ln_posterior_volume[k]);
@@ -81,7 +81,11 @@ impl<'a> Bounds<'a> {
         bounds
     }
 
-    fn with((terms, graph): (&'a Terms, &'a ConsistencyGraph), min: usize, of_number: impl Fn(usize) -> f64) -> Self {
+    fn with(
+        (terms, graph): (&'a PairTerms, &'a ConsistencyGraph),
+        min: usize,
+        of_number: impl Fn(usize) -> f64,
+    ) -> Self {
         let ranks = graph.starts.len() - 1;
         let grows = libm::log(terms.ln_fraction.len() as f64) + 1.0;
         let of_rank = |i: usize| &terms.pairs[graph.starts[i]..graph.starts[i + 1]];
@@ -317,7 +321,7 @@ mod tests {
         };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
-        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let terms = PairTerms::of(&problem, &prior_terms, &graph);
         let bounds = Bounds::of((&terms, &prior_terms, &graph), 3);
         let (mut common, mut held, mut after) = (vec![0; graph.lasts.len()], Vec::new(), Vec::new());
         let (mut threes, mut spans) = (0, 0);

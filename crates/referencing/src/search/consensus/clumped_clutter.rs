@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::prior_terms::{BOUND_SIGMAS, Known};
+use super::prior_terms::{BOUND_SIGMAS, PriorDensity};
 use crate::problem::Problem;
 
 /// Number of nested boxes about a predicted place, each half as wide as the previous.
@@ -33,7 +33,7 @@ pub(super) struct Excess([f64; BOXES]);
 
 impl ClumpedClutter {
     /// The counts about the model points with candidates. Time O(n M).
-    pub(super) fn of(problem: &Problem<'_>, known: &Known) -> Self {
+    pub(super) fn of(problem: &Problem<'_>, known: &PriorDensity) -> Self {
         let cloud: Vec<Vector3<f64>> = problem.cloud.iter().map(|point| point.position.at.coords).collect();
         let mut rings = vec![[0; BOXES]; cloud.len()];
         for model in (0..known.places.len()).filter(|&model| !problem.candidates.lists[model].is_empty()) {
@@ -76,7 +76,7 @@ impl ClumpedClutter {
 
 impl Excess {
     /// The excess at the measured place of a model point; zero outside the boxes.
-    pub(super) fn about(&self, known: &Known, model: usize, at: &Vector3<f64>) -> f64 {
+    pub(super) fn about(&self, known: &PriorDensity, model: usize, at: &Vector3<f64>) -> f64 {
         About::of(known, model).ring(at).map_or(0.0, |ring| self.0[ring])
     }
 }
@@ -89,7 +89,7 @@ struct About {
 }
 
 impl About {
-    fn of(known: &Known, model: usize) -> Self {
+    fn of(known: &PriorDensity, model: usize) -> Self {
         let (place, spread) = known.places[model];
         Self { place, half: known.half.map_or(spread * BOUND_SIGMAS, Vector3::repeat) }
     }

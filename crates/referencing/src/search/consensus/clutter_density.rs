@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{
     clumped_clutter::ClumpedClutter,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, PairTerms},
     line_density::{Densities, LineDensity, NEAR},
     prior_terms::PriorTerms,
     visible::ln_visible,
@@ -82,7 +82,7 @@ impl ClutterDensity {
     pub(in crate::search) fn weigh(
         &mut self,
         problem: &Problem<'_>,
-        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         mode: &mut Mode,
     ) {
         let excess = self.excesses(problem, (terms, prior_terms, graph), mode);
@@ -106,7 +106,7 @@ impl ClutterDensity {
     pub(super) fn excesses(
         &mut self,
         problem: &Problem<'_>,
-        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         mode: &Mode,
     ) -> Vec<f64> {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
@@ -143,7 +143,7 @@ impl ClutterDensity {
     fn excess(
         &mut self,
         problem: &Problem<'_>,
-        (terms, graph): (&Terms, &ConsistencyGraph),
+        (terms, graph): (&PairTerms, &ConsistencyGraph),
         v: usize,
         members: &[usize],
     ) -> f64 {
@@ -166,7 +166,7 @@ impl ClutterDensity {
     fn duplicate(
         &mut self,
         problem: &Problem<'_>,
-        terms: &Terms,
+        terms: &PairTerms,
         graph: &ConsistencyGraph,
         v: usize,
         before: &[usize],
@@ -192,7 +192,7 @@ impl ClutterDensity {
 }
 
 impl Lines {
-    fn of(problem: &Problem<'_>, (terms, graph): (&Terms, &ConsistencyGraph), members: &[usize]) -> Self {
+    fn of(problem: &Problem<'_>, (terms, graph): (&PairTerms, &ConsistencyGraph), members: &[usize]) -> Self {
         let mut density = LineDensity::of(problem);
         let taken: BTreeSet<usize> = members.iter().copied().collect();
         // The vertices of each cloud point; that of the first model point represents them.
@@ -232,7 +232,7 @@ impl Lines {
 }
 
 /// The density (1/m³) of cloud points about a vertex if clutter is uniform; without a prior that of all candidates.
-fn even(problem: &Problem<'_>, (terms, graph): (&Terms, &ConsistencyGraph), of: &LineDensity, v: usize) -> f64 {
+fn even(problem: &Problem<'_>, (terms, graph): (&PairTerms, &ConsistencyGraph), of: &LineDensity, v: usize) -> f64 {
     let Correspondence { model, .. } = graph.vertices[v];
     let own = terms.ln_density_about(v, model);
     libm::exp(match problem.prior {
@@ -246,7 +246,7 @@ fn even(problem: &Problem<'_>, (terms, graph): (&Terms, &ConsistencyGraph), of: 
 ///
 /// r_ij is the ratio of candidate j, and `own` is ln of the member's. The best of several candidates in dense clutter
 /// is near by chance; only the sum has the expectation one without an object.
-fn any_of(terms: &Terms, graph: &ConsistencyGraph, v: usize, mode: &Mode, own: f64) -> f64 {
+fn any_of(terms: &PairTerms, graph: &ConsistencyGraph, v: usize, mode: &Mode, own: f64) -> f64 {
     let rank = graph.rank[v] as usize;
     let others = (graph.starts[rank]..graph.starts[rank + 1]).filter(|&other| other != v);
     let fractions = others.filter_map(|other| terms.of_pair(other, &mode.motion)).map(|gain| libm::exp(gain - own));
@@ -326,7 +326,7 @@ mod tests {
         };
         let prior_terms = PriorTerms::of(&problem).expect("no prior to reject");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
-        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let terms = PairTerms::of(&problem, &prior_terms, &graph);
         let motion = Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() };
         let gain = |v: &usize| terms.residual_gain(*v, &motion);
         let nearest = (0..cloud.len()).max_by(|a, b| gain(a).total_cmp(&gain(b))).expect("a candidate");
@@ -335,7 +335,7 @@ mod tests {
             edges: Vec::new(),
             motion,
             ln_evidence: 0.0,
-            ln_even: 0.0,
+            ln_uniform: 0.0,
             ln_clutter_density: 0.0,
         };
         let own = gain(&nearest);

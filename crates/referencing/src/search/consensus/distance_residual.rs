@@ -16,24 +16,24 @@ pub(in crate::search) fn lost_to(distance_residual: f64) -> f64 {
     (distance_residual - PASSES).max(0.0)
 }
 
-/// The distance of two pairs, with its error and direction.
+/// A side of a triangle of pairs: the distance of two pairs, with its error and direction.
 #[derive(Clone, Copy)]
-pub(in crate::search) struct Edge {
+pub(in crate::search) struct Side {
     /// Measured minus model distance (m).
-    scale_error: f64,
+    length_error: f64,
     /// Direction from the first measured place to the second.
     along: Vector3<f64>,
     /// Variance of the distance error (m²).
     variance: f64,
 }
 
-impl Edge {
+impl Side {
     #[inline]
     pub(in crate::search) fn of(a: &Term, b: &Term) -> Self {
         let apart = b.cloud - a.cloud;
         let measured = apart.norm();
         Self {
-            scale_error: measured - (b.model - a.model).norm(),
+            length_error: measured - (b.model - a.model).norm(),
             along: apart / measured,
             variance: (1.0 + CURVED) * (a.variance + b.variance),
         }
@@ -43,22 +43,22 @@ impl Edge {
 /// ½ χ² of the distance of two pairs: a lower bound of their residual cost under any pose (nats).
 #[inline]
 pub(in crate::search) fn residual_of_two(a: &Term, b: &Term) -> f64 {
-    let edge = Edge::of(a, b);
-    0.5 * edge.scale_error * edge.scale_error / edge.variance
+    let side = Side::of(a, b);
+    0.5 * side.length_error * side.length_error / side.variance
 }
 
 /// ½ χ² of the three distances of three pairs: dᵀ (J Σ Jᵀ)⁻¹ d / 2, J the derivative of the distances by the places.
 ///
 /// A lower bound of their residual cost under any pose (nats), for errors that are small relative to the distances.
 #[inline]
-pub(in crate::search) fn residual_of_three([a, b, c]: [&Term; 3], [ab, ac, bc]: [&Edge; 3]) -> f64 {
+pub(in crate::search) fn residual_of_three([a, b, c]: [&Term; 3], [ab, ac, bc]: [&Side; 3]) -> f64 {
     let (aa, bb, cc) = (ab.variance, ac.variance, bc.variance);
     let of_a = a.variance * ab.along.dot(&ac.along);
     let of_b = -b.variance * ab.along.dot(&bc.along);
     let of_c = c.variance * ac.along.dot(&bc.along);
     let (p, q, r) = (bb * cc - of_c * of_c, of_b * of_c - of_a * cc, of_a * of_c - of_b * bb);
     let determinant = aa * p + of_a * q + of_b * r;
-    let (x, y, z) = (ab.scale_error, ac.scale_error, bc.scale_error);
+    let (x, y, z) = (ab.length_error, ac.length_error, bc.length_error);
     let square = x * x * p
         + y * y * (aa * cc - of_b * of_b)
         + z * z * (aa * bb - of_a * of_a)
@@ -120,7 +120,7 @@ mod tests {
                 gain: 0.0,
             };
             let [a, b, c] = [0, 1, 2].map(term);
-            let [ab, ac, bc] = [Edge::of(&a, &b), Edge::of(&a, &c), Edge::of(&b, &c)];
+            let [ab, ac, bc] = [Side::of(&a, &b), Side::of(&a, &c), Side::of(&b, &c)];
             let distance_residual = residual_of_three([&a, &b, &c], [&ab, &ac, &bc]);
             let min = min_residual(&model, &cloud);
             // In a flat triangle the distances are correlated, and the allowance for curvature costs more of χ².
@@ -129,10 +129,10 @@ mod tests {
                 distance_residual <= min + 0.02 && distance_residual >= fraction * min - 0.1,
                 "{distance_residual} of {min}, altitude {flat}"
             );
-            let of_edge = |edge: Edge| 0.5 * edge.scale_error * edge.scale_error / edge.variance;
+            let of_side = |side: Side| 0.5 * side.length_error * side.length_error / side.variance;
             assert!(
-                [ab, ac, bc].into_iter().all(|edge| of_edge(edge) <= distance_residual + 1e-9),
-                "a single edge has a larger residual"
+                [ab, ac, bc].into_iter().all(|side| of_side(side) <= distance_residual + 1e-9),
+                "a single side has a larger residual"
             );
             compared += 1;
         }
@@ -150,7 +150,7 @@ mod tests {
         };
         let distance_residual = |places: [(f64, f64); 3]| {
             let [a, b, c] = places.map(|(x, known)| term(x, known));
-            residual_of_three([&a, &b, &c], [&Edge::of(&a, &b), &Edge::of(&a, &c), &Edge::of(&b, &c)])
+            residual_of_three([&a, &b, &c], [&Side::of(&a, &b), &Side::of(&a, &c), &Side::of(&b, &c)])
         };
         assert_eq!(distance_residual([(0.0, 0.0), (0.0, 1.0), (2.0, 3.0)]), 0.0);
         // The end point is one σ too far: a third of χ² remains, the rest is shared.

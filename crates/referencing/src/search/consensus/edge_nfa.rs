@@ -8,7 +8,7 @@ use super::{
     edge_terms::{EdgeTerms, EdgeVertex},
     graph::ConsistencyGraph,
     joined::Joined,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, PairTerms},
     local_maxima::Climb,
     motion::Motion,
     prior_terms::PriorTerms,
@@ -62,7 +62,7 @@ pub(crate) fn of_counted(
     let prior_terms = PriorTerms::of(problem)?;
     prior_terms.known.as_ref()?;
     let graph = ConsistencyGraph::of(problem, &prior_terms);
-    let terms = Terms::of(problem, &prior_terms, &graph);
+    let terms = PairTerms::of(problem, &prior_terms, &graph);
     let edges = EdgeTerms::of(problem, &prior_terms)?;
     let none = BTreeSet::new();
     let climb = Climb::new(problem.model, (&terms, &prior_terms, &graph), &none);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector3};
 
-use super::{joined::Joined, prior_terms::Known};
+use super::{joined::Joined, prior_terms::PriorDensity};
 use crate::{edge_candidates::OVERLAP, search::consensus::local_maxima::Climb};
 
 /// Half-size of the grid, in standard deviations of the prior along each axis; 3.5 leave out 0.05 % of the priors an axis.
@@ -36,7 +36,7 @@ impl Votes {
     /// `work` counts the votes.
     pub(in crate::search) fn of(
         joined: &Joined<'_>,
-        prior: &Known,
+        prior: &PriorDensity,
         pairs: &[Vec<usize>; 2],
         work: &mut u64,
     ) -> Option<Self> {
@@ -45,7 +45,7 @@ impl Votes {
         Some(votes)
     }
 
-    fn empty(joined: &Joined<'_>, prior: &Known, covariance: &Matrix6<f64>) -> Self {
+    fn empty(joined: &Joined<'_>, prior: &PriorDensity, covariance: &Matrix6<f64>) -> Self {
         let Climb { terms, prior_terms, .. } = joined.climb;
         let extent = [3, 4, 5].map(|k| EXTENT * covariance[(k, k)].sqrt());
         let lever = |p: &Vector3<f64>| (p - prior_terms.centroid).norm();
@@ -74,7 +74,7 @@ impl Votes {
     }
 
     /// The displacements with most votes, at least two cells from each other, the best first; the prior's density is added.
-    pub(in crate::search) fn peaks(&self, prior: &Known) -> Vec<Vector3<f64>> {
+    pub(in crate::search) fn peaks(&self, prior: &PriorDensity) -> Vec<Vector3<f64>> {
         let density = prior.information.fixed_view::<3, 3>(3, 3);
         let value = |index: usize| {
             let off = self.centre(index);
@@ -104,7 +104,7 @@ impl Votes {
     pub(in crate::search) fn voters(
         &self,
         joined: &Joined<'_>,
-        prior: &Known,
+        prior: &PriorDensity,
         [edges, points]: &[Vec<usize>; 2],
         at: &Vector3<f64>,
     ) -> [Vec<usize>; 2] {
@@ -122,7 +122,7 @@ impl Votes {
     }
 
     /// Adds the votes of these pairs, feature by feature.
-    fn count(&mut self, joined: &Joined<'_>, prior: &Known, [edges, points]: &[Vec<usize>; 2], work: &mut u64) {
+    fn count(&mut self, joined: &Joined<'_>, prior: &PriorDensity, [edges, points]: &[Vec<usize>; 2], work: &mut u64) {
         let (vertices, pairs) = (&joined.edges.vertices, &joined.climb.graph.vertices);
         let mut ballot = Ballot { last: vec![0; self.score.len()], feature: 0, cells: Vec::new() };
         for of_one in points.chunk_by(|&a, &b| pairs[a].model == pairs[b].model) {
@@ -169,7 +169,7 @@ struct Ballot {
 }
 
 /// The displacement of the prior that a pair of points asks for.
-fn displacement_of_point(joined: &Joined<'_>, prior: &Known, v: usize) -> Vector3<f64> {
+fn displacement_of_point(joined: &Joined<'_>, prior: &PriorDensity, v: usize) -> Vector3<f64> {
     let pair = &joined.climb.terms.pairs[v];
     pair.cloud - prior.motion.apply(&pair.model)
 }
@@ -177,7 +177,7 @@ fn displacement_of_point(joined: &Joined<'_>, prior: &Known, v: usize) -> Vector
 /// The displacements, about a cell (m) from each other, at which an edge overlaps the line of its pair.
 fn displacements_of_edge(
     joined: &Joined<'_>,
-    prior: &Known,
+    prior: &PriorDensity,
     v: usize,
     cell: f64,
 ) -> impl Iterator<Item = Vector3<f64>> + use<> {

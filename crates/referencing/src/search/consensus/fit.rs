@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3, Vector6};
 
 use super::{
     gaussian::HALF_LN_2PI,
-    likelihood::Terms,
+    likelihood::PairTerms,
     motion::Motion,
     prior_terms::PriorTerms,
     solve6::{factor as factor_of, solve},
@@ -33,7 +33,7 @@ pub(in crate::search) struct Linear {
 impl Linear {
     /// The linearisation; `None` if pairs and prior do not determine the motion.
     pub(in crate::search) fn at(
-        terms: &Terms,
+        terms: &PairTerms,
         prior_terms: &PriorTerms,
         members: &[usize],
         motion: &Motion,
@@ -112,7 +112,7 @@ impl Linear {
     }
 
     /// The log-likelihood ratio of pair `v` after the step, to first order; `None` beyond the gate.
-    pub(in crate::search) fn of_pair(&self, terms: &Terms, v: usize) -> Option<f64> {
+    pub(in crate::search) fn of_pair(&self, terms: &PairTerms, v: usize) -> Option<f64> {
         let pair = &terms.pairs[v];
         let place = self.motion.apply(&pair.model);
         let (phi, tau) = (self.step.fixed_rows::<3>(0), self.step.fixed_rows::<3>(3));
@@ -135,7 +135,7 @@ impl Linear {
 
 /// The MAP motion of these pairs near a start, and the factor of its information.
 pub(in crate::search) fn fit(
-    terms: &Terms,
+    terms: &PairTerms,
     prior_terms: &PriorTerms,
     members: &[usize],
     start: &Motion,
@@ -148,7 +148,7 @@ pub(in crate::search) fn fit(
 /// The fit from a given first linearisation.
 pub(in crate::search) fn fit_on(
     first: Linear,
-    terms: &Terms,
+    terms: &PairTerms,
     prior_terms: &PriorTerms,
     members: &[usize],
     rounds: usize,

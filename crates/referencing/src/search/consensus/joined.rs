@@ -12,7 +12,7 @@ use super::{
     motion::Motion,
     solve6::{factor as factor_of, solve},
 };
-use crate::solve::likelihood::mixed::ENOUGH;
+use crate::solve::likelihood::mixed::MIN_FEATURE_VALUE;
 
 /// Maximum number of rounds of choosing features and fitting.
 const ROUNDS: usize = 10;
@@ -42,7 +42,7 @@ impl Joined<'_> {
             let loose = covariance.as_ref().filter(|_| round < LOOSE_ROUNDS).map(|covariance| (covariance, &about));
             let edges = self.edges.choose(&motion, self.taken, loose);
             let points = self.climb.choose_any(&motion);
-            if 2 * points.len() + 3 * edges.len() < ENOUGH {
+            if 2 * points.len() + 3 * edges.len() < MIN_FEATURE_VALUE {
                 return None;
             }
             let stands = round >= LOOSE_ROUNDS && known.as_ref().is_some_and(|(p, e)| *p == points && *e == edges);
@@ -51,7 +51,7 @@ impl Joined<'_> {
             if stands {
                 return self.mode(points, edges, motion, &factor);
             }
-            if round == LOOSE_ROUNDS && self.promise(&points, &edges, &motion, &factor) < min {
+            if round == LOOSE_ROUNDS && self.evidence_bound(&points, &edges, &motion, &factor) < min {
                 return None;
             }
             covariance = Some(factor.inverse());
@@ -63,7 +63,7 @@ impl Joined<'_> {
     }
 
     /// The approximate evidence of some features, those that no longer fit left out.
-    fn promise(&self, points: &[usize], edges: &[usize], motion: &Motion, factor: &Factor) -> f64 {
+    fn evidence_bound(&self, points: &[usize], edges: &[usize], motion: &Motion, factor: &Factor) -> f64 {
         let Climb { terms, prior_terms, .. } = self.climb;
         let of_points: f64 = points.iter().filter_map(|&v| terms.of_pair(v, motion)).sum();
         let of_edge = |&v: &usize| {
@@ -98,7 +98,7 @@ impl Joined<'_> {
             edges,
             motion,
             ln_evidence,
-            ln_even: ln_evidence,
+            ln_uniform: ln_evidence,
             ln_clutter_density: 0.0,
         })
     }

@@ -3,8 +3,8 @@
 use super::{
     fractions::ln_fraction,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
-    structured_clutter::{Occupied, StructuredClutter},
+    likelihood::{Mode, PairTerms},
+    structured_clutter::{ModelPlaces, StructuredClutter},
 };
 use crate::{
     a_contrario::{coincidence::Shuffled, coordinates::shuffled},
@@ -20,7 +20,7 @@ const MAX_PROBABILITY: f64 = 0.99;
 /// Maximum number of poses examined, the best first.
 const MAX: usize = 24;
 
-impl Occupied<'_> {
+impl ModelPlaces<'_> {
     /// The evidence of poses that put the model onto the same places in another order.
     ///
     /// A grid, a ring or a frame has self-symmetries. If a matcher proposes partners among points of similar appearance
@@ -38,16 +38,16 @@ impl Occupied<'_> {
     pub(in crate::search) fn mistaken(
         &self,
         problem: &Problem<'_>,
-        (terms, graph): (&Terms, &ConsistencyGraph),
+        (terms, graph): (&PairTerms, &ConsistencyGraph),
         others: &[Mode],
     ) -> Option<StructuredClutter> {
         if !shuffled(problem) {
             return None;
         }
         // Computed on demand: seldom is there a pose to test.
-        let mut nfa = None;
+        let mut shuffled = None;
         let variance = terms.pairs.iter().map(|pair| pair.variance).fold(0.0, f64::max);
-        let (mut met, mut places, mut ln_nfa, mut poses) = (0, 0, 0.0, 0);
+        let (mut met, mut places, mut ln_random, mut poses) = (0, 0, 0.0, 0);
         for other in others.iter().take(MAX) {
             let mistakes = |v: &&usize| !self.best.holds(**v) && self.holds_place(problem, terms, graph, **v);
             let mistaken: Vec<usize> =
@@ -56,10 +56,10 @@ impl Occupied<'_> {
                 continue;
             }
             poses += 1;
-            let nfa = nfa.get_or_insert_with(|| Shuffled::of(problem));
+            let shuffled = shuffled.get_or_insert_with(|| Shuffled::of(problem));
             for (i, point) in problem.model.iter().enumerate() {
                 let (place, of_best) = (other.motion.apply(&point.at.coords), self.best.motion.apply(&point.at.coords));
-                let met_at_random = nfa.meets(i, place).min(MAX_PROBABILITY);
+                let met_at_random = shuffled.meets(i, place).min(MAX_PROBABILITY);
                 // A place that both poses share gives no information on confusion.
                 if met_at_random <= 0.0 || (place - of_best).norm_squared() <= APART * variance {
                     continue;
@@ -67,12 +67,12 @@ impl Occupied<'_> {
                 places += 1;
                 let is_met = mistaken.contains(&i);
                 met += usize::from(is_met);
-                ln_nfa += libm::log(if is_met { met_at_random } else { 1.0 - met_at_random });
+                ln_random += libm::log(if is_met { met_at_random } else { 1.0 - met_at_random });
             }
         }
         let (k, n) = (self.best.members.len(), problem.candidates.with_candidates());
         (poses > 0 && met > 0).then(|| StructuredClutter {
-            ln_evidence: ln_fraction(met, places) - ln_nfa,
+            ln_evidence: ln_fraction(met, places) - ln_random,
             ln_alone: ln_fraction(k + met, n + places) - ln_fraction(k, n) - ln_fraction(met, places)
                 + libm::log((poses + 1) as f64),
         })

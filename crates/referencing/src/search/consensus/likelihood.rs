@@ -1,5 +1,7 @@
 //! The likelihood ratio of a pose against clutter alone.
 
+use std::cmp::Ordering;
+
 use nalgebra::{Cholesky, Matrix3, Matrix6, U6, Vector3};
 use seafix_geometry::{Camera, UncertainPoint, so3::skew};
 
@@ -57,7 +59,7 @@ impl Term {
 /// A true pair contributes ln N(c − p; 0, Σ) − ln ρ to the log-likelihood ratio against clutter, with the density ρ
 /// (1/m³) of cloud points about the predicted place of the model point. The number of visible points is unknown: all
 /// numbers from 0 to n are equally probable, and one set of k has the probability B(k) = k! (n − k)! / (n + 1)!.
-pub(in crate::search) struct Terms {
+pub(in crate::search) struct PairTerms {
     /// The term of each vertex.
     pub(in crate::search) pairs: Vec<Term>,
     /// ln of the density of cloud points about each predicted place; without a prior, that of the complete cloud.
@@ -71,7 +73,7 @@ pub(in crate::search) struct Terms {
     pub(in crate::search) ln_fraction: Vec<f64>,
 }
 
-impl Terms {
+impl PairTerms {
     pub(in crate::search) fn of(problem: &Problem<'_>, prior_terms: &PriorTerms, graph: &ConsistencyGraph) -> Self {
         // A model point for which a matcher proposed no partner could not be identified if it were visible, nor any without
         // measured points.
@@ -225,12 +227,19 @@ pub(in crate::search) struct Mode {
     /// at the maximum, times the posterior volume (2π)³/√det H.
     pub(in crate::search) ln_evidence: f64,
     /// The evidence under uniform clutter.
-    pub(in crate::search) ln_even: f64,
+    pub(in crate::search) ln_uniform: f64,
     /// The evidence lost to dense clutter (nats).
     pub(in crate::search) ln_clutter_density: f64,
 }
 
 impl Mode {
+    /// The order by falling evidence; modes of equal evidence are ordered by their members and edges.
+    pub(in crate::search) fn by_evidence(&self, other: &Self) -> Ordering {
+        (other.ln_evidence.total_cmp(&self.ln_evidence))
+            .then_with(|| self.members.cmp(&other.members))
+            .then_with(|| self.edges.cmp(&other.edges))
+    }
+
     /// The pairs, in the order of the model points.
     pub(in crate::search) fn pairs(&self, graph: &ConsistencyGraph) -> Vec<Correspondence> {
         let mut pairs: Vec<Correspondence> = self.members.iter().map(|&v| graph.vertices[v]).collect();
@@ -246,7 +255,7 @@ impl Mode {
     }
 
     /// The pairs in ascending order of their residuals.
-    pub(in crate::search) fn closest_first(&self, terms: &Terms, graph: &ConsistencyGraph) -> Vec<Correspondence> {
+    pub(in crate::search) fn closest_first(&self, terms: &PairTerms, graph: &ConsistencyGraph) -> Vec<Correspondence> {
         let mut members: Vec<(f64, usize)> =
             self.members.iter().map(|&v| (terms.pairs[v].gain - terms.residual_gain(v, &self.motion), v)).collect();
         members.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -254,7 +263,12 @@ impl Mode {
     }
 
     /// ln evidence of some members alone, without the probability of their number; zero if they determine no pose.
-    pub(in crate::search) fn ln_evidence_of(&self, terms: &Terms, prior_terms: &PriorTerms, members: &[usize]) -> f64 {
+    pub(in crate::search) fn ln_evidence_of(
+        &self,
+        terms: &PairTerms,
+        prior_terms: &PriorTerms,
+        members: &[usize],
+    ) -> f64 {
         if members.len() < 3 && prior_terms.known.is_none() {
             return 0.0;
         }
@@ -265,7 +279,7 @@ impl Mode {
     /// factor of its information. `None` if they determine no pose.
     pub(super) fn refitted(
         &self,
-        terms: &Terms,
+        terms: &PairTerms,
         prior_terms: &PriorTerms,
         members: &[usize],
     ) -> Option<(f64, Motion, Cholesky<f64, U6>)> {

@@ -8,11 +8,11 @@ use super::{
     bits::is_set,
     fit::{Linear, fit, fit_on},
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms, ln_volume},
+    likelihood::{Mode, PairTerms, ln_volume},
     motion::Motion,
     prior_terms::PriorTerms,
 };
-use crate::site::model::ModelPoint;
+use crate::{search::limits::NEEDED, site::model::ModelPoint};
 
 /// Maximum number of rounds of choosing pairs and fitting.
 const ROUNDS: usize = 8;
@@ -21,15 +21,13 @@ const JOINING: f64 = 8.0;
 /// Allowance (nats) for large rotations in the prediction of a step. More costs time, less loses modes; the prediction
 /// is seldom off by a nat.
 const TURNING: f64 = 3.0;
-/// Minimum number of pairs that determine a pose.
-const MIN: usize = 3;
 
 type Factor = Cholesky<f64, U6>;
 
 /// The modes of one problem, by iterated choice of pairs and fit.
 pub(in crate::search) struct Climb<'a> {
     pub(in crate::search) model: &'a [ModelPoint],
-    pub(in crate::search) terms: &'a Terms,
+    pub(in crate::search) terms: &'a PairTerms,
     pub(in crate::search) prior_terms: &'a PriorTerms,
     pub(in crate::search) graph: &'a ConsistencyGraph,
     /// Cloud points that no mode may use.
@@ -42,7 +40,7 @@ impl<'a> Climb<'a> {
     /// The ascent among these pairs without the cloud points in `taken`.
     pub(in crate::search) fn new(
         model: &'a [ModelPoint],
-        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
+        (terms, prior_terms, graph): (&'a PairTerms, &'a PriorTerms, &'a ConsistencyGraph),
         taken: &'a BTreeSet<usize>,
     ) -> Self {
         Self { model, terms, prior_terms, graph, taken, compared: Cell::new(0) }
@@ -61,15 +59,15 @@ impl<'a> Climb<'a> {
     ) -> Option<Mode> {
         // Most sets near the pose of three noisy points fit no motion: this is detected before the first step.
         let first = Linear::at(self.terms, self.prior_terms, members, start)?;
-        if self.foreseen(members, &first) + TURNING < min {
+        if self.predicted_bound(members, &first) + TURNING < min {
             return None;
         }
         let (mut motion, factor) = fit_on(first, self.terms, self.prior_terms, members, 2)?;
-        if self.promise(members, &motion, &factor) < min {
+        if self.evidence_bound(members, &motion, &factor) < min {
             return None;
         }
         let mut chosen = self.choose(&motion);
-        if chosen.len() < MIN || climbed(&chosen) {
+        if chosen.len() < NEEDED || climbed(&chosen) {
             return None;
         }
         let mut stands = chosen == members;
@@ -79,7 +77,7 @@ impl<'a> Climb<'a> {
             }
             (motion, _) = fit(self.terms, self.prior_terms, &chosen, &motion, 2)?;
             let next = self.choose(&motion);
-            if next.len() < MIN {
+            if next.len() < NEEDED {
                 return None;
             }
             stands = next == chosen;
@@ -92,7 +90,7 @@ impl<'a> Climb<'a> {
     /// The mode reached from a motion.
     pub(in crate::search) fn near(&self, motion: &Motion) -> Option<Mode> {
         let members = self.choose(motion);
-        if members.len() < MIN {
+        if members.len() < NEEDED {
             return None;
         }
         self.from(&members, motion, f64::NEG_INFINITY, |_| false)
@@ -112,7 +110,7 @@ impl<'a> Climb<'a> {
             edges: Vec::new(),
             motion,
             ln_evidence,
-            ln_even: ln_evidence,
+            ln_uniform: ln_evidence,
             ln_clutter_density: 0.0,
         })
     }
@@ -134,13 +132,13 @@ impl<'a> Climb<'a> {
     }
 
     /// Approximate evidence of the members that remain, with one or two pairs that may join them.
-    fn promise(&self, members: &[usize], motion: &Motion, factor: &Factor) -> f64 {
+    fn evidence_bound(&self, members: &[usize], motion: &Motion, factor: &Factor) -> f64 {
         let gains = members.iter().filter_map(|&v| self.terms.of_pair(v, motion));
         self.ln_fraction_of(gains) + self.prior_terms.ln_density(motion) + ln_volume(factor) + JOINING
     }
 
-    /// The approximate evidence ([`Self::promise`]) before the step.
-    fn foreseen(&self, members: &[usize], linear: &Linear) -> f64 {
+    /// The approximate evidence ([`Self::evidence_bound`]) before the step.
+    fn predicted_bound(&self, members: &[usize], linear: &Linear) -> f64 {
         let gains = members.iter().filter_map(|&v| linear.of_pair(self.terms, v));
         self.ln_fraction_of(gains) + linear.ln_density(self.prior_terms) + linear.ln_volume() + JOINING
     }
@@ -148,7 +146,7 @@ impl<'a> Climb<'a> {
     /// The sum of the gains and ln B of their number; −∞ if too few remain.
     fn ln_fraction_of(&self, gains: impl Iterator<Item = f64>) -> f64 {
         let (k, sum) = gains.fold((0, 0.0), |(k, sum), gain| (k + 1, sum + gain));
-        if k < MIN - 1 { f64::NEG_INFINITY } else { sum + self.terms.ln_fraction[k] }
+        if k < NEEDED - 1 { f64::NEG_INFINITY } else { sum + self.terms.ln_fraction[k] }
     }
 
     /// The maximum-likelihood one-to-one set under a motion.
@@ -156,7 +154,7 @@ impl<'a> Climb<'a> {
     /// Greedy: the better of two pairs that share a model point or a cloud point wins, so that a model point that loses
     /// its best pair to another takes its next. The set keeps the number of pairs that maximises the likelihood.
     fn choose(&self, motion: &Motion) -> Vec<usize> {
-        self.choose_with_min(MIN, motion)
+        self.choose_with_min(NEEDED, motion)
     }
 
     /// The set of [`choose`](Self::choose) with any number of pairs, as edges may determine the motion.
@@ -244,7 +242,7 @@ mod tests {
         };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
-        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let terms = PairTerms::of(&problem, &prior_terms, &graph);
         let taken = BTreeSet::new();
         let climb = Climb::new(&model, (&terms, &prior_terms, &graph), &taken);
         let chosen = climb.choose(&Motion { rotation: Matrix3::identity(), translation: Vector3::zeros() });

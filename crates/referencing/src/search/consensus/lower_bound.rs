@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, Matrix6, U6};
 
 use super::{
     fit::Linear,
-    likelihood::{Terms, ln_volume},
+    likelihood::{PairTerms, ln_volume},
     motion::Motion,
     prior_terms::PriorTerms,
 };
@@ -49,7 +49,7 @@ impl LaplacePosterior {
 /// Costs are those of residuals and prior, ½ χ² (nats), relative to zero residuals and the mode of the prior.
 #[derive(Clone, Copy)]
 pub(super) struct Fits<'a> {
-    pub(super) terms: &'a Terms,
+    pub(super) terms: &'a PairTerms,
     pub(super) prior_terms: &'a PriorTerms,
     pub(super) members: &'a [usize],
 }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, PairTerms},
     local_maxima::Climb,
     motion::Motion,
     places::Places,
@@ -31,7 +31,7 @@ const PAIRS_A_THREE: usize = 8;
 /// prior gives no information on images: both are weighed without it.
 pub(in crate::search) fn mirror_image(
     model: &[ModelPoint],
-    (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+    (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
     mode: &Mode,
 ) -> Option<Mode> {
     let prior_terms =
@@ -72,7 +72,7 @@ pub(in crate::search) fn mirror_image(
 /// the other: each common pair contributes d_i to the difference of evidence, with either sign equally probable, so
 /// that the standard deviation of their sum is √Σ d_i². Pairs of which the plane contains the model point have d_i = 0,
 /// as the planar remainder of a true image has.
-fn beyond_noise(terms: &Terms, own: &Mode, image: &Mode) -> f64 {
+fn beyond_noise(terms: &PairTerms, own: &Mode, image: &Mode) -> f64 {
     let common = own.members.iter().filter(|&&v| image.holds(v));
     let off = |v: &usize| terms.residual_gain(*v, &image.motion) - terms.residual_gain(*v, &own.motion);
     SIGMAS * common.map(|v| off(v).powi(2)).sum::<f64>().sqrt()

@@ -13,7 +13,7 @@ mod fit;
 mod fractions;
 mod gaussian;
 pub(crate) mod graph;
-pub(crate) mod hinges;
+pub(crate) mod influential_pairs;
 pub(crate) mod joined;
 mod labels;
 pub(crate) mod likelihood;
@@ -39,6 +39,6 @@ pub(crate) mod turned;
 mod visible;
 mod wireframe;
 
-pub use hinges::Hinge;
+pub use influential_pairs::InfluentialPairs;
 pub use structured_clutter::StructuredClutter;
 pub use support::Support;

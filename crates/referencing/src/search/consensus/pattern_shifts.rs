@@ -6,14 +6,12 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::{
     edge_terms::EdgeTerms, gaussian::HALF_LN_2PI, joined::Joined, likelihood::Mode, local_maxima::Climb,
-    motion::Motion, prior_terms::PriorTerms, repeated_pattern::Pattern,
+    motion::Motion, prior_terms::PriorTerms, repeated_pattern::Pattern, seeds::MARGIN,
 };
 use crate::{parts::Parts, problem::Problem};
 
 /// Maximum number of shifts examined: any two decide that the pose is ambiguous, the rest is for the reader.
 const MAX_SHIFTS: usize = 64;
-/// Evidence (nats) below the best at which a shift is no alternative; the margin of the search.
-const MARGIN: f64 = 10.0;
 
 impl Pattern {
     /// The poses of the object shifted within its pattern whose evidence is comparable with a mode's.

@@ -3,7 +3,7 @@
 use super::{
     bits::ones,
     graph::ConsistencyGraph,
-    likelihood::{Term, Terms},
+    likelihood::{PairTerms, Term},
     motion::Motion,
 };
 use crate::lanes::{LANES, packed};
@@ -20,7 +20,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    pub(super) fn of(terms: &Terms) -> Self {
+    pub(super) fn of(terms: &PairTerms) -> Self {
         let full = terms.pairs.len().next_multiple_of(LANES);
         let filled = |value: &dyn Fn(&Term) -> f64| {
             let mut column: Vec<f64> = terms.pairs.iter().map(value).collect();
@@ -39,7 +39,7 @@ impl Places {
     /// The best pair within the gate of each model point; `None` if they are not more than `more_than`.
     pub(super) fn near(
         &self,
-        terms: &Terms,
+        terms: &PairTerms,
         graph: &ConsistencyGraph,
         motion: &Motion,
         more_than: usize,

@@ -1,6 +1,6 @@
 //! Upper bounds of the posterior volume relative to the prior.
 
-use super::{gaussian::HALF_LN_2PI, graph::ConsistencyGraph, likelihood::Terms, prior_terms::PriorTerms};
+use super::{gaussian::HALF_LN_2PI, graph::ConsistencyGraph, likelihood::PairTerms, prior_terms::PriorTerms};
 use crate::site::model::ModelPoint;
 
 /// Maximum number of model points for which triples are listed; beyond, the information bound is zero.
@@ -18,7 +18,7 @@ const MAX_POINTS: usize = 64;
 /// information P, det^⅙ (P + H) ≥ det^⅙ P + det^⅙ H (Minkowski).
 pub(super) fn ln_posterior_volume(
     model: &[ModelPoint],
-    (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+    (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
 ) -> Vec<f64> {
     let ranks = graph.starts.len() - 1;
     let mut ln_posterior_volume = vec![0.0; ranks + 1];
@@ -38,14 +38,14 @@ pub(super) fn ln_posterior_volume(
         }
     }
     let (mut of_one, mut of_two, mut of_three) = (Smallest::of(&weights), Smallest::of(&twos), Smallest::of(&threes));
-    for (k, filled) in ln_posterior_volume.iter_mut().enumerate().skip(3) {
+    for (k, bound) in ln_posterior_volume.iter_mut().enumerate().skip(3) {
         let (twos, threes) = (k * (k - 1) / 2, k * (k - 1) * (k - 2) / 6);
         // det H = W³ · ⁸⁄₉ · (W e₁/W) · (W e₂/W).
         let determinant = 8.0 / 9.0 * of_one.sum(k) * of_two.sum(twos) * of_three.sum(threes);
         let ln_determinant = libm::log(determinant);
         // The prior in units of its own volume: ln p at the maximum is −½ ln det Σ − 3 ln 2π.
         let ln_prior = -2.0 * (prior_terms.ln_peak + 6.0 * HALF_LN_2PI);
-        *filled = match &prior_terms.known {
+        *bound = match &prior_terms.known {
             Some(_) => -3.0 * libm::log1p(libm::exp((ln_determinant + ln_prior) / 6.0)),
             None => (-0.5 * (ln_determinant + ln_prior)).min(0.0),
         };
@@ -134,7 +134,7 @@ mod tests {
             };
             let prior_terms = PriorTerms::of(&problem).expect("a box");
             let graph = ConsistencyGraph::of(&problem, &prior_terms);
-            let terms = Terms::of(&problem, &prior_terms, &graph);
+            let terms = PairTerms::of(&problem, &prior_terms, &graph);
             let max = ln_posterior_volume(&model, (&terms, &prior_terms, &graph));
             let motion = Motion { rotation: nalgebra::Matrix3::identity(), translation: shift };
             for set in 0u32..1 << 8 {

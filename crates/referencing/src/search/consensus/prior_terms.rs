@@ -21,7 +21,7 @@ pub(in crate::search) const BOUND_SIGMAS: f64 = 3.0;
 /// the model's centroid, that of its anchors (m). dφ dτ is the measure of every density here.
 pub(in crate::search) struct PriorTerms {
     /// The prior motion; `None` without a prior.
-    pub(in crate::search) known: Option<Known>,
+    pub(in crate::search) known: Option<PriorDensity>,
     /// Centroid of the model.
     pub(in crate::search) centroid: Vector3<f64>,
     /// ln of the density at its maximum.
@@ -30,8 +30,8 @@ pub(in crate::search) struct PriorTerms {
     pub(in crate::search) parts: Option<Parts>,
 }
 
-/// A prior in these coordinates.
-pub(in crate::search) struct Known {
+/// The density of a prior pose, in these coordinates.
+pub(in crate::search) struct PriorDensity {
     pub(in crate::search) motion: Motion,
     /// Information on η.
     pub(in crate::search) information: Matrix6<f64>,
@@ -77,12 +77,12 @@ impl PriorTerms {
             PriorBound::Gaussian(_) => None,
         };
         let anchors = anchors.iter().map(|anchor| (*anchor, motion.apply(anchor))).collect();
-        let known = Some(Known { motion, information, attitude, places, half, anchors });
+        let known = Some(PriorDensity { motion, information, attitude, places, half, anchors });
         Some(Self { known, centroid, ln_peak, parts: None })
     }
 
     /// η of a motion.
-    pub(in crate::search) fn step_to(&self, known: &Known, motion: &Motion) -> Vector6<f64> {
+    pub(in crate::search) fn step_to(&self, known: &PriorDensity, motion: &Motion) -> Vector6<f64> {
         let phi = log_of_matrix(&(motion.rotation * known.motion.rotation.transpose()));
         let tau = motion.apply(&self.centroid) - known.motion.apply(&self.centroid);
         Vector6::new(phi.x, phi.y, phi.z, tau.x, tau.y, tau.z)
@@ -114,7 +114,7 @@ impl PriorTerms {
     }
 
     /// ln of the density of η.
-    pub(in crate::search) fn ln_density_of(&self, known: &Known, eta: &Vector6<f64>) -> f64 {
+    pub(in crate::search) fn ln_density_of(&self, known: &PriorDensity, eta: &Vector6<f64>) -> f64 {
         self.ln_peak - 0.5 * eta.dot(&(known.information * eta))
     }
 }

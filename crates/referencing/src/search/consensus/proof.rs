@@ -10,7 +10,7 @@ use super::{
     distance_residual::residual_of_two,
     fit::fit,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, PairTerms},
     local_maxima::Climb,
     lower_bound::{Fits, LaplacePosterior, ROUNDS},
     motion::Motion,
@@ -18,14 +18,12 @@ use super::{
     prior_terms::{PriorTerms, spread},
     seeds::Swept,
 };
-use crate::{lanes::ones_of, site::model::ModelPoint};
+use crate::{lanes::ones_of, search::limits::NEEDED, site::model::ModelPoint};
 
 /// Evidence difference (nats) below which two sets are equal, since a fit ends only near its maximum.
 const EQUAL: f64 = 1e-3;
 /// Relative allowance for second-order terms in a variance.
 const CURVED: f64 = 0.2;
-/// Minimum number of pairs that determine a pose.
-const MIN: usize = 3;
 /// Costs, in words read: a fit, each of its members, each pair compared with a pose.
 const COST_OF_A_FIT: u64 = 512;
 const COST_OF_A_MEMBER: u64 = 64;
@@ -99,14 +97,14 @@ struct Level {
 /// outside the prior's box are excluded. `None` without a pose.
 pub(in crate::search) fn prove(
     model: &[ModelPoint],
-    (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+    (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
     swept: &mut Swept,
     budget: u64,
 ) -> Option<Proved> {
     let none = BTreeSet::new();
     let mut prover = Prover::of(model, (terms, prior_terms, graph), &none, swept.modes.first()?, budget);
     // Maximum amount by which the pruning bounds may be below the strict ones.
-    let below = prover.bounds.above(&Bounds::of((terms, prior_terms, graph), MIN), prover.best.ln_evidence);
+    let below = prover.bounds.above(&Bounds::of((terms, prior_terms, graph), NEEDED), prover.best.ln_evidence);
     let listed = swept.complete && swept.looked_for <= prover.best.ln_evidence - below;
     let open = if listed { prover.of_pairs(swept, below) } else { prover.of_each() };
     swept.insert(prover.better);
@@ -116,7 +114,7 @@ pub(in crate::search) fn prove(
 impl<'a> Prover<'a> {
     fn of(
         model: &'a [ModelPoint],
-        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
+        (terms, prior_terms, graph): (&'a PairTerms, &'a PriorTerms, &'a ConsistencyGraph),
         taken: &'a BTreeSet<usize>,
         best: &Mode,
         budget: u64,
@@ -300,12 +298,12 @@ impl<'a> Prover<'a> {
     fn fitted(&mut self, begun: &Begun) -> Begun {
         let Climb { terms, .. } = self.climb;
         let count = self.members.len();
-        if count < MIN {
+        if count < NEEDED {
             return *begun;
         }
         self.spent += COST_OF_A_FIT + COST_OF_A_MEMBER * count as u64;
         let fitted = match &begun.known {
-            Some(known) if count > MIN && known.is_of_first_order() => self.fits().refined(&known.motion),
+            Some(known) if count > NEEDED && known.is_of_first_order() => self.fits().refined(&known.motion),
             known => self.fits().min_cost(known.map(|known| known.motion)),
         };
         // Pairs that do not determine a pose are no set of interest by themselves.

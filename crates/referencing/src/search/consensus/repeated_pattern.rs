@@ -6,11 +6,12 @@ use super::{
     edge_terms::EdgeTerms,
     fractions::ln_fraction,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms, ln_measured},
+    likelihood::{Mode, PairTerms, ln_measured},
     motion::Motion,
     pattern_edges::{EdgeEvidence, repeated_edges},
     pattern_shifts::{ln_phase, ln_shifted},
     prior_terms::PriorTerms,
+    seeds::MARGIN,
 };
 use crate::{
     problem::Problem,
@@ -33,7 +34,7 @@ const TELLING: usize = 3;
 const MAX_REGION: usize = 64;
 /// Evidence (nats) that a pattern ends at one side of the object, above which a complete identification decides against
 /// the shifts to this side; the margin of the search.
-const ENDS: f64 = 10.0;
+const ENDS: f64 = MARGIN;
 /// Tolerance of a shift, as a fraction of the shortest step.
 const SHIFT_FRACTION: f64 = 0.25;
 /// Sine of the angle between two steps below which they are one direction.
@@ -61,7 +62,7 @@ pub(in crate::search) struct Pattern {
 
 /// ln evidence of a pattern that continues beyond the object at a pose, relative to clutter alone (nats).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::search) struct Continued {
+pub(in crate::search) struct PatternEvidence {
     /// Another pattern with the same steps: the object is absent.
     pub(in crate::search) alone: f64,
     /// The object's own pattern, which holds the object at another shift.
@@ -76,7 +77,7 @@ pub(in crate::search) struct Continued {
     identifies: bool,
 }
 
-impl Continued {
+impl PatternEvidence {
     /// ln of the odds of this shift against another, without the numbers of seen and unseen points.
     pub(super) fn against(&self, other: &Self) -> f64 {
         match self.identifies || other.identifies {
@@ -177,10 +178,10 @@ impl Pattern {
     pub(in crate::search) fn weigh(
         &self,
         problem: &Problem<'_>,
-        parts: (&Terms, &PriorTerms, &ConsistencyGraph),
+        parts: (&PairTerms, &PriorTerms, &ConsistencyGraph),
         edges: Option<&EdgeTerms<'_>>,
         modes: &mut Vec<Mode>,
-    ) -> Option<Continued> {
+    ) -> Option<PatternEvidence> {
         let shifts = self.shifts_from_first(modes);
         let add = |(at, mut mode): (usize, Mode)| {
             let others = shifts[at].iter().flat_map(|own| shifts.iter().flatten().map(move |other| other - own));
@@ -192,10 +193,9 @@ impl Pattern {
             mode.ln_evidence = more + libm::log1p(libm::exp(less - more));
             (mode, continued, shifts[at])
         };
-        let mut ranked: Vec<(Mode, Continued, Option<Vector3<f64>>)> = modes.drain(..).enumerate().map(add).collect();
-        let by_evidence =
-            |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
-        ranked.sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
+        let mut ranked: Vec<(Mode, PatternEvidence, Option<Vector3<f64>>)> =
+            modes.drain(..).enumerate().map(add).collect();
+        ranked.sort_by(|(a, ..), (b, ..)| a.by_evidence(b));
         if let Some(((best, of_best, Some(own)), others)) = ranked.split_first_mut() {
             for (other, continued, shift) in others.iter_mut() {
                 let Some(shift) = shift else { continue };
@@ -203,7 +203,7 @@ impl Pattern {
                     other.ln_evidence = other.ln_evidence.max(best.ln_evidence + continued.against(of_best));
                 }
             }
-            ranked.sort_by(|(a, ..), (b, ..)| by_evidence(a, b));
+            ranked.sort_by(|(a, ..), (b, ..)| a.by_evidence(b));
         }
         let of_best = ranked.first().map(|(_, continued, _)| *continued);
         modes.extend(ranked.into_iter().map(|(mode, ..)| mode));
@@ -217,7 +217,7 @@ impl Pattern {
     pub(super) fn goes_on_to(
         &self,
         problem: &Problem<'_>,
-        (terms, _, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        (terms, _, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         mode: &Mode,
         shift: &Vector3<f64>,
     ) -> bool {
@@ -235,7 +235,7 @@ impl Pattern {
     fn seen_at(
         &self,
         problem: &Problem<'_>,
-        (terms, graph): (&Terms, &ConsistencyGraph),
+        (terms, graph): (&PairTerms, &ConsistencyGraph),
         mode: &Mode,
         places: &[Vector3<f64>],
     ) -> (usize, f64) {
@@ -313,11 +313,11 @@ impl Pattern {
     pub(in crate::search) fn continued(
         &self,
         problem: &Problem<'_>,
-        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         edges: Option<&EdgeTerms<'_>>,
         mode: &Mode,
         beyond: &[Vector3<f64>],
-    ) -> Continued {
+    ) -> PatternEvidence {
         let by_edges =
             edges.map_or_else(EdgeEvidence::default, |edges| EdgeEvidence::of(edges, &self.edges_repeat, mode));
         let repeats = |v: &&usize| self.repeats[graph.vertices[**v].model];
@@ -344,7 +344,7 @@ impl Pattern {
         let in_blocks = of_points - ln_fraction(k, n) + ln_fraction(k - seen, n - all) + gains + by_edges.distinctive;
         let ln_prior = prior_terms.known.as_ref().map_or(0.0, |_| prior_terms.ln_density(&mode.motion));
         let ln_prior = ln_prior + by_edges.distinctive;
-        Continued { alone: another, shifted, around, in_blocks, ln_prior, identifies: k > seen }
+        PatternEvidence { alone: another, shifted, around, in_blocks, ln_prior, identifies: k > seen }
     }
 }
 

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{
     fractions::ln_fraction,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, PairTerms},
     prior_terms::PriorTerms,
 };
 use crate::{problem::Problem, search::alike::slack};
@@ -28,7 +28,7 @@ pub struct StructuredClutter {
 }
 
 /// The places of the model points under the best pose.
-pub(in crate::search) struct Occupied<'a> {
+pub(in crate::search) struct ModelPlaces<'a> {
     pub(super) best: &'a Mode,
     /// Sorted along the first axis.
     places: Vec<Vector3<f64>>,
@@ -36,7 +36,7 @@ pub(in crate::search) struct Occupied<'a> {
     distinctive: Vec<bool>,
 }
 
-impl<'a> Occupied<'a> {
+impl<'a> ModelPlaces<'a> {
     pub(in crate::search) fn of(problem: &Problem<'_>, best: &'a Mode, distinctive: Option<Vec<bool>>) -> Self {
         let mut places: Vec<Vector3<f64>> =
             problem.model.iter().map(|point| best.motion.apply(&point.at.coords)).collect();
@@ -51,7 +51,13 @@ impl<'a> Occupied<'a> {
     }
 
     /// Whether a pair's cloud point lies at a place of the object under the best pose.
-    pub(super) fn holds_place(&self, problem: &Problem<'_>, terms: &Terms, graph: &ConsistencyGraph, v: usize) -> bool {
+    pub(super) fn holds_place(
+        &self,
+        problem: &Problem<'_>,
+        terms: &PairTerms,
+        graph: &ConsistencyGraph,
+        v: usize,
+    ) -> bool {
         self.near(&terms.pairs[v].cloud, slack(problem, graph.vertices[v]))
     }
 
@@ -64,7 +70,7 @@ impl<'a> Occupied<'a> {
     pub(in crate::search) fn structured_clutter(
         &self,
         problem: &Problem<'_>,
-        (terms, prior_terms, graph): (&Terms, &PriorTerms, &ConsistencyGraph),
+        (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         other: &Mode,
     ) -> StructuredClutter {
         let model = |v: &usize| graph.vertices[*v].model;
@@ -79,8 +85,10 @@ impl<'a> Occupied<'a> {
         let (all, imitable) = (distinctive.len(), distinctive.iter().filter(|&&distinctive| !distinctive).count());
         let (s, empty) = (free.len(), (0..all).filter(unseen).count());
         let f = s + (0..all).filter(|i| !distinctive[*i]).filter(unseen).count();
-        let (reported, k): (Vec<usize>, Vec<usize>) = self.best.members.iter().partition(|v| distinctive[model(v)]);
-        let reported: f64 = reported.iter().map(|&v| terms.residual_gain(v, &self.best.motion).max(0.0)).sum();
+        let (distinctive_members, k): (Vec<usize>, Vec<usize>) =
+            self.best.members.iter().partition(|v| distinctive[model(v)]);
+        let ln_distinctive: f64 =
+            distinctive_members.iter().map(|&v| terms.residual_gain(v, &self.best.motion).max(0.0)).sum();
         let given = other.ln_evidence_of(terms, prior_terms, &own) + ln_fraction(other.members.len(), all);
         StructuredClutter {
             // `given` assumes uniform clutter; sparser clutter must not count as structure.
@@ -88,7 +96,7 @@ impl<'a> Occupied<'a> {
             ln_alone: ln_fraction(k.len() + s, imitable + f)
                 - ln_fraction(k.len(), imitable)
                 - ln_fraction(s, f)
-                - reported,
+                - ln_distinctive,
         }
     }
 }

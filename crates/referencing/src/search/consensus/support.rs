@@ -6,7 +6,7 @@ use super::{
     bits::{ones, shared},
     fit::fit,
     graph::ConsistencyGraph,
-    likelihood::{Mode, Term, Terms},
+    likelihood::{Mode, PairTerms, Term},
     motion::Motion,
     places::{LOOSE, Places},
     prior_terms::PriorTerms,
@@ -74,7 +74,7 @@ pub struct Support {
 /// the sample is expected to have s₀ = ln C(N, 3) q³ − ln M/m. If it has more, s₁ > s₀, the pairs are not as independent
 /// as assumed, and all supports are divided by s₁/s₀.
 pub(in crate::search) struct IndependentPairs<'a> {
-    terms: &'a Terms,
+    terms: &'a PairTerms,
     graph: &'a ConsistencyGraph,
     prior_terms: &'a PriorTerms,
     /// The kept pairs, by the first coordinate of their cloud points.
@@ -87,7 +87,7 @@ pub(in crate::search) struct IndependentPairs<'a> {
 
 impl<'a> IndependentPairs<'a> {
     pub(in crate::search) fn of(
-        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
+        (terms, prior_terms, graph): (&'a PairTerms, &'a PriorTerms, &'a ConsistencyGraph),
     ) -> Self {
         let mut kept = apart(terms, 0..terms.pairs.len(), one_place, |pair| [pair.cloud, pair.model]);
         kept.sort_by(|&a, &b| terms.pairs[a].cloud.x.total_cmp(&terms.pairs[b].cloud.x).then(a.cmp(&b)));
@@ -110,7 +110,7 @@ impl<'a> IndependentPairs<'a> {
         let ln_odds = |other: &Mode| {
             let common = other.members.iter().filter(|&&v| best.holds(v)).count();
             match 2 * common > other.members.len() {
-                true => other.ln_even - best.ln_even,
+                true => other.ln_uniform - best.ln_uniform,
                 false => scale * (self.of_motion(&other.motion, &places) - own),
             }
         };
@@ -248,7 +248,7 @@ fn far() -> f64 {
 ///
 /// Ends are together up to the distance `wide` (m).
 fn apart<const N: usize>(
-    terms: &Terms,
+    terms: &PairTerms,
     of: impl Iterator<Item = usize>,
     wide: impl Fn(&Term) -> f64,
     ends: impl Fn(&Term) -> [Vector3<f64>; N],

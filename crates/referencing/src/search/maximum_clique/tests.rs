@@ -8,7 +8,7 @@ use super::*;
 use crate::{candidates::Candidates, problem::Tolerance, site::model::ModelPoint};
 
 #[test]
-fn settings_out_of_range_are_refused() {
+fn settings_out_of_range_are_rejected() {
     let good = MaximumClique::default();
     assert_eq!(good.check(), Ok(()));
     let message = MaximumClique { budget: 0, ..good.clone() }.check().unwrap_err();
@@ -177,8 +177,8 @@ fn mirror_images_are_reported() {
     let mirrored = |places: &[[f64; 3]]| places.iter().map(|[x, y, z]| [*x, *y, -z]).collect::<Vec<_>>();
     let four = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.5, 0.0], [3.0, 0.4, 1.1]];
     let scene = Scene::of(&four, &mirrored(&four)).named();
-    let refused = scene.search(&MaximumClique::default()).unwrap_err();
-    assert_eq!(refused, Rejected::Mirrored { best: 4, proved: true });
+    let rejected = scene.search(&MaximumClique::default()).unwrap_err();
+    assert_eq!(rejected, Rejected::Mirrored { best: 4, proved: true });
     let distances = MaximumClique { orientation: false, ..MaximumClique::default() };
     let found = scene.search(&distances).unwrap();
     assert_eq!((found.pairs.len(), found.undecided, found.optimal), (4, None, true));

@@ -12,7 +12,7 @@ use super::{
             repeated_pattern::Pattern,
             resembling,
             seeds::{MARGIN, Swept},
-            structured_clutter::{Occupied, StructuredClutter},
+            structured_clutter::{ModelPlaces, StructuredClutter},
         },
         limits::NEEDED,
         posterior::COPY,
@@ -20,7 +20,7 @@ use super::{
     STRONG,
     context::Context,
 };
-use crate::{ablation::SearchMechanism, solve::likelihood::mixed::ENOUGH};
+use crate::{ablation::SearchMechanism, solve::likelihood::mixed::MIN_FEATURE_VALUE};
 
 /// Evidence (nats) below the best at which a pose beside it does not matter, unless it is a [`COPY`].
 const BESIDE: f64 = 14.0;
@@ -124,7 +124,7 @@ impl Effort {
 fn is_elsewhere(mode: &Mode, best: &Mode) -> bool {
     let points = mode.members.iter().filter(|&&v| best.holds(v)).count();
     let edges = mode.edges.iter().filter(|v| best.edges.binary_search(v).is_ok()).count();
-    2 * points + 3 * edges < ENOUGH
+    2 * points + 3 * edges < MIN_FEATURE_VALUE
 }
 
 /// Second copies of the object, and with no pattern parts of them, in the rest of the cloud.
@@ -170,10 +170,10 @@ fn compared(
 ) -> (Vec<Mode>, Option<StructuredClutter>) {
     let Some(best) = swept.modes.first() else { return (Vec::new(), None) };
     let (terms, _, graph) = context.parts;
-    let occupied = Occupied::of(context.problem, best, pattern.and_then(Pattern::distinctive));
+    let places = ModelPlaces::of(context.problem, best, pattern.and_then(Pattern::distinctive));
     let mistaken = context
         .with(SearchMechanism::Mislabelled)
-        .then(|| occupied.mistaken(context.problem, (terms, graph), &others.modes))
+        .then(|| places.mistaken(context.problem, (terms, graph), &others.modes))
         .flatten();
     others.modes.retain(|mode| is_elsewhere(mode, best));
     let known = |mode: &Mode| swept.modes.iter().any(|known| known.members == mode.members);
@@ -183,7 +183,7 @@ fn compared(
     let is_shift = |mode: &Mode| pattern.is_some_and(|of| of.is_shift(&best.motion, &mode.motion));
     let structured = context.with(SearchMechanism::StructuredClutter);
     let alike = others.modes.iter().filter(|other| structured && !is_shift(other));
-    let alike = alike.map(|other| occupied.structured_clutter(context.problem, context.parts, other));
+    let alike = alike.map(|other| places.structured_clutter(context.problem, context.parts, other));
     let weight = |of: &StructuredClutter| of.ln_evidence + of.ln_alone;
     (missed, alike.chain(mistaken).max_by(|a, b| weight(a).total_cmp(&weight(b))))
 }

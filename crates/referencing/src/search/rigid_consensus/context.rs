@@ -10,7 +10,7 @@ use super::{
             edge_terms::EdgeTerms,
             graph::ConsistencyGraph,
             joined::Joined,
-            likelihood::{Mode, Terms},
+            likelihood::{Mode, PairTerms},
             local_maxima::Climb,
             prior_terms::PriorTerms,
             seeds::{Seeds, Swept},
@@ -24,7 +24,7 @@ use crate::{Correspondence, ablation::SearchMechanism, problem::Problem};
 /// One problem with the terms of its evidence.
 pub(super) struct Context<'a> {
     pub(super) problem: &'a Problem<'a>,
-    pub(super) parts: (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
+    pub(super) parts: (&'a PairTerms, &'a PriorTerms, &'a ConsistencyGraph),
     /// The terms of edges, if the problem has any.
     pub(super) edges: Option<EdgeTerms<'a>>,
     /// Whether there are candidates enough for a pose of points alone.
@@ -55,8 +55,7 @@ impl Context<'_> {
         for mode in &mut swept.modes {
             density.weigh(self.problem, self.parts, mode);
         }
-        let by = |a: &Mode, b: &Mode| b.ln_evidence.total_cmp(&a.ln_evidence).then_with(|| a.members.cmp(&b.members));
-        swept.modes.sort_by(by);
+        swept.modes.sort_by(Mode::by_evidence);
     }
 
     /// Adds edges to the modes of points, and the modes of edges; `taken` are the cloud points and lines not to be used.
@@ -67,7 +66,7 @@ impl Context<'_> {
         // A mode of points alone sees none of the edges.
         swept.modes.iter_mut().for_each(|mode| {
             mode.ln_evidence += edges.ln_fraction[0];
-            mode.ln_even = mode.ln_evidence;
+            mode.ln_uniform = mode.ln_evidence;
         });
         let near = |mode: &Mode| joined.near(&mode.motion, None, f64::NEG_INFINITY);
         let upgraded: Vec<Mode> = swept.modes.iter().take(MAX_COMPARED).filter_map(near).collect();

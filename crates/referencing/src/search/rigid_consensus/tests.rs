@@ -128,7 +128,7 @@ fn the_prior_weighs_on_the_pose() {
 }
 
 #[test]
-fn settings_out_of_range_are_refused() {
+fn settings_out_of_range_are_rejected() {
     assert_eq!(RigidConsensus::default().check(), Ok(()));
     assert!(RigidConsensus { budget: 0, ..RigidConsensus::default() }.check().is_err());
 }

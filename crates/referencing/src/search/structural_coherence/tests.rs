@@ -5,7 +5,7 @@ use super::*;
 use crate::{candidates::Candidates, problem::Tolerance, site::model::ModelPoint};
 
 #[test]
-fn a_search_without_a_budget_is_refused() {
+fn a_search_without_a_budget_is_rejected() {
     assert_eq!(StructuralCoherence::default().check(), Ok(()));
     let message = StructuralCoherence { budget: 0, ..StructuralCoherence::default() }.check().unwrap_err();
     assert_eq!(message, "budget = 0; give 1 or more pair tests");
@@ -154,8 +154,8 @@ fn the_size_of_the_largest_set_is_reported_where_it_is_too_small() {
 fn a_mirror_image_is_reported_with_its_size() {
     let image = PLACES.map(|[x, y, z]| [x, y, -z]);
     for samples in [Samples::Permutations, Samples::Combinations] {
-        let refused = Scene::of(&PLACES, &image).search(&search(samples, 1000)).unwrap_err();
-        assert_eq!(refused, Rejected::Mirrored { best: 4, proved: true });
+        let rejected = Scene::of(&PLACES, &image).search(&search(samples, 1000)).unwrap_err();
+        assert_eq!(rejected, Rejected::Mirrored { best: 4, proved: true });
         let distances = StructuralCoherence { orientation: false, ..search(samples, 1000) };
         assert_eq!(Scene::of(&PLACES, &image).search(&distances).unwrap().pairs.len(), 4);
     }

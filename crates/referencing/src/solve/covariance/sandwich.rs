@@ -51,7 +51,7 @@ pub(crate) fn or_resampled(
     solve: impl Fn(&Observations<'_>) -> Result<Transform<Object, Camera>, Degenerate>,
 ) -> Result<Covariance6<Object, Camera>, Degenerate> {
     let known = covariance(data, at, weight)?;
-    if known.attitude_sigma() <= STRAIGHT {
+    if known.attitude_rms() <= STRAIGHT {
         Ok(known)
     } else {
         resampled::covariance(solve, data, at, resampled::Answer::Straight)

@@ -35,7 +35,7 @@ pub(crate) struct Deletions<'a> {
 /// Decrement of a negligible step of a pose of points and edges.
 const SMALL: f64 = 1e-12;
 /// Minimum number of remaining points for a single step; with fewer another minimum may be the best.
-const ENOUGH: usize = 5;
+const MIN_REMAINING: usize = 5;
 /// Largest squared step (standard deviations) that counts as linear.
 const NEAR: f64 = 1.0;
 /// Largest standard deviation of the attitude (rad, three axes together) at which a step counts as linear.
@@ -89,7 +89,7 @@ impl<'a> Deletions<'a> {
     /// It is one step from the pose of all points if the step is short and enough points remain; otherwise the
     /// remaining points are solved anew. `None` if they determine no pose.
     pub(crate) fn without(&self, out: &[usize]) -> Option<(Transform<Object, Camera>, Covariance6<Object, Camera>)> {
-        if self.each.len() >= out.len() + ENOUGH {
+        if self.each.len() >= out.len() + MIN_REMAINING {
             let left = out.iter().fold(self.all, |left, &k| left.less(&self.each[k]));
             if let Ok(covariance) = left.covariance()
                 && covariance.fixed_view::<3, 3>(0, 0).trace() <= SURE * SURE

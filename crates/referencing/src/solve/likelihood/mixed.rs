@@ -66,7 +66,7 @@ impl<'a> Mixed<'a> {
         rig_of_edges: Option<&'a StereoRig>,
     ) -> Result<Self, Degenerate> {
         let (points, edges) = (data.points.len(), data.edges.len());
-        if 2 * points + 3 * edges < ENOUGH {
+        if 2 * points + 3 * edges < MIN_FEATURE_VALUE {
             return Err(Degenerate::TooFew { found: points + edges, needed: 3 });
         }
         let finite =
@@ -409,10 +409,10 @@ pub(crate) fn covariance(
     Mixed::of(data, rig, rig)?.shared(at)?.covariance().map(Covariance6::new)
 }
 
-/// The value of a feature set that can determine a pose: a point counts two, an edge three.
+/// Minimum value of a feature set that can determine a pose: a point counts two, an edge three.
 ///
 /// Three points, two points and an edge, and two edges can; a point and an edge cannot.
-pub(crate) const ENOUGH: usize = 6;
+pub(crate) const MIN_FEATURE_VALUE: usize = 6;
 /// Maximum number of steps.
 const MAX_STEPS: u64 = 100;
 /// Decrement of a step of 1e-9 standard deviations, below which rounding rules.

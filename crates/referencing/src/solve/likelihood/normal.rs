@@ -157,7 +157,7 @@ mod tests {
 
     /// Collinear points leave the rotation about their line undetermined.
     #[test]
-    fn what_has_no_inverse_is_refused_with_its_smallest_eigenvalue() {
+    fn what_has_no_inverse_is_rejected_with_its_smallest_eigenvalue() {
         let mut line = Normal::default();
         for k in 0..4 {
             line.add(&Vector3::new(f64::from(k), 0.0, 0.0), &(Matrix3::identity() * 1e6));

@@ -79,7 +79,7 @@ mod tests {
     const SIGMA: f64 = 0.002;
 
     /// The corners of a box of 2 × 2 × 1 m, measured at `by` times their distance from the camera.
-    fn stretched(by: f64) -> Option<ScaleError> {
+    fn scaled(by: f64) -> Option<ScaleError> {
         let pose = Transform::<Object, Camera>::exp(&[0.3, -0.2, 0.4, 0.1, 0.2, -5.0].into());
         let corner = |k: usize| Point::new((k & 1) as f64 * 2.0, (k >> 1 & 1) as f64 * 2.0, (k >> 2 & 1) as f64);
         let seen = |k: usize| Observation {
@@ -97,7 +97,7 @@ mod tests {
     fn a_box_that_is_larger_is_reported() {
         let of_box = SIGMA / 18.0_f64.sqrt();
         for by in [1.0, 1.01, 0.98] {
-            let found = stretched(by).unwrap();
+            let found = scaled(by).unwrap();
             assert!(
                 (found.sigma / of_box - 1.0).abs() < 1e-9
                     && (found.value - (by - 1.0)).abs() < 1e-3 * (by - 1.0).abs() + 1e-9,

@@ -136,7 +136,7 @@ fn an_edge_has_no_direction_and_no_place_along_it() {
 
 /// E6: parallel edges determine no pose, and a solver for points says so of a set without enough points.
 #[test]
-fn sets_without_a_pose_are_refused() {
+fn sets_without_a_pose_are_rejected() {
     let rig = rig();
     let truth = pose(2.0, 0.4);
     let mut rng = ChaCha8Rng::seed_from_u64(2);

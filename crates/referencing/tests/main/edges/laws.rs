@@ -120,7 +120,7 @@ fn a_motion_of_cloud_and_lines_changes_nothing() {
 ///
 /// Fails if a larger mirror image of the set is not sought.
 #[test]
-fn a_mirror_image_is_refused() {
+fn a_mirror_image_is_rejected() {
     for draw in [DRAW, BOXED] {
         let draw = Draw { mirrored: true, clutter: (0, 0), ..draw };
         for seed in 0..SCENES {

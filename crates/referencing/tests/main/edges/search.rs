@@ -208,7 +208,7 @@ fn an_absent_object_stays_rejected() {
 
 /// The present object with few visible edges: refused or right.
 #[test]
-fn few_edges_alone_are_refused_or_right() {
+fn few_edges_alone_are_rejected_or_right() {
     let [_, wrong, _] = tally(Frame { every: 9, parallel: true, ..SEEN }, 30, 4);
     assert_eq!(wrong, 0);
 }

@@ -24,7 +24,7 @@ pub(crate) fn uniform(run: &Run, summary: &RunSummary) -> Option<Text> {
     if all(|row| row.found == row.attempted) {
         return Some(text!["All ", n, " attempts have a fix, in every trial, and none is wrong."]);
     }
-    all(|row| row.refused == row.attempted).then(|| text!["None of ", n, " attempts has a fix, in any trial."])
+    all(|row| row.rejected == row.attempted).then(|| text!["None of ", n, " attempts has a fix, in any trial."])
 }
 
 /// The figure: rates of fixes and wrong fixes among the attempts, with 95 % intervals.

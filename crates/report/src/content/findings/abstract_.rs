@@ -24,7 +24,7 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
         " attempts (one for every frame and target in view): "
     ];
     let groups =
-        [("found", total(|row| row.found)), ("refused", total(|row| row.refused)), ("wrong", total(|row| row.wrong))];
+        [("found", total(|row| row.found)), ("refused", total(|row| row.rejected)), ("wrong", total(|row| row.wrong))];
     for (index, (group, n)) in groups.into_iter().enumerate() {
         let key = phrases::over(&trials, "/metrics/evaluation", format!("percent {group} of attempted"));
         let fraction = (attempted > 0).then(|| 100.0 * n as f64 / attempted as f64);
@@ -35,17 +35,17 @@ pub(crate) fn section(run: &Run, summary: &RunSummary, comparisons: &[Comparison
             let [low, high] = phrases::interval(trial, group, n, attempted);
             first.extend(text![", 95 % interval [", low, ", ", high, "]"]);
         }
-        first.push(["), ", "), ", "). "][index].into());
+        first.push(["), ", "), ", ")."][index].into());
     }
     if trials.len() > 1 {
         first.push(
-            "These counts pool trials that may share frames; the table of outcomes has the intervals of each trial. "
+            " These counts pool trials that may share frames; the table of outcomes has the intervals of each trial."
                 .into(),
         );
     }
     if total(|row| row.unjudged) > 0 {
         first.extend(text![
-            "Ground truth is missing for ",
+            " Ground truth is missing for ",
             pooled("unjudged", total(|row| row.unjudged)),
             " of the fixes; they are not checked."
         ]);

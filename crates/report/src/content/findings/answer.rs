@@ -248,7 +248,7 @@ fn wrong(run: &Run, summary: &RunSummary, labels: &Labels) -> Option<Text> {
         return None;
     }
     let alike = summary.rows.iter().filter(|other| other.wrong == row.wrong).count();
-    let began = if alike == 1 { "Most wrong fixes:" } else { "No trial has more wrong fixes than" };
+    let began = if alike == 1 { "Most wrong fixes:" } else { "Most wrong fixes, shared by several trials:" };
     Some(text![
         format!("{began} {} with ", labels.of_trial(row)),
         phrases::count(trial, "wrong", row.wrong),

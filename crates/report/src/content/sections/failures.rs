@@ -83,10 +83,10 @@ fn worst(run: &Run) -> Vec<Case<'_>> {
         keys.iter().filter_map(chosen).collect()
     };
     let wrong = |row: &AttemptRow| row.wrong();
-    let refused = |row: &AttemptRow| !row.wrong() && !row.found() && row.get(Field::Visible).unwrap_or(0.0) >= 3.0;
+    let rejected = |row: &AttemptRow| !row.wrong() && !row.found() && row.get(Field::Visible).unwrap_or(0.0) >= 3.0;
     let found = |row: &AttemptRow| row.found();
     let mut cases = pick(&max(all().filter(|(.., row)| wrong(row)).collect(), LISTED), &wrong);
-    let mut refusals: Vec<Case<'_>> = all().filter(|(.., row)| refused(row)).collect();
+    let mut refusals: Vec<Case<'_>> = all().filter(|(.., row)| rejected(row)).collect();
     // Rejected attempts with many points in view are the least expected.
     let visible = |row: &AttemptRow| row.get(Field::Visible).unwrap_or(0.0);
     refusals.sort_by(|a, b| visible(b.2).total_cmp(&visible(a.2)));

@@ -55,7 +55,7 @@ fn outcomes(run: &Run, summary: &RunSummary) -> Table {
     for (index, (row, trial)) in summary.rows.iter().zip(&run.trials).enumerate() {
         let mut line = cells(row);
         line.push(phrases::count(trial, "attempted", row.attempted).into());
-        for (group, k) in [("found", row.found), ("refused", row.refused), ("wrong", row.wrong)] {
+        for (group, k) in [("found", row.found), ("refused", row.rejected), ("wrong", row.wrong)] {
             let [low, high] = phrases::interval(trial, group, k, row.attempted);
             line.push(phrases::percent(trial, group, k, row.attempted).into());
             line.push(Cell { text: text!["[", low, ", ", high, "]"], minor: true, ..Cell::default() });
@@ -168,7 +168,7 @@ fn refusals(run: &Run, summary: &RunSummary) -> Option<Table> {
             let n = row.reasons.get(reason).copied().unwrap_or(0);
             line.push(phrases::count(trial, &format!("refused:{reason}"), n).into());
         }
-        line.push(phrases::count(trial, "refused", row.refused).into());
+        line.push(phrases::count(trial, "refused", row.rejected).into());
         table.line(breaks(summary, index), line);
     }
     Some(table)

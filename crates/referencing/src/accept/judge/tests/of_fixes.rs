@@ -21,7 +21,7 @@ fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
 /// A scale error of 1 % with σ 0.4 % is 2.5 standard deviations; the square, 6.25, exceeds 3.84 (χ²₁ at 95 %) times the
 /// mean of the other eleven degrees of freedom. Points at 10 m then have an error of (1 % + 2 · 0.4 %) · 10 m = 0.18 m.
 #[test]
-fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
+fn a_scale_error_is_rejected_that_is_sure_and_moves_the_object_too_far() {
     let scale_error = |value: f64| Some(ScaleError { value, sigma: 0.004 });
     let of = |distance: f64, chi2: f64, scale_error: Option<ScaleError>| {
         // The distance counts to the centroid of the points, not to the origin of the object.
@@ -32,7 +32,9 @@ fn a_scale_error_is_refused_that_is_sure_and_moves_the_object_too_far() {
     };
     for value in [0.01, -0.01] {
         let rejection = of(10.0, 17.0, scale_error(value)).unwrap_err();
-        let RejectionReason::Stretched { scale_error: reported, off, limit } = rejection else { panic!("{rejection}") };
+        let RejectionReason::ScaleError { scale_error: reported, off, limit } = rejection else {
+            panic!("{rejection}")
+        };
         assert!(reported.value == value && close(off, 0.18) && limit == 0.10, "{off}");
     }
     assert_eq!(of(10.0, 17.0, None), Ok(()));

@@ -8,7 +8,7 @@ use crate::{
     candidates::{Candidates, Gate},
     problem::{Prior, PriorBound, Tolerance},
     search::{
-        consensus::{graph::ConsistencyGraph, likelihood::Terms},
+        consensus::{graph::ConsistencyGraph, likelihood::PairTerms},
         identification::Search,
         posterior::PosteriorProbabilities,
         rigid_consensus::RigidConsensus,
@@ -126,7 +126,7 @@ fn sides_of_a_grid(from: f64, sigma: f64, place: impl Fn(usize, Vector3<f64>) ->
     };
     let prior_terms = PriorTerms::of(&problem).expect("a prior");
     let graph = ConsistencyGraph::of(&problem, &prior_terms);
-    let terms = Terms::of(&problem, &prior_terms, &graph);
+    let terms = PairTerms::of(&problem, &prior_terms, &graph);
     let (parts, none) = ((&terms, &prior_terms, &graph), BTreeSet::new());
     let pattern = Pattern::of(&model, &[]).expect("a lattice");
     let start = Motion { rotation: Matrix3::identity(), translation: ahead + from * STEP * Vector3::x() };

@@ -59,7 +59,7 @@ fn evidence(prover: &Prover<'_>, members: &[usize]) -> Option<f64> {
 
 /// Calls `each` with every coherent set of three pairs or more that begins with `begun`.
 fn coherent(graph: &ConsistencyGraph, begun: &mut Vec<usize>, each: &mut impl FnMut(&[usize])) {
-    if begun.len() >= MIN {
+    if begun.len() >= NEEDED {
         each(begun);
     }
     let from = begun.last().map_or(0, |&v| graph.starts[graph.rank[v] as usize + 1]);
@@ -99,7 +99,7 @@ fn fractions_are_no_more_than_what_all_cost() {
         };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
-        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let terms = PairTerms::of(&problem, &prior_terms, &graph);
         let none = BTreeSet::new();
         let motion = Motion { rotation: Matrix3::identity(), translation: ahead };
         // Every set examined has less evidence: none becomes the best.
@@ -108,7 +108,7 @@ fn fractions_are_no_more_than_what_all_cost() {
             edges: Vec::new(),
             motion,
             ln_evidence: 1e9,
-            ln_even: 1e9,
+            ln_uniform: 1e9,
             ln_clutter_density: 0.0,
         };
         let mut prover = Prover::of(&model, (&terms, &prior_terms, &graph), &none, &other, 0);
@@ -159,10 +159,10 @@ fn compare(rounds: u64) {
         };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
-        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let terms = PairTerms::of(&problem, &prior_terms, &graph);
         let (parts, none) = ((&terms, &prior_terms, &graph), BTreeSet::new());
         for (missed, budget) in [(false, 200 * (round % 5)), (false, FREE), (true, 200 * (round % 5)), (true, FREE)] {
-            let mut swept = Seeds::new(&model, parts, &none, (MIN, -3.0), FREE).sweep();
+            let mut swept = Seeds::new(&model, parts, &none, (NEEDED, -3.0), FREE).sweep();
             if missed {
                 swept.modes.drain(..swept.modes.len().saturating_sub(1));
             }

@@ -4,10 +4,11 @@ use super::{
     super::{
         bits::{intersect, is_set, ones},
         graph::ConsistencyGraph,
-        likelihood::{Mode, Terms},
+        likelihood::{Mode, PairTerms},
     },
-    MIN, Seeds,
+    Seeds,
 };
+use crate::search::limits::NEEDED;
 
 /// Number of starting pairs of this search, and number of vertices compared with each.
 const BEGINNINGS: usize = 8;
@@ -38,7 +39,7 @@ impl Seeds<'_> {
             self.of_three = ones(&common, graph.starts[after]).filter(|&v| is_set(graph.row(c), v)).collect();
             self.follow([a, b, c], 0.0);
             let shared = |mode: &Mode| mode.members.iter().filter(|&&v| than.holds(v)).count();
-            self.modes.retain(|mode| shared(mode) < MIN);
+            self.modes.retain(|mode| shared(mode) < NEEDED);
             if !self.modes.is_empty() {
                 break;
             }
@@ -60,7 +61,7 @@ impl Seeds<'_> {
 }
 
 /// The pairs that a pose does not explain, one bit each; with `free`, without the cloud points of its own pairs.
-fn contradicting(terms: &Terms, graph: &ConsistencyGraph, pose: &Mode, free: bool) -> Vec<u64> {
+fn contradicting(terms: &PairTerms, graph: &ConsistencyGraph, pose: &Mode, free: bool) -> Vec<u64> {
     let mut taken: Vec<usize> = pose.members.iter().map(|&v| graph.vertices[v].cloud).collect();
     taken.sort_unstable();
     let mut bits = vec![0; graph.vertices.len().div_ceil(64)];

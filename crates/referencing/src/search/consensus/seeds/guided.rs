@@ -7,14 +7,14 @@ use super::{
         bits::{is_set, ones, shared},
         bound::distortion,
         graph::ConsistencyGraph,
-        likelihood::Terms,
+        likelihood::PairTerms,
         places::Places,
     },
-    COMPARED, MIN, Seeds,
+    COMPARED, Seeds,
 };
 use crate::{
     observations::Observation,
-    search::{bitset::BitMatrix, consensus::motion::Motion},
+    search::{bitset::BitMatrix, consensus::motion::Motion, limits::NEEDED},
     solve::closed_form::fit as least_squares,
 };
 
@@ -121,12 +121,12 @@ impl Seeds<'_> {
             let Some(&(_, second)) = ranked.iter().find(|(_, v)| !tried.contains(v)) else { return };
             let joined = joined(adjacency, &[seed, second], &ranked);
             tried.extend(&joined[1..]);
-            if joined.len() < MIN {
+            if joined.len() < NEEDED {
                 continue;
             }
             let held =
                 |mode: &crate::search::consensus::likelihood::Mode| joined.iter().filter(|&&v| mode.holds(v)).count();
-            if self.modes.iter().take(COMPARED).any(|mode| held(mode) >= MIN) {
+            if self.modes.iter().take(COMPARED).any(|mode| held(mode) >= NEEDED) {
                 return;
             }
             if self.follow_beginning(&joined, places) {
@@ -140,11 +140,11 @@ impl Seeds<'_> {
         let crate::search::consensus::local_maxima::Climb { terms, graph, .. } = self.climb;
         self.spent += super::COST_OF_A_MODE + graph.vertices.len() as u64 / 16;
         let Some(motion) = fitted(terms, joined) else { return false };
-        let Some(mut members) = places.near(terms, graph, &motion, MIN) else { return false };
+        let Some(mut members) = places.near(terms, graph, &motion, NEEDED) else { return false };
         members.retain(|&v| is_set(&self.free, v));
         let gains: f64 = members.iter().map(|&v| self.bounds.gain_of_rank(graph.rank[v] as usize)).sum();
         let threshold = self.threshold();
-        if members.len() < MIN || self.bounds.of_set(members.len(), gains) < threshold {
+        if members.len() < NEEDED || self.bounds.of_set(members.len(), gains) < threshold {
             return false;
         }
         let climbed = |set: &[usize]| !self.climbed.insert(set.to_vec());
@@ -184,11 +184,11 @@ pub(in crate::search::consensus) fn beginning(
     mut neighbours: Vec<(usize, usize)>,
 ) -> Option<Vec<usize>> {
     best_connected_first(&mut neighbours);
-    Some(joined(adjacency, &[seed], &neighbours)).filter(|joined| joined.len() >= MIN)
+    Some(joined(adjacency, &[seed], &neighbours)).filter(|joined| joined.len() >= NEEDED)
 }
 
 /// The least-squares motion of some pairs; `None` if it is not finite.
-pub(in crate::search::consensus) fn fitted(terms: &Terms, members: &[usize]) -> Option<Motion> {
+pub(in crate::search::consensus) fn fitted(terms: &PairTerms, members: &[usize]) -> Option<Motion> {
     let observed = |&v: &usize| Observation {
         measured: UncertainPoint::isotropic(terms.pairs[v].cloud.into(), 0.0),
         pixels: None,

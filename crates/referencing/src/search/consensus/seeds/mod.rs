@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 use super::{
     bits::{Held, intersect, is_set, ones, shared},
     bound::{After, Bounds},
-    distance_residual::{Edge, lost_to, residual_of_three},
+    distance_residual::{Side, lost_to, residual_of_three},
     graph::ConsistencyGraph,
-    likelihood::{Mode, Terms},
+    likelihood::{Mode, PairTerms},
     local_maxima::Climb,
     motion::Motion,
     prior_terms::PriorTerms,
@@ -32,8 +32,6 @@ const LOOSE: f64 = 3.5;
 const COMPARED: usize = 16;
 /// Approximate number of vertices at which pairs are counted.
 const COUNTED: usize = 256;
-/// Minimum number of pairs that determine a pose.
-const MIN: usize = 3;
 /// Maximum number of modes kept.
 const KEPT: usize = 256;
 /// Maximum numbers of pairs to follow, and of pairs that lead to parts of sets (12 bytes each).
@@ -80,16 +78,7 @@ fn insert(modes: &mut Vec<Mode>, mode: Mode) {
     if modes.iter().any(|known| known.members == mode.members && known.edges == mode.edges) {
         return;
     }
-    let before = |known: &Mode| {
-        known
-            .ln_evidence
-            .total_cmp(&mode.ln_evidence)
-            .reverse()
-            .then_with(|| known.members.cmp(&mode.members))
-            .then_with(|| known.edges.cmp(&mode.edges))
-            .is_lt()
-    };
-    let place = modes.partition_point(before);
+    let place = modes.partition_point(|known| known.by_evidence(&mode).is_lt());
     modes.insert(place, mode);
     modes.truncate(KEPT);
 }
@@ -158,7 +147,7 @@ impl<'a> Seeds<'a> {
     /// Sets have at least `min` pairs and the evidence `floor` (nats).
     pub(in crate::search) fn new(
         model: &'a [ModelPoint],
-        (terms, prior_terms, graph): (&'a Terms, &'a PriorTerms, &'a ConsistencyGraph),
+        (terms, prior_terms, graph): (&'a PairTerms, &'a PriorTerms, &'a ConsistencyGraph),
         taken: &'a BTreeSet<usize>,
         (min, floor): (usize, f64),
         budget: u64,
@@ -336,7 +325,7 @@ impl<'a> Seeds<'a> {
         likely.flat_map(|mode| &mode.members).for_each(|&v| self.again[v / 64] |= 1 << (v % 64));
         let gains = self.bounds.gain(a) + self.bounds.gain(b);
         let (first, second) = (&terms.pairs[a], &terms.pairs[b]);
-        let side = Edge::of(first, second);
+        let side = Side::of(first, second);
         for (place, held) in common.iter().enumerate() {
             for c in held.ones() {
                 if is_set(&self.again, c) {
@@ -357,7 +346,7 @@ impl<'a> Seeds<'a> {
                     continue;
                 }
                 let third = &terms.pairs[c];
-                let sides = [&side, &Edge::of(first, third), &Edge::of(second, third)];
+                let sides = [&side, &Side::of(first, third), &Side::of(second, third)];
                 let lost = lost_to(residual_of_three([first, second, third], sides));
                 if (lost == 0.0 || enough(gains - lost)) && !self.known([a, b, c]) {
                     self.of_three.clear();

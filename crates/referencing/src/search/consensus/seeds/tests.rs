@@ -7,6 +7,7 @@ use super::*;
 use crate::{
     candidates::Candidates,
     problem::{Problem, Tolerance},
+    search::limits::NEEDED,
 };
 
 const POINTS: usize = 9;
@@ -50,7 +51,7 @@ fn a_part_is_found_without_limits_and_the_complete_set_always() {
         };
         let prior_terms = PriorTerms::of(&problem).expect("a box");
         let graph = ConsistencyGraph::of(&problem, &prior_terms);
-        let terms = Terms::of(&problem, &prior_terms, &graph);
+        let terms = PairTerms::of(&problem, &prior_terms, &graph);
         let seeds = |taken, min| Seeds::new(&model, (&terms, &prior_terms, &graph), taken, (min, 3.0), u64::MAX / 4);
         let clouds = |swept: &Swept| -> Vec<usize> {
             let best = swept.modes.first().map(|mode| mode.pairs(&graph)).unwrap_or_default();
@@ -58,15 +59,15 @@ fn a_part_is_found_without_limits_and_the_complete_set_always() {
         };
         let (none, full): (_, BTreeSet<usize>) = (BTreeSet::new(), (0..POINTS).collect());
         let part: Vec<usize> = (POINTS..POINTS + SEEN).collect();
-        let plain = seeds(&full, MIN).sweep();
-        let unlimited = seeds(&full, MIN).with_parts(SEEN + 2, u64::MAX, u64::MAX / 4).sweep();
+        let plain = seeds(&full, NEEDED).sweep();
+        let unlimited = seeds(&full, NEEDED).with_parts(SEEN + 2, u64::MAX, u64::MAX / 4).sweep();
         assert_eq!((clouds(&plain), clouds(&unlimited)), (part.clone(), part));
         assert!(plain.complete && unlimited.complete && unlimited.parts);
-        let full_sets = seeds(&full, MIN).with_parts(SEEN + 2, 1, 0).sweep();
+        let full_sets = seeds(&full, NEEDED).with_parts(SEEN + 2, 1, 0).sweep();
         assert!(full_sets.complete && !full_sets.parts);
-        let all = seeds(&none, MIN).with_parts(SEEN + 2, 1, 0).sweep();
+        let all = seeds(&none, NEEDED).with_parts(SEEN + 2, 1, 0).sweep();
         assert_eq!(clouds(&all), (0..POINTS).collect::<Vec<_>>());
-        assert!(all.complete && all.pair_tests < seeds(&none, MIN).sweep().pair_tests);
+        assert!(all.complete && all.pair_tests < seeds(&none, NEEDED).sweep().pair_tests);
     }
 }
 
@@ -99,8 +100,8 @@ fn a_large_set_is_found_by_guided_seeds() {
     };
     let prior_terms = PriorTerms::of(&problem).expect("a box");
     let graph = ConsistencyGraph::of(&problem, &prior_terms);
-    let terms = Terms::of(&problem, &prior_terms, &graph);
-    let seeds = |taken, budget| Seeds::new(&model, (&terms, &prior_terms, &graph), taken, (MIN, 3.0), budget);
+    let terms = PairTerms::of(&problem, &prior_terms, &graph);
+    let seeds = |taken, budget| Seeds::new(&model, (&terms, &prior_terms, &graph), taken, (NEEDED, 3.0), budget);
     let (none, all): (_, BTreeSet<usize>) = (BTreeSet::new(), (0..TRUE).collect());
     const SMALL: u64 = 1_000_000;
     assert!(!seeds(&none, SMALL).sweep().complete);

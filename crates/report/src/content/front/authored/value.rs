@@ -99,7 +99,7 @@ impl Values<'_> {
             Group::Attempts => row.attempted,
             Group::Fixes => row.found,
             Group::Wrong => row.wrong,
-            Group::Rejected => row.refused,
+            Group::Rejected => row.rejected,
             Group::Frames => row.frames,
         });
         let trials: Vec<&Trial> = members.iter().map(|&index| &self.run.trials[index]).collect();

@@ -12,16 +12,16 @@ use seafix_vision::RightCameraRotation;
 
 use crate::exit::{Failure, INPUT, USAGE};
 
-/// How a recording is read.
+/// The source of stereo pairs, and how a recording is read.
 #[derive(Debug, Args)]
-pub(crate) struct PairsOf {
+pub(crate) struct PairSource {
     /// Set how a recording is read: a setting of the source `mcap` and a TOML value, `left=/cam0/image_raw` or
     /// `stamps=log`; `seafix show mcap` lists them.
     #[arg(long, value_name = "KEY=VALUE")]
     source: Vec<String>,
 }
 
-impl PairsOf {
+impl PairSource {
     /// Rejects settings of a recording beside two images.
     ///
     /// # Errors
