@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use seafix::referencing;
 
-/// The integrity of a fix: residual test, solution separation, protection levels and scale error.
+/// The integrity of a fix: residual test, solution separation, protection levels, scale error and depth error.
 ///
 /// Levels are those of Blanch and others, *Baseline advanced RAIM user algorithm*, 2015.
 #[pyclass(frozen, module = "seafix")]
@@ -71,6 +71,21 @@ impl Integrity {
     #[getter]
     fn scale_error_sigma(&self) -> Option<f64> {
         self.0.scale_error.map(|error| error.sigma)
+    }
+
+    /// float or None: measured distances along the optical axis are longer than the model's by this fraction.
+    ///
+    /// A focal length f of both cameras instead of f₀ gives f/f₀ − 1. None with three points, or if the points do not
+    /// determine it, as those of a plane seen face-on.
+    #[getter]
+    fn depth_error(&self) -> Option<f64> {
+        self.0.depth_error.map(|error| error.value)
+    }
+
+    /// float or None: the standard deviation of `depth_error`.
+    #[getter]
+    fn depth_error_sigma(&self) -> Option<f64> {
+        self.0.depth_error.map(|error| error.sigma)
     }
 
     fn __repr__(&self) -> String {

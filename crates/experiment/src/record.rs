@@ -226,6 +226,8 @@ fn integrity(it: &seafix_referencing::Integrity) -> Integrity {
         protection_attitude: it.protection.map(|level| level.attitude),
         scale_error: it.scale_error.map(|it| it.value),
         scale_error_sigma: it.scale_error.map(|it| it.sigma),
+        depth_error: it.depth_error.map(|it| it.value),
+        depth_error_sigma: it.depth_error.map(|it| it.sigma),
     }
 }
 

@@ -200,6 +200,8 @@ quantities! {
     PROTECTION_ATTITUDE: Target Real "protection_attitude" "rad" "/referencing/result" "The protection level of the attitude." = |r: &TargetRecord| integrity(r)?.protection_attitude;
     SCALE_ERROR: Target Real "scale_error" "" "/referencing/result" "The relative excess of measured distances over the model's." = |r: &TargetRecord| integrity(r)?.scale_error;
     SCALE_ERROR_SIGMA: Target Real "scale_error_sigma" "" "/referencing/result" "The standard deviation of the scale error." = |r: &TargetRecord| integrity(r)?.scale_error_sigma;
+    DEPTH_ERROR: Target Real "depth_error" "" "/referencing/result" "The relative excess of measured distances over the model's along the optical axis." = |r: &TargetRecord| integrity(r)?.depth_error;
+    DEPTH_ERROR_SIGMA: Target Real "depth_error_sigma" "" "/referencing/result" "The standard deviation of the depth error." = |r: &TargetRecord| integrity(r)?.depth_error_sigma;
     ALERT_LIMIT: Target Real "alert_limit" "m" "/metrics/evaluation" "The alert limit of the target." = |r: &TargetRecord| r.evaluation.alert_limit;
     REGION: Target Text "region" "" "/metrics/evaluation" "The region of the Stanford diagram that error, protection level and alert limit lie in." = |r: &TargetRecord| r.region().map_or_else(String::new, |region| region.name().to_owned());
 }

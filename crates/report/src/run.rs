@@ -23,7 +23,7 @@ use crate::{
     navigation_quantity::{Counted, NavigationQuantity},
     place,
     points_of_interest::{self, PoiQuantity},
-    scale_error::ScaleError,
+    scale_error::ScaleErrors,
 };
 
 /// The trials of a run, sorted by file name.
@@ -52,8 +52,8 @@ pub(crate) struct Trial {
     pub(crate) pictures: bool,
     /// The sum of the squared disparity errors of correctly identified points (px²), and their number.
     pub(crate) disparity: (f64, usize),
-    /// The scale error that its fixes agree about.
-    pub(crate) scale_error: ScaleError,
+    /// The scale and depth errors of its fixes.
+    pub(crate) scale_errors: ScaleErrors,
     /// The names of search and solver in the first row.
     pub(crate) named: [String; 2],
     /// The stages shared with other trials in any frame.
@@ -179,7 +179,7 @@ impl Trial {
             images: false,
             pictures: false,
             disparity: (0.0, 0),
-            scale_error: ScaleError::default(),
+            scale_errors: ScaleErrors::default(),
             named: Default::default(),
             shared: SharedStages::default(),
             digest: Vec::new(),
@@ -215,7 +215,7 @@ impl Trial {
         }
         let first = self.rows.len() as u32;
         for target in &frame.targets {
-            self.scale_error.add(target);
+            self.scale_errors.add(target);
             if self.rows.is_empty() {
                 self.named = [target.search.clone(), target.solver.clone()];
             }

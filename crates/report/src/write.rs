@@ -29,7 +29,7 @@ pub struct Report {
     pub page: PathBuf,
     /// The results as a table for the terminal.
     pub summary: RunSummary,
-    /// A scale error that the fixes of a trial agree about, as a sentence.
+    /// A scale or depth error that the fixes of a trial agree about, as a sentence.
     pub scale_warning: Option<String>,
     /// The report's section of the page that [`index`](crate::index) writes.
     pub findings: String,
@@ -78,7 +78,7 @@ pub fn prepare(run_dir: &Path, forms: Forms, answer: Option<&Answer>) -> Result<
     let section = Section::of(&run, &summary, authored.as_ref(), &files);
     let unmet = authored.map(|authored| authored.unmet()).unwrap_or_default();
     // Trials share frames: the fixes of several would not be independent.
-    let scale_warning = run.trials.iter().find_map(|trial| trial.scale_error.warning());
+    let scale_warning = run.trials.iter().find_map(|trial| trial.scale_errors.warning());
     Ok(Prepared { unmet, files, identity: run.header().run.clone(), summary, scale_warning, section })
 }
 

@@ -25,7 +25,7 @@ pub const SHARED: [SharedPart; 8] = [
     // Cameras, rigs, distortion, transforms and covariances.
     SharedPart { name: "geometry", version: 1, used: |_| true },
     // Points in view, candidates, gates, tolerance, acceptance tests, integrity and joint fixes.
-    SharedPart { name: "acceptance", version: 5, used: |_| true },
+    SharedPart { name: "acceptance", version: 6, used: |_| true },
     // Errors, rates and bounds; the comparison with truth.
     SharedPart { name: "evaluation", version: 1, used: |_| true },
     // The logged quantities and the choice of logged frames.

@@ -160,6 +160,40 @@ fn images_beyond_the_last_stamp_are_reported() {
     assert!(Dataset::open(&sequence).unwrap_err()[0].to_string().contains("images without a stamp"));
 }
 
+/// Cameras without a common trigger. Fails if the offset of their stamps is not stated.
+#[test]
+fn an_offset_of_the_cameras_is_stated() {
+    let folder = TempDir::new().unwrap();
+    euroc(folder.path());
+    let file = folder.path().join("mav0/cam1/data.csv");
+    let later =
+        |line: &str| match line.split_once(',').and_then(|(stamp, name)| Some((stamp.parse::<u64>().ok()?, name))) {
+            Some((stamp, name)) => format!("{},{name}\n", stamp + 3_000_000),
+            None => format!("{line}\n"),
+        };
+    let table: String = fs::read_to_string(&file).unwrap().lines().map(later).collect();
+    fs::write(&file, table).unwrap();
+    let faults: Vec<String> = Dataset::open(folder.path()).unwrap_err().iter().map(ToString::to_string).collect();
+    assert!(faults.len() == 1 && faults[0].contains("the right image is 3.0 ms after the left one"), "{faults:?}");
+    assert!(faults[0].contains("frames.csv") && !faults[0].contains("tolerance"), "{faults:?}");
+}
+
+/// Fails if the first image is only said not to exist.
+#[test]
+fn images_that_begin_with_one_are_named() {
+    let root = TempDir::new().unwrap();
+    let folder = kitti(root.path());
+    let count = own().frames.len();
+    for camera in [2, 3] {
+        let image = |index: usize| folder.join(format!("image_{camera}/{index:06}.png"));
+        (0..count).rev().for_each(|index| fs::rename(image(index), image(index + 1)).unwrap());
+    }
+    let faults = Dataset::open(&folder).unwrap_err();
+    let said = faults[0].to_string();
+    assert!(faults.len() == 1 && said.starts_with("images that do not begin with 000000.png"), "{faults:?}");
+    assert!(said.contains("image_2: the first is 000001.png"), "{said}");
+}
+
 #[test]
 fn a_site_makes_them_sources() {
     let folder = TempDir::new().unwrap();

@@ -470,6 +470,12 @@ pub struct Integrity {
     pub scale_error: ::core::option::Option<f64>,
     #[prost(double, optional, tag = "10")]
     pub scale_error_sigma: ::core::option::Option<f64>,
+    /// By how much measured distances along the optical axis are longer than the model's, as a fraction of them, and its
+    /// standard deviation; absent where the points do not determine it.
+    #[prost(double, optional, tag = "11")]
+    pub depth_error: ::core::option::Option<f64>,
+    #[prost(double, optional, tag = "12")]
+    pub depth_error_sigma: ::core::option::Option<f64>,
 }
 /// The best pose of an answer that is no fix.
 #[derive(Clone, PartialEq, ::prost::Message)]

@@ -205,6 +205,10 @@ mirror! {
         pub scale_error: Option<f64>,
         /// Its standard deviation.
         pub scale_error_sigma: Option<f64>,
+        /// By how much measured distances along the optical axis are longer than the model's, as a fraction of them.
+        pub depth_error: Option<f64>,
+        /// Its standard deviation.
+        pub depth_error_sigma: Option<f64>,
     }
 }
 

@@ -124,6 +124,8 @@ pub(crate) fn frame(number: u64) -> FrameRecord {
         protection_attitude: Some(0.004),
         scale_error: Some(-0.002),
         scale_error_sigma: Some(0.001),
+        depth_error: Some(0.004),
+        depth_error_sigma: Some(0.002),
     });
     fixed.evaluation = Evaluation {
         wrong: Some(false),

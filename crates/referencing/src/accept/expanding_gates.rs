@@ -55,6 +55,7 @@ fn nothing(outcome: &Outcome) -> bool {
             | RejectionReason::InfluentialPairs { .. }
             | RejectionReason::Attitude { .. }
             | RejectionReason::ScaleError { .. }
+            | RejectionReason::DepthError { .. }
             | RejectionReason::Inconsistent { .. } => false,
         },
     }

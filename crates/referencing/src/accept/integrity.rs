@@ -9,7 +9,7 @@ use crate::{
     solve::likelihood::{
         leave_out::Deletions,
         mixed::MIN_FEATURE_VALUE,
-        scale_error::{ScaleError, isotropic},
+        scale_error::{ScaleError, of_mean_variance},
     },
 };
 use consistency::Hypotheses;
@@ -108,6 +108,12 @@ pub struct Integrity {
     pub protection: Option<Protection>,
     /// The scale error between measurement and model; `None` with fewer than four points, since any three fit.
     pub scale_error: Option<ScaleError>,
+    /// The depth error: the excess ε of measured distances along the optical axis over the model's, relative to them.
+    ///
+    /// With p the position of a point (m, camera frame) and p̄ the mean, p′ = p + ε (p − p̄)_z e_z. ε is f/f₀ − 1 for
+    /// a focal length f of both cameras instead of f₀, since X = u b/d does not depend on f and Z = f b/d does. `None`
+    /// with fewer than four points, or if the points do not determine it, as those of a plane seen face-on.
+    pub depth_error: Option<ScaleError>,
     /// The evidence that a part of the object is displaced against the rest.
     ///
     /// `None` with fewer than four points, or if [`Acceptance::moved_part_rate`] is zero.
@@ -127,6 +133,8 @@ pub(super) struct IntegrityTests {
     pub(super) protection: Option<Protection>,
     /// The scale error, as [`Integrity::scale_error`].
     pub(super) scale_error: Option<ScaleError>,
+    /// The depth error, as [`Integrity::depth_error`].
+    pub(super) depth_error: Option<ScaleError>,
     /// The most critical point: its index in the set, and the error of the transferred model points if it is a wrong
     /// match.
     ///
@@ -173,7 +181,7 @@ pub(super) fn protection(
     let rate = acceptance.moved_part_rate;
     let part = if rate > 0.0 { 1.0 / 3.0 } else { 0.5 } * risk;
     let own = Protection::quiet(covariance, part);
-    let even = || isotropic(&data.points, pose).filter(|_| data.points.len() > 3);
+    let even = || of_mean_variance(&data.points, pose).filter(|_| data.points.len() > 3);
     let Some(deletions) = Deletions::near(data, pose) else {
         return IntegrityTests {
             scale_error: even(),
@@ -181,7 +189,7 @@ pub(super) fn protection(
             ..IntegrityTests::default()
         };
     };
-    let scale_error = deletions.scale_error.or_else(even);
+    let (scale_error, depth_error) = (deletions.scale_error.or_else(even), deletions.depth_error);
     let mut exclusions = Exclusions { pose, transfer, deletions, level: own, spared: true, most_influential: None };
     let twice = acceptance.two_wrong_rate > 0.0;
     let fraction = if twice { 0.5 } else { 1.0 } * part;
@@ -207,6 +215,7 @@ pub(super) fn protection(
         two,
         protection: available.then_some(level),
         scale_error,
+        depth_error,
         most_influential,
         consistency,
         spread,

@@ -419,6 +419,7 @@ impl<'a> Judge<'a> {
             misidentified,
             protection: left_out.protection,
             scale_error: left_out.scale_error,
+            depth_error: left_out.depth_error,
             consistency: left_out.consistency,
         };
         let features = hypothesis.pairs.len() + hypothesis.edges.len();

@@ -118,6 +118,21 @@ pub enum RejectionReason {
         /// The alert limit (m).
         limit: f64,
     },
+    /// The depth error between measurement and model may displace the object beyond the alert limit.
+    #[error(
+        "depth error: distances along the optical axis are {:.1} % {} than the model's (one sigma {:.1} %), which may \
+         displace the object by {off:.2} m, the alert limit is {limit:.2} m",
+        100.0 * .depth_error.value.abs(), if .depth_error.value > 0.0 { "longer" } else { "shorter" },
+        100.0 * .depth_error.sigma
+    )]
+    DepthError {
+        /// The estimated depth error.
+        depth_error: ScaleError,
+        /// The displacement of the object along the optical axis (m) at the depth error plus two standard deviations.
+        off: f64,
+        /// The alert limit (m).
+        limit: f64,
+    },
     /// A part of the object is displaced against the rest, which may displace the pose beyond the alert limit.
     #[error(
         "inconsistent parts: {} of {points} identified points are displaced by {:.3} m against the others (one sigma \
@@ -152,7 +167,11 @@ impl RejectionReason {
             Self::Search(why) => why.reason(),
             Self::TooFew { .. } => "too-few",
             Self::Absent { .. } => "absent",
-            Self::Residuals { .. } | Self::Behind { .. } | Self::ScaleError { .. } | Self::Prior { .. } => "gate",
+            Self::Residuals { .. }
+            | Self::Behind { .. }
+            | Self::ScaleError { .. }
+            | Self::DepthError { .. }
+            | Self::Prior { .. } => "gate",
             Self::Inconsistent { .. } => "inconsistent",
             Self::Imprecise { .. } | Self::InfluentialPairs { .. } | Self::Attitude { .. } => "imprecise",
         }
@@ -171,6 +190,9 @@ impl RejectionReason {
             Self::Attitude { .. } => "identify points farther from a common line",
             Self::Behind { .. } => "check the normals of the object model",
             Self::ScaleError { .. } => "check baseline, focal length and survey",
+            Self::DepthError { .. } => {
+                "check the focal length: was the rig calibrated in the same medium, air or water?"
+            }
             Self::Inconsistent { .. } => "survey the object again, or model the displaced part as an object of its own",
             Self::Prior { .. } => "check the prior's pose and covariance",
         })

@@ -91,6 +91,11 @@ pub struct Support {
     pub alert_limit: f64,
     /// The scale error between measurement and model; null with fewer than four points.
     pub scale_error: Option<Estimate>,
+    /// The depth error between measurement and model, along the optical axis.
+    ///
+    /// Absent with fewer than four points, or if the points do not determine it, as those of a plane seen face-on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub depth_error: Option<Estimate>,
 }
 
 /// The printed form of a number with its standard deviation.
@@ -125,6 +130,7 @@ impl Support {
             protection: integrity.protection.map(|level| Levels { position: level.position, attitude: level.attitude }),
             alert_limit,
             scale_error: integrity.scale_error.map(|it| Estimate { value: it.value, sigma: it.sigma }),
+            depth_error: integrity.depth_error.map(|it| Estimate { value: it.value, sigma: it.sigma }),
         }
     }
 }

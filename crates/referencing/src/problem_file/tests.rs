@@ -69,6 +69,19 @@ fn a_good_problem_is_answered_with_the_keys_of_the_format() {
     assert_eq!(answer["covariance"].as_array().unwrap().len(), 6);
 }
 
+/// Of five points with σ = 1 cm the depth error is zero; a plane seen face-on has none and keeps its scale error.
+#[test]
+fn the_depth_error_is_an_optional_key() {
+    let integrity = &solved(GOOD)["integrity"];
+    let depth_error = |key: &str| integrity["depth_error"][key].as_f64().unwrap();
+    assert!(depth_error("value").abs() < 1e-9 && (0.005..0.05).contains(&depth_error("sigma")), "{integrity}");
+    let flat = GOOD
+        .replace("[0.5,0.5,1],[-0.5,0.25,0.5]", "[0.5,0.5,0],[-0.5,0.25,0]")
+        .replace("[0.5,0.5,4],[-0.5,0.25,3.5]", "[0.5,0.5,3],[-0.5,0.25,3]");
+    let integrity = &solved(&flat)["integrity"];
+    assert!(integrity.get("depth_error").is_none() && integrity["scale_error"]["sigma"].is_f64(), "{integrity}");
+}
+
 /// A model an eighth too large, under noise that admits it: umeyama reports 9/8, the other solvers nothing.
 #[test]
 fn the_scale_is_reported_by_the_solver_that_finds_it() {

@@ -137,7 +137,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 15;
+    const VERSION: u32 = 16;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -216,7 +216,7 @@ impl Search for RigidConsensus {
         add_shifted_and_turned(&context, pattern.as_ref(), &mut swept);
         swept.modes.truncate(MAX_COMPARED);
         if !large {
-            context.weigh(&mut clutter_density, &mut swept);
+            context.weigh(&mut clutter_density, &mut swept, &[]);
         }
         let continued = pattern
             .as_ref()

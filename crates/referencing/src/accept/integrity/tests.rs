@@ -72,6 +72,21 @@ fn what_the_points_may_be_mistaken_for_is_taken_from_the_risk() {
     assert_eq!([1e-4, 0.3, f64::NAN].map(|misidentified| level(1e-4, misidentified)), [None; 3]);
 }
 
+/// Three points, any of which fit, have no depth error.
+#[test]
+fn every_fix_of_four_points_has_a_depth_error() {
+    let depth_error = |count: usize| {
+        let (data, pose) = seen(count);
+        let covariance = Mahalanobis::default().covariance(&data, &pose).unwrap();
+        protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), ALERT, 0.0).depth_error
+    };
+    assert_eq!(depth_error(3), None);
+    for count in [4, 6] {
+        let found = depth_error(count).expect("four points or more");
+        assert!(found.value.abs() < 1e-6 && (0.5 * SIGMA..5.0 * SIGMA).contains(&found.sigma), "{count}: {found:?}");
+    }
+}
+
 /// One nearly exact coordinate takes all weight from the others; three points, any of which fit, have no scale error.
 #[test]
 fn every_fix_of_four_points_has_a_scale_error() {

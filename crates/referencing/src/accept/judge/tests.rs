@@ -399,4 +399,5 @@ fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
     assert_eq!(of(&scene, Some((2, 0.0501)), 0.04), Ok(()));
 }
 
+mod depth_error;
 mod of_fixes;

@@ -77,6 +77,8 @@ impl ClutterDensity {
 
     /// Recomputes the evidence of a mode with the local clutter density about each of its points.
     ///
+    /// The cloud points in `other` are those of another object, and no clutter.
+    ///
     /// A point in dense clutter may contribute negatively; it is then rather clutter than the object's. The evidence is
     /// summed over the subsets of members that are the object's ([`ln_visible`]).
     pub(in crate::search) fn weigh(
@@ -84,8 +86,9 @@ impl ClutterDensity {
         problem: &Problem<'_>,
         (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         mode: &mut Mode,
+        other: &[usize],
     ) {
-        let excess = self.excesses(problem, (terms, prior_terms, graph), mode);
+        let excess = self.excesses(problem, (terms, prior_terms, graph), mode, other);
         let even: Vec<f64> = mode.members.iter().map(|&v| terms.residual_gain(v, &mode.motion)).collect();
         let gain = |at: usize| match self.with(SearchMechanism::AllCandidates) {
             true => any_of(terms, graph, mode.members[at], mode, even[at]),
@@ -102,18 +105,21 @@ impl ClutterDensity {
         mode.ln_clutter_density = even - dense;
     }
 
-    /// The excess density (nats) of clutter over uniform clutter about each of the mode's points.
+    /// The excess density (nats) of clutter over uniform clutter about each of the mode's points; `other` as in
+    /// [`weigh`](Self::weigh).
     pub(super) fn excesses(
         &mut self,
         problem: &Problem<'_>,
         (terms, prior_terms, graph): (&PairTerms, &PriorTerms, &ConsistencyGraph),
         mode: &Mode,
+        other: &[usize],
     ) -> Vec<f64> {
         let members: Vec<usize> = mode.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+        let no_clutter = [&members, other].concat();
         let known = prior_terms.known.as_ref().filter(|_| self.with(SearchMechanism::ClumpedClutter));
         let clumped = known.map(|known| {
             let clumped_clutter = self.clumped_clutter.get_or_insert_with(|| ClumpedClutter::of(problem, known));
-            (known, clumped_clutter.beside(&members))
+            (known, clumped_clutter.beside(&no_clutter))
         });
         let every = members.len().div_ceil(MAX_MEMBERS).max(1);
         let excess: Vec<f64> = (0..members.len())
@@ -123,7 +129,7 @@ impl ClutterDensity {
                 let Correspondence { model, cloud } = graph.vertices[v];
                 let place = &problem.cloud[cloud].position.at.coords;
                 let excess = match self.with(SearchMechanism::LocalDensity) {
-                    true => self.excess(problem, (terms, graph), v, &members),
+                    true => self.excess(problem, (terms, graph), v, &no_clutter),
                     false => 0.0,
                 };
                 let clumped = clumped.as_ref().map(|(known, clumped)| clumped.about(known, model, place));
@@ -139,7 +145,7 @@ impl ClutterDensity {
         (0..members.len()).map(|at| if at.is_multiple_of(every) { excess[at / every] } else { mean }).collect()
     }
 
-    /// ln ρ/ρ_even at the cloud point of a vertex if `members` are the object's.
+    /// ln ρ/ρ_even at the cloud point of a vertex if the points in `members` are no clutter.
     fn excess(
         &mut self,
         problem: &Problem<'_>,

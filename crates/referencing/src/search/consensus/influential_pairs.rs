@@ -98,7 +98,7 @@ pub(in crate::search) fn influential_pairs(
     };
     let Some((all, pose, _)) = refit(&mode.members) else { return Vec::new() };
     let even = || vec![0.0; mode.members.len()];
-    let excess = clutter_density.map_or_else(even, |density| density.excesses(problem, parts, mode));
+    let excess = clutter_density.map_or_else(even, |density| density.excesses(problem, parts, mode, &[]));
     let deleted = |out: &[usize]| {
         let kept = |at: &usize| !out.contains(at);
         let others: Vec<usize> = (0..mode.members.len()).filter(kept).map(|at| mode.members[at]).collect();

@@ -82,12 +82,14 @@ impl Beside {
             true => context.seeds(&context.none, (NEEDED, 0.0), effort.clutter).contradicting(best).sweep(),
             false => Swept::nothing(),
         };
-        context.weigh(density, &mut others);
+        context.weigh(density, &mut others, &[]);
         let (missed, structured_clutter) = match best.members.len() >= NEEDED {
             true => compared(context, swept, &mut others, pattern),
             false => (Vec::new(), None),
         };
-        context.weigh(density, &mut copies);
+        // The best pose explains its points as the object's: about a copy of it they are no clutter.
+        let of_best: Vec<usize> = cloud_points(context, best).collect();
+        context.weigh(density, &mut copies, &of_best);
         let pair_tests = copies.pair_tests + others.pair_tests;
         let mut unlikely = others.modes.into_iter().next();
         if unlikely.is_none()
@@ -127,25 +129,31 @@ fn is_elsewhere(mode: &Mode, best: &Mode) -> bool {
     2 * points + 3 * edges < MIN_FEATURE_VALUE
 }
 
+/// The cloud points of a mode.
+fn cloud_points(context: &Context<'_>, mode: &Mode) -> impl Iterator<Item = usize> {
+    let (_, _, graph) = context.parts;
+    mode.members.iter().map(|&v| graph.vertices[v].cloud)
+}
+
 /// Second copies of the object, and with no pattern parts of them, in the rest of the cloud.
 fn copies(context: &Context<'_>, best: &Mode, pattern: Option<&Pattern>, effort: &Effort) -> Swept {
     if !context.with(SearchMechanism::SecondCopies) {
         return Swept::nothing();
     }
-    let (_, _, graph) = context.parts;
-    let taken: BTreeSet<usize> = best.members.iter().map(|&v| graph.vertices[v].cloud).collect();
+    let taken: BTreeSet<usize> = cloud_points(context, best).collect();
     let min = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
-    let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
     let left = effort.left;
     let mut copies = if !context.by_points {
         Swept::nothing()
     } else if pattern.is_some() {
         context.seeds(&taken, (min, STRONG), left).sweep()
     } else {
-        let seeds = context.seeds(&taken, (NEEDED, floor), left);
+        // A set of points close together has up to nine nats more than its bound, which is that of an average set.
+        let seeds = context.seeds(&taken, (NEEDED, 0.0), left);
         seeds.with_parts(min, left.min(2 * effort.first), left.min(effort.first / 2)).guided(effort.budget).sweep()
     };
     if let Some(edges) = &context.edges {
+        let floor = (best.ln_evidence - BESIDE).clamp(0.0, COPY);
         context.add_edges([&taken, &lines_of(best, edges)], &mut copies);
         // A structure of the object's kind beside the object is no second object.
         let climb = context.climb();

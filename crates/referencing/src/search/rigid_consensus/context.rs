@@ -50,10 +50,10 @@ impl Context<'_> {
         Seeds::new(self.problem.model, self.parts, taken, min_floor, budget)
     }
 
-    /// Weighs the modes with the local density of clutter and sorts them.
-    pub(super) fn weigh(&self, density: &mut ClutterDensity, swept: &mut Swept) {
+    /// Weighs the modes with the local density of clutter and sorts them; the cloud points in `other` are no clutter.
+    pub(super) fn weigh(&self, density: &mut ClutterDensity, swept: &mut Swept, other: &[usize]) {
         for mode in &mut swept.modes {
-            density.weigh(self.problem, self.parts, mode);
+            density.weigh(self.problem, self.parts, mode, other);
         }
         swept.modes.sort_by(Mode::by_evidence);
     }

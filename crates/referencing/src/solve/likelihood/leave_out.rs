@@ -13,7 +13,7 @@ use crate::{
             mixed::Mixed,
             pixel_terms::rig_of_pixels,
             point_fit::{covariance, solved},
-            scale_error::{ScaleError, scale_error},
+            scale_error::{Lever, ScaleError, scale_error},
         },
     },
 };
@@ -30,6 +30,8 @@ pub(crate) struct Deletions<'a> {
     shared: Matrix6<f64>,
     /// The scale error of all points; `None` if they determine none.
     pub(crate) scale_error: Option<ScaleError>,
+    /// The depth error of all points; `None` if they determine none.
+    pub(crate) depth_error: Option<ScaleError>,
 }
 
 /// Decrement of a negligible step of a pose of points and edges.
@@ -63,11 +65,10 @@ impl<'a> Deletions<'a> {
         let places = points.chain(edges).collect();
         // Any three points have a scale of their own.
         let enough = data.points.len() > 3;
-        let scale_error = enough.then(|| {
-            let points = Observations { edges: Vec::new(), ..data.clone() };
-            Deletions::of(&points).and_then(|of_points| of_points.scale_error)
-        });
-        Some(Self { data, pose, all, each, places, shared, scale_error: scale_error.flatten() })
+        let points = Observations { edges: Vec::new(), ..data.clone() };
+        let of_points = enough.then(|| Deletions::of(&points)).flatten();
+        let (scale_error, depth_error) = of_points.map_or((None, None), |it| (it.scale_error, it.depth_error));
+        Some(Self { data, pose, all, each, places, shared, scale_error, depth_error })
     }
 
     /// `None` if all points together determine no pose.
@@ -75,13 +76,14 @@ impl<'a> Deletions<'a> {
         let solved = likely(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
             let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
-            each.map(|each| (*pose, each, scale_error(&data.points, pose, terms)))
+            let stretch = |lever: Lever| scale_error(&data.points, pose, terms, lever);
+            each.map(|each| (*pose, each, stretch(Lever::Isotropic), stretch(Lever::Depth)))
         });
-        let (pose, each, scale_error) = solved.ok()?;
+        let (pose, each, scale_error, depth_error) = solved.ok()?;
         let mut all = *each.first()?;
         each[1..].iter().for_each(|one| all = all.plus(one));
         let places = data.points.iter().map(|point| point.model.coords).collect();
-        Some(Self { data, pose, all, each, places, shared: Matrix6::zeros(), scale_error })
+        Some(Self { data, pose, all, each, places, shared: Matrix6::zeros(), scale_error, depth_error })
     }
 
     /// The maximum-likelihood pose without the points `out`, and its covariance.
@@ -127,10 +129,10 @@ fn likely<R>(
 mod tests {
     use super::*;
     use crate::{
-        observations::Observation,
+        observations::{EdgeObservation, Observation},
         solve::{mahalanobis::Mahalanobis, solver::Solver},
     };
-    use seafix_geometry::{Point, UncertainPoint};
+    use seafix_geometry::{MeasuredLine, Point, UncertainPoint};
 
     /// Seven points without pixels, one of them with a small error.
     fn seen() -> Observations<'static> {
@@ -147,6 +149,22 @@ mod tests {
             }
         });
         Observations { points: points.collect(), edges: Vec::new(), rig: None }
+    }
+
+    /// Scale error and depth error beside an edge are those of the points alone.
+    #[test]
+    fn an_edge_leaves_the_errors_of_the_points() {
+        let points = seen();
+        let pose = Mahalanobis::default().solve(&points).unwrap();
+        let ends = [points.points[0].measured.at, points.points[1].measured.at];
+        let measured =
+            MeasuredLine { ends, offsets: nalgebra::Matrix4::identity() * 4e-6, segments: None, depth: true };
+        let model = [points.points[0].model, points.points[1].model];
+        let edges = vec![EdgeObservation { measured, model, model_sigmas: [0.0; 2] }];
+        let data = Observations { edges, ..points.clone() };
+        let (alone, beside) = (Deletions::of(&points).unwrap(), Deletions::near(&data, &pose).unwrap());
+        assert!(alone.scale_error.is_some() && alone.depth_error.is_some() && alone.scale_error != alone.depth_error);
+        assert_eq!((beside.scale_error, beside.depth_error), (alone.scale_error, alone.depth_error));
     }
 
     #[test]

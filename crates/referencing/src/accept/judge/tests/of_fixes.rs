@@ -3,7 +3,7 @@
 use super::*;
 
 /// The integrity of a fix of six points with this χ² and scale error.
-fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
+pub(super) fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
     Integrity {
         redundancy: Redundancy::Excludable,
         chi2,
@@ -14,6 +14,7 @@ fn integrity(chi2: f64, scale_error: Option<ScaleError>) -> Integrity {
         misidentified: None,
         protection: None,
         scale_error,
+        depth_error: None,
         consistency: None,
     }
 }
@@ -45,6 +46,44 @@ fn a_scale_error_is_rejected_that_is_sure_and_moves_the_object_too_far() {
     // Residuals below their noise do not increase the significance: 1.95² is less than 3.84, 1.97² more.
     assert!(of(30.0, 4.0, scale_error(0.0078)).is_ok() && of(30.0, 4.0, scale_error(0.00788)).is_err());
     assert!(of(30.0, 0.5, scale_error(0.0078)).is_ok());
+}
+
+/// A depth error of 20 % with σ 4 % displaces by (20 % + 2 · 4 %) of the depth, not of the distance.
+#[test]
+fn a_depth_error_of_another_medium_is_rejected() {
+    let of = |scale: Option<(f64, f64)>, depth: (f64, f64), aside: f64| {
+        let mut scene = Scene::of(octahedron([3.0, 0.0, 1.0]), &Transform::identity());
+        scene.acceptance.confidence = 0.95;
+        let hypothesis = scene.hypothesis(camera_at(3.0 - aside, 0.0, -9.0), 17.0);
+        let error = |(value, sigma)| ScaleError { value, sigma };
+        let known = Integrity { depth_error: Some(error(depth)), ..integrity(17.0, scale.map(error)) };
+        scene.judge(&Kabsch::default(), |judge| judge.as_large_as_modelled(&hypothesis, &known))
+    };
+    let rejection = of(None, (0.2, 0.04), 8.0).unwrap_err();
+    let RejectionReason::DepthError { depth_error, off, limit } = rejection else { panic!("{rejection}") };
+    assert!(depth_error.value == 0.2 && close(off, 2.8) && limit == 0.10, "{off}");
+    assert_eq!(
+        (rejection.reason(), rejection.remedy().as_ref()),
+        ("gate", "check the focal length: was the rig calibrated in the same medium, air or water?")
+    );
+    let message = "depth error: distances along the optical axis are 20.0 % longer than the model's (one sigma 4.0 %), \
+                   which may displace the object by 2.80 m, the alert limit is 0.10 m";
+    assert_eq!(rejection.to_string(), message);
+    assert!(of(None, (-0.2, 0.04), 0.0).unwrap_err().to_string().contains("20.0 % shorter"));
+    // 1.9 standard deviations; errors nearer to zero than to −0.25 and 0.33, and a little farther.
+    assert_eq!(of(None, (-0.19, 0.1), 0.0), Ok(()));
+    assert_eq!(
+        [-0.124, -0.125, 0.164, 0.166].map(|value| of(None, (value, 0.01), 0.0).is_ok()),
+        [true, false, true, false]
+    );
+    // A quarter with σ 10 % is tested, one with σ 10.1 % is not, however sure.
+    assert!(of(None, (-0.25, 0.1), 0.0).is_err());
+    assert_eq!(of(None, (-0.9, 0.101), 0.0), Ok(()));
+    // The larger gain is named: 2.5² against 2.6² and 2.4²; the scale error of two equal ones.
+    let named = |scale: f64, depth: f64| {
+        matches!(of(Some((scale * 0.004, 0.004)), (depth * 0.08, 0.08), 0.0), Err(RejectionReason::DepthError { .. }))
+    };
+    assert_eq!([(2.5, 2.6), (2.5, 2.4), (2.5, 2.5), (1.0, 2.5)].map(|(s, d)| named(s, d)), [true, false, false, true]);
 }
 
 /// A fix from (0, 0, −4) with σ of 1 mrad and 1 cm, and these levels.
