@@ -4,7 +4,7 @@ use std::{io::Read, path::Path};
 
 use crate::{binary, fault::Fault};
 
-/// The text of a file of at most 64 MiB: UTF-8, with an optional byte order mark and LF or CRLF line ends.
+/// The text of a file of at most 64 MiB: UTF-8, with an optional byte order mark and LF, CRLF or CR line ends.
 ///
 /// # Errors
 /// A file that is missing, too large, or not UTF-8.
@@ -32,7 +32,9 @@ pub fn read_long_text(path: &Path, limit: u64) -> Result<String, Fault> {
             .remedy(format!("at most {limit} bytes are read")));
     }
     let text = decoded(bytes, path)?;
-    Ok(text.strip_prefix('\u{feff}').unwrap_or(&text).replace("\r\n", "\n"))
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    // Old Macintosh programs end lines with CR alone; beside LF it is no line end.
+    Ok(if text.contains('\n') { text.replace("\r\n", "\n") } else { text.replace('\r', "\n") })
 }
 
 /// The text of bytes in UTF-8, or in UTF-16 with the byte order mark that spreadsheets write.
@@ -66,6 +68,20 @@ fn decoded(bytes: Vec<u8>, path: &Path) -> Result<String, Fault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_end_with_lf_crlf_or_cr() {
+        let folder = tempfile::tempdir().unwrap();
+        let read = |text: &str| {
+            let file = folder.path().join("a.txt");
+            std::fs::write(&file, text).unwrap();
+            read_text(&file).unwrap()
+        };
+        for text in ["a\nb\n", "a\r\nb\r\n", "a\rb\r"] {
+            assert_eq!(read(text), "a\nb\n", "{text:?}");
+        }
+        assert_eq!(read("a\rb\n"), "a\rb\n");
+    }
 
     /// Fails if a spreadsheet is only "not UTF-8".
     #[test]

@@ -21,7 +21,8 @@ pub struct Rig {
     pub bits: u8,
     /// The source file; `None` for a rig built in code.
     pub file: Option<PathBuf>,
-    /// A warning if the file marks the rig as rectified and the cameras contradict it.
+    /// A warning if the file marks the rig as rectified and the cameras contradict it, or if they are rotated against each
+    /// other.
     pub warning: Option<Fault>,
 }
 
@@ -35,8 +36,8 @@ impl Rig {
         let path = path.as_ref();
         let file = if path.is_dir() { path.join("dataset.toml") } else { path.to_owned() };
         if calibration::is_foreign(&file) {
-            let stereo = calibration::read(std::slice::from_ref(&file), Given::default())?.rig;
-            return Ok(Self { file: Some(file), ..Self::from(stereo) });
+            let found = calibration::read(std::slice::from_ref(&file), Given::default())?;
+            return Ok(Self { file: Some(file), warning: found.warning, ..Self::from(found.rig) });
         }
         let source = read_text(&file)?;
         let description: Description =

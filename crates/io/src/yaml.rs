@@ -43,11 +43,22 @@ pub fn number(value: &Yaml) -> Option<f64> {
 
 /// The numbers of a list, also of a list of lists, row by row.
 pub fn numbers(value: &Yaml) -> Option<Vec<f64>> {
+    list(value, number)
+}
+
+/// The numbers of a list as [`numbers`], with NaN and infinity as YAML, OpenCV (`.Nan`) and NumPy (`NaN`) write them.
+pub fn any_numbers(value: &Yaml) -> Option<Vec<f64>> {
+    // Some of these are words to the parser.
+    let word = |value: &Yaml| value.as_str()?.replacen('.', "", 1).parse().ok();
+    list(value, |value| number(value).or_else(|| value.as_f64()).or_else(|| word(value)))
+}
+
+fn list(value: &Yaml, number: impl Fn(&Yaml) -> Option<f64> + Copy) -> Option<Vec<f64>> {
     let mut all = Vec::new();
     for value in value.as_vec()? {
         match number(value) {
             Some(number) => all.push(number),
-            None => all.extend(numbers(value)?),
+            None => all.extend(list(value, number)?),
         }
     }
     Some(all)
@@ -73,6 +84,8 @@ mod tests {
         let nested = parse(&("%YAML:1.0\n".to_owned() + &"[".repeat(200)), file).unwrap_err().to_string();
         assert!(nested.starts_with("invalid YAML in a.yaml:2") && nested.contains("nested"), "{nested}");
         assert_eq!(numbers(&parse("T:\n- [1, 0]\n- [0, 1]\n", file).unwrap()["T"]), Some(vec![1.0, 0.0, 0.0, 1.0]));
+        let any = any_numbers(&parse("a: [.Nan, NaN, -.Inf, .inf, 1]\n", file).unwrap()["a"]).unwrap();
+        assert!(any[..4].iter().all(|number| !number.is_finite()) && any[2] < 0.0 && any[4] == 1.0, "{any:?}");
         assert!(parse("a: [1\n", file).unwrap_err().to_string().starts_with("invalid YAML in a.yaml"));
     }
 }

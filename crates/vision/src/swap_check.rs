@@ -17,6 +17,11 @@ pub struct Sides {
     pub given: usize,
     /// The number of matches in the exchanged order.
     pub exchanged: usize,
+    /// The number of matches that both orders admit.
+    ///
+    /// With principal points of different columns (x), as of converging cameras, exchanged disparities need not be negative:
+    /// the farther points then lie in front of the cameras in both orders, and favour none.
+    pub common: usize,
     /// The number of key points of the image that has fewer; many key points without matches mean unrelated images.
     pub keypoints: usize,
 }
@@ -44,9 +49,11 @@ impl Sides {
             let beaten = |m: &&Match| other.iter().any(|o| o.left == m.left && o.distance < m.distance);
             found.iter().filter(|m| !beaten(m)).count()
         };
+        let same = |m: &&Match| exchanged.iter().any(|o| o.left == m.left && o.right == m.right);
         Self {
             given: better(&given, &exchanged),
             exchanged: better(&exchanged, &given),
+            common: given.iter().filter(same).count(),
             keypoints: left.keypoints.len().min(right.keypoints.len()),
         }
     }
@@ -60,9 +67,19 @@ impl Sides {
         Self::of(&view(left, 0), &view(right, 1), rig, &mut Workspace::default())
     }
 
+    /// The number of matches.
+    pub fn all(&self) -> usize {
+        self.given + self.exchanged - self.common
+    }
+
+    /// The number of matches that lie behind the cameras in the given order only.
+    pub fn behind(&self) -> usize {
+        self.exchanged - self.common
+    }
+
     /// Whether there are enough matches for a decision.
     pub fn is_decisive(&self) -> bool {
-        self.given + self.exchanged >= FEW
+        self.all() >= FEW
     }
 
     /// Whether the images are unrelated: too few matches for a decision, and fewer than one for 20 key points.
@@ -70,9 +87,11 @@ impl Sides {
         self.keypoints > 0 && !self.is_decisive() && 20 * self.given < self.keypoints
     }
 
-    /// Whether the images are exchanged: by more than nine tenths of at least 20 matches.
+    /// Whether the images are exchanged: by more than nine tenths of the matches that favour an order, which are at least
+    /// 20 and a third of all. Fewer may be accidents where both orders admit nearly all.
     pub fn are_swapped(&self) -> bool {
-        self.is_decisive() && 10 * self.exchanged > 9 * (self.given + self.exchanged)
+        let decide = self.all() - self.common;
+        decide >= FEW && 3 * decide >= self.all() && 10 * self.behind() > 9 * decide
     }
 }
 
@@ -83,7 +102,23 @@ impl std::ops::Add for Sides {
         Self {
             given: self.given + other.given,
             exchanged: self.exchanged + other.exchanged,
+            common: self.common + other.common,
             keypoints: self.keypoints + other.keypoints,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Counts of converging cameras, of parallel ones, and of a scene so far that both orders admit nearly all matches.
+    /// Fails if the matches that both orders admit count against the exchange, or if a few accidents decide.
+    #[test]
+    fn matches_of_both_orders_favour_none() {
+        let swapped = |given, exchanged, common| Sides { given, exchanged, common, keypoints: 1000 }.are_swapped();
+        assert!(swapped(330, 682, 297) && !swapped(681, 329, 300));
+        assert!(swapped(22, 819, 0) && !swapped(819, 22, 0));
+        assert!(!swapped(901, 930, 900) && !swapped(0, 19, 0));
     }
 }

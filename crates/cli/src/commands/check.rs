@@ -127,17 +127,23 @@ fn examine(path: &Path, limits: ImageLimits) -> Examined {
             Err(error) => Examined { faults: vec![error.to_string()], ..Examined::default() },
         };
     }
+    // The words of a calibration may stand in a trajectory too, as CAMERA_ID in COLMAP's images; poses do not stand in
+    // any other file.
+    let trajectory = path.is_file().then(|| Trajectory::read(path));
+    if let Some(Ok(found)) = trajectory {
+        return Examined { note: trajectory_note(&found), warnings: found.warnings, ..Examined::default() };
+    }
     if calibration::is_calibration(path) {
         return match calibration::read(&[path.to_owned()], Given::default()) {
-            Ok(found) => Examined { note: format!("note: {}\n", convert::summary(&found)), ..Examined::default() },
+            Ok(found) => {
+                let note = format!("note: {}\n", convert::summary(&found));
+                Examined { note, warnings: found.warning.into_iter().collect(), ..Examined::default() }
+            }
             Err(fault) => Examined { faults: vec![fault.to_string()], ..Examined::default() },
         };
     }
-    if is_table(path) {
-        return match Trajectory::read(path) {
-            Ok(found) => Examined { note: trajectory_note(&found), warnings: found.warnings, ..Examined::default() },
-            Err(fault) => Examined { faults: vec![fault.to_string()], ..Examined::default() },
-        };
+    if let Some(Err(fault)) = trajectory.filter(|_| is_table(path)) {
+        return Examined { faults: vec![fault.to_string()], ..Examined::default() };
     }
     let (faults, warnings) = read(path, limits);
     Examined { faults: lines(faults), warnings, note: String::new() }
@@ -209,7 +215,7 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     }
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("json") if path.file_name().is_some_and(|name| name == "manifest.json") => {
-            (check_run(path.parent().unwrap_or(Path::new(""))), Vec::new())
+            (check_run(folder_of(path)), Vec::new())
         }
         Some("json") => match problem_file::read(path) {
             Ok(problem) => (Vec::new(), problem.warnings(path)),
@@ -223,9 +229,7 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
                     Ok(site) => (Vec::new(), site.warnings),
                     Err(faults) => (faults, Vec::new()),
                 },
-                Some(format) if format.starts_with("seafix-dataset/") => {
-                    dataset::check(path.parent().unwrap_or(Path::new(".")), limits)
-                }
+                Some(format) if format.starts_with("seafix-dataset/") => dataset::check(folder_of(path), limits),
                 Some(format) if format.starts_with("seafix-geometry/") => faults(geometry(path)),
                 Some(format) if format.starts_with("seafix-reports/") => faults(publication::read(path).map(|_| ())),
                 _ => match Plan::read(path, &[]) {
@@ -235,6 +239,11 @@ fn read(path: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
             },
         },
     }
+}
+
+/// The folder of a file; that of a bare name is the current one.
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
 }
 
 /// A geometry file is checked together with its site file.

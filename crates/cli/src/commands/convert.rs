@@ -76,6 +76,7 @@ impl CalibrationFiles {
         let found = found.map_err(|fault| Failure::new(INPUT, fault))?;
         let name = self.files[0].file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         notify(&summary(&found));
+        found.warning.iter().for_each(|warning| notify(&format!("warning: {warning}")));
         let text = toml::to_string(&description(&name, found))
             .map_err(|error| Failure::new(OUTPUT, format!("cannot write the description: {error}")))?;
         match &self.out {

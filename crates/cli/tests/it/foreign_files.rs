@@ -191,9 +191,12 @@ fn an_estimate_that_contradicts_the_reference_is_named() {
         tum(k, ns, t.into(), [q.i, q.j, q.k, q.w])
     };
     let millimetres = |k: usize, ns: u64, place: [f64; 3], turn: [f64; 4]| tum(k, ns, place.map(|x| 1e3 * x), turn);
-    for (folder, part) in
-        [(walk(inverse, ""), "if the inverse is taken"), (walk(millimetres, ""), "if positions are in millimetres")]
-    {
+    let conjugate = |k: usize, ns: u64, place: [f64; 3], [a, b, c, d]: [f64; 4]| tum(k, ns, place, [-a, -b, -c, d]);
+    for (folder, part) in [
+        (walk(inverse, ""), "if the inverse is taken"),
+        (walk(millimetres, ""), "if positions are in millimetres"),
+        (walk(conjugate, ""), "if the rotations alone are inverted"),
+    ] {
         let said = angle(&folder).1;
         assert!(
             said.contains("warning: poses that contradict the reference in estimate") && said.contains(part),
@@ -353,6 +356,13 @@ fn calibrations_are_converted_and_used() {
     let said = run(&["check", "camchain.yaml"]);
     assert!(said.out.contains("note: Kalibr camchain: 1024×768 px") && said.out.contains("in order"), "{}", said.out);
     run(&["convert", "calibration", "camchain.yaml", "--out", "made.toml"]);
+    let upside_down =
+        pose.replace("[1.0, 0.0, 0.0, -0.25]", "[-1.0, 0.0, 0.0, -0.25]").replace("[0.0, 1.0,", "[0.0, -1.0,");
+    fs::write(folder.path().join("rolled.yaml"), format!("cam0:\n{}cam1:\n{}", camera(""), camera(&upside_down)))
+        .unwrap();
+    let warning = "warning: cameras rolled against each other in rolled.yaml: 180.0°";
+    assert!(run(&["check", "rolled.yaml"]).out.contains(warning));
+    assert!(run(&["convert", "calibration", "rolled.yaml"]).error.contains(warning));
     let clouds = ["dataset.toml", "camchain.yaml", "made.toml"]
         .map(|rig| run(&["cloud", "left000.png", "right000.png", "--rig", rig, "--json"]).out);
     let points = |text: &str| serde_json::from_str::<Value>(text).unwrap()["points"].clone();

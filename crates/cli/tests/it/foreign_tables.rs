@@ -156,6 +156,22 @@ fn a_trajectory_is_checked_as_what_it_is() {
     };
     let said = check("reference.tum", 0);
     assert!(said.contains("note: a trajectory of 40 poses over 3.9 s") && said.contains("in order"), "{said}");
+    // `eval` reads any name, and files with words of calibrations.
+    let poses = fs::read_to_string(folder.path().join("reference.tum")).unwrap();
+    let image = |k: u64| format!("{k} 1 0 0 0 {k} 0 0 1 {}.png\n\n", START + k * 100_000_000);
+    let images = "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n".to_owned();
+    for (name, text) in [
+        ("walk", poses.clone()),
+        ("walk.traj", poses.replace('\n', "\r")),
+        ("cam0.txt", format!("# poses of cam0, as camera_model pinhole\n{poses}")),
+        ("images.txt", images.clone() + &(0..40).map(image).collect::<String>()),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        let said = check(name, 0);
+        assert!(said.contains("note: a trajectory of 40 poses") && said.contains("in order"), "{said}");
+    }
+    fs::write(folder.path().join("images.txt"), images + "1 2 0 0 0 0 0 0 1 a.png\n\n").unwrap();
+    assert!(check("images.txt", 1).contains("unit length in images.txt:2"), "{}", check("images.txt", 1));
     fs::write(folder.path().join("notes.txt"), "the camera was cleaned\n").unwrap();
     let said = check("notes.txt", 1);
     assert!(said.lines().count() == 1 && !said.contains("question"), "{said}");
@@ -164,4 +180,20 @@ fn a_trajectory_is_checked_as_what_it_is() {
     let mut command = program();
     let said = ended_with(1, command.current_dir(empty.path()).args(["check", "a.csv"])).out;
     assert!(said.contains("a trajectory without poses") && said.lines().count() == 1, "{said}");
+}
+
+/// Fails if the folder of a bare name is the empty path.
+#[test]
+fn a_description_is_checked_from_its_own_folder() {
+    let folder = TempDir::new().unwrap();
+    let text = "format = \"seafix-dataset/1\"\nname = \"a\"\nlicence = \"own\"\nframes = \"frames.csv\"\n";
+    let camera = |side: &str| {
+        format!("[rig.{side}]\nsize = [64, 48]\nfx = 50.0\nfy = 50.0\ncx = 31.5\ncy = 23.5\ndistortion = []\n")
+    };
+    let pose = "[rig]\nright_from_left = [[1.0,0.0,0.0,-0.1],[0.0,1.0,0.0,0.0],[0.0,0.0,1.0,0.0],[0.0,0.0,0.0,1.0]]\nrectified = true\n";
+    let text = format!("{text}{pose}{}{}", camera("left"), camera("right"));
+    fs::write(folder.path().join("dataset.toml"), text).unwrap();
+    let mut command = program();
+    let said = ended_with(1, command.current_dir(folder.path()).args(["check", "dataset.toml"])).out;
+    assert!(said.contains("frames.csv") && !said.contains("no such folder"), "{said}");
 }

@@ -323,6 +323,11 @@ pub(super) fn mistakes(body_from_camera: &Transform<Body, Camera>) -> Vec<Mistak
             Box::new(move |pose| Transform::new(pose.rotation(), pose.translation() * unit)),
         );
     }
+    add(
+        "if the rotations alone are inverted (JPL quaternions, or those of camera_from_world)",
+        "give the rotation of world_from_camera: negate qx, qy and qz",
+        Box::new(conjugated),
+    );
     add("if the inverse is taken and w is read first", INVERT, Box::new(move |pose| inverse(&w_first(pose))));
     add(
         "if the inverse is taken in a world with exchanged axes (ENU for NED)",
@@ -335,6 +340,11 @@ pub(super) fn mistakes(body_from_camera: &Transform<Body, Camera>) -> Vec<Mistak
 /// The pose with its quaternion read in another order.
 fn with_rotation(pose: &Pose, read: impl Fn(&UnitQuaternion<f64>) -> Quaternion<f64>) -> Pose {
     Transform::new(UnitQuaternion::new_normalize(read(&pose.rotation())), pose.translation())
+}
+
+/// The pose with its rotation inverted and its position kept.
+fn conjugated(pose: &Pose) -> Pose {
+    Transform::new(pose.rotation().inverse(), pose.translation())
 }
 
 /// The pose in a world with other axes.
@@ -390,12 +400,13 @@ mod tests {
         let none = Transform::identity();
         assert_eq!(said(&|pose| *pose, none), None);
         type Mistake<'a> = &'a dyn Fn(&Pose) -> Pose;
-        let cases: [(Mistake<'_>, &str); 5] = [
+        let cases: [(Mistake<'_>, &str); 6] = [
             (
                 &|pose| pose.inverse().relabel(),
                 "in view in 0 of 6 pairs as given, in 6 if the inverse is taken (camera_from_world)",
             ),
             (&|pose| with_rotation(pose, |q| Quaternion::new(q.k, q.w, q.i, q.j)), "if w is read first"),
+            (&conjugated, "if the rotations alone are inverted (JPL"),
             (&|pose| turned(&Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0), pose), "ENU for NED"),
             (&|pose| Transform::new(pose.rotation(), pose.translation() * 1e3), "if positions are in millimetres"),
             (&|pose| axes_of(pose, &Matrix3::new(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0)), "OpenGL"),
@@ -445,5 +456,21 @@ mod tests {
         assert!(
             faults(0.7)[0].to_string().starts_with("a prior that contradicts the truth in prior.tum: 0.70 m and 0.0°")
         );
+    }
+
+    /// Objects to all sides are in view of the prior too, so that only its attitude speaks against it.
+    #[test]
+    fn a_prior_with_conjugate_quaternions_is_explained_by_the_truth() {
+        let (_, truth) = walk();
+        let (rig, steps) = (rig(), || (-8..=8).map(|k| 0.5 * f64::from(k)));
+        let sides = steps().flat_map(|x| steps().flat_map(move |y| [[x, y, -4.0], [x, y, 4.0]]));
+        let wall = sides.flat_map(|[a, b, c]| [[a, b, c], [c, a, b], [b, c, a]]);
+        let around = wall.map(|at| Point::from(truth[0].translation() + Vector3::from(at))).collect();
+        let view = View { rig: &rig, body_from_camera: Transform::identity(), objects: vec![around] };
+        let priors: Vec<Option<Pose>> = truth.iter().map(|pose| Some(conjugated(pose))).collect();
+        let truths: Vec<Option<Pose>> = truth.iter().copied().map(Some).collect();
+        let faults = poses_faults([&view; 2], &priors, &truths, Some((0.1, 0.01)), &[], Path::new("prior.tum"));
+        let said = faults[0].to_string();
+        assert!(said.contains("contradicts the truth") && said.contains("they agree if the rotations alone"), "{said}");
     }
 }

@@ -71,7 +71,7 @@ fn depends_on_attitude(mistake: &Mistake) -> bool {
 }
 
 /// The median difference of the motions over an eighth of the trajectory, as a part of the motions.
-fn motions_apart(reference: &[Placed], estimate: &[Placed], has_attitude: bool) -> Option<f64> {
+pub(super) fn motions_apart(reference: &[Placed], estimate: &[Placed], has_attitude: bool) -> Option<f64> {
     let apart = (reference.len() / PARTS).max(1);
     let count = reference.len().checked_sub(apart).filter(|count| *count >= 3)?;
     let parts = (0..count).step_by(count.div_ceil(COMPARED)).filter_map(|from| {
@@ -147,6 +147,7 @@ mod tests {
             let q = UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q.k, q.w, q.i, q.j));
             Pose { rotation: q.to_rotation_matrix().into_inner(), ..*pose }
         };
+        let conjugate = |pose: &Pose| Pose { rotation: pose.rotation.transpose(), ..*pose };
         let inverse = |pose: &Pose| pose.to(&Pose::IDENTITY);
         let millimetres = |pose: &Pose| Pose { position: pose.position * 1000.0, ..*pose };
         let enu = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
@@ -154,6 +155,7 @@ mod tests {
         for (change, has_attitude, part) in [
             (&misread as &dyn Fn(&Pose) -> Pose, true, "if w is read first"),
             (&inverse, true, "if the inverse is taken"),
+            (&conjugate, true, "if the rotations alone are inverted (JPL"),
             (&millimetres, true, "millimetres"),
             (&millimetres, false, "millimetres"),
             (&exchanged, true, "ENU for NED"),

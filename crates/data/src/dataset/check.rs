@@ -11,16 +11,21 @@ use rayon::prelude::*;
 use seafix::{PosePrior, Rig, StereoImages};
 use seafix_component::Fault;
 use seafix_geometry::{StereoPixels, StereoRig};
-use seafix_vision::{Image, RightCameraRotation, Sides, matches_by_appearance};
+use seafix_navigation::{Odometry as _, Stereo, StereoPair};
+use seafix_vision::{Image, RightCameraRotation, Sides, Threads, matches_by_appearance};
 
 use seafix_io::{
     ImageLimits,
     image::{Orientation, orientation, regular},
 };
 
-use super::{contents::Dataset, folder::inside, pairing::SAME_INSTANT_NS};
+use super::{
+    contents::{Dataset, DatasetFrame},
+    folder::inside,
+    pairing::SAME_INSTANT_NS,
+};
 use crate::contradictions::{
-    MeasuredPair, View, dim_fault, fixes_fault, images_fault, mosaic_fault, poses_faults, scale_fault,
+    MeasuredPair, View, dim_fault, fixes_fault, images_fault, mosaic_fault, motion_fault, poses_faults, scale_fault,
 };
 
 /// Reads the data set in `folder` and every file that it names: decodes the images, compares their sizes with the
@@ -47,6 +52,7 @@ pub fn check(folder: &Path, limits: ImageLimits) -> (Vec<Fault>, Vec<Fault>) {
     }
     if faults.is_empty() {
         faults.extend(prior_without_fixes(&dataset));
+        faults.extend(motion_without_site(&dataset));
     }
     (faults, warnings)
 }
@@ -199,6 +205,31 @@ fn prior_without_fixes(dataset: &Dataset) -> Option<Fault> {
     fixes_fault(site, &rig, &pairs.collect::<Vec<_>>(), &dataset.folder.join("dataset.toml"))
 }
 
+/// The fault of a truth without a site that contradicts odometry, as [`motion_fault`] of the pairs that move farthest.
+fn motion_without_site(dataset: &Dataset) -> Option<Fault> {
+    const PAIRS: usize = 40;
+    let path = |frames: &[DatasetFrame]| -> Option<f64> {
+        let truth: Option<Vec<_>> = frames.iter().map(|frame| frame.truth).collect();
+        Some(truth?.windows(2).map(|two| (two[1].translation() - two[0].translation()).norm()).sum())
+    };
+    let parts = dataset.frames.chunks(PAIRS).filter(|_| dataset.site.is_none());
+    let (_, frames) = parts.filter_map(|part| Some((path(part)?, part))).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let images: Vec<(Image, Image)> = frames.iter().map(|frame| dataset.pair(frame)).collect::<Result<_, _>>().ok()?;
+    let odometry = |rig: &StereoRig| {
+        let stereo = Stereo::default();
+        let mut session = stereo.begin(rig, dataset.body_from_camera, Threads::One);
+        for (frame, (left, right)) in frames.iter().zip(&images) {
+            session.advance(&StereoPair { stamp_ns: frame.stamp_ns, left, right }).ok()?;
+        }
+        let segments = session.trajectory().segments;
+        let [segment] = segments.as_slice() else { return None };
+        let poses: Vec<_> = segment.poses.iter().map(|waypoint| waypoint.world_from_camera).collect();
+        (poses.len() == frames.len()).then_some(poses)
+    };
+    let truth: Vec<_> = frames.iter().filter_map(|frame| frame.truth).collect();
+    motion_fault(&truth, &dataset.rig, &dataset.body_from_camera, &odometry, &dataset.folder.join("dataset.toml"))
+}
+
 /// A warning about images of 16 bits that hold numbers of fewer bits, as [`dim_fault`] of the first pairs.
 fn dim_images(dataset: &Dataset) -> Option<Fault> {
     let step = dataset.frames.len().div_ceil(INSPECTED_PAIRS).max(1);
@@ -262,7 +293,7 @@ pub(crate) fn rotation_of_sample(
 pub fn swap_fault(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_swapped().then(|| {
         Fault::new("exchanged left and right images", file)
-            .value(format!("{} of {} matches lie behind the cameras", sides.exchanged, sides.exchanged + sides.given))
+            .value(format!("{} of {} matches lie behind the cameras", sides.behind(), sides.all()))
             .remedy("exchange the images, or the cameras of the rig; if they are in order, the images are mirrored: flip them")
     })
 }
@@ -270,7 +301,7 @@ pub fn swap_fault(sides: Sides, file: &Path) -> Option<Fault> {
 /// A warning about many key points with few matches, with the number of matches after exchange.
 pub fn strangers(sides: Sides, file: &Path) -> Option<Fault> {
     sides.are_strangers().then(|| {
-        let Sides { given, exchanged, keypoints } = sides;
+        let Sides { given, exchanged, keypoints, .. } = sides;
         Fault::new("images with key points but hardly any match", file)
             .value(format!("{keypoints} key points, {given} matches; {exchanged} with left and right exchanged"))
             .remedy(partners_remedy(exchanged, exchanged > 3 * given))

@@ -15,7 +15,7 @@ use yaml_rust2::Yaml;
 use super::{
     contents::{Dataset, DatasetFrame},
     foreign::{Foreign, image},
-    pairing::{SAME_INSTANT_NS, left_out, pairs},
+    pairing::{SAME_INSTANT_NS, constant_offset, left_out, pairs},
     tum::{Stamped, between},
 };
 use crate::trajectory::Trajectory;
@@ -51,7 +51,11 @@ pub(super) fn read(folder: &Path, home: &Path, pairs_only: bool) -> Result<Datas
     let mut warnings = Vec::new();
     match left_out(pairs.len(), [stamps[0].len(), stamps[1].len()], &tables[0]) {
         Ok(warning) => warnings.extend(warning),
-        Err(fault) => faults.push(fault),
+        Err(fault) => {
+            let remedy = "stamp both images of a pair alike, or list the pairs in the frames.csv of a dataset.toml";
+            let offset = constant_offset(&stamps[0], &stamps[1], &tables[1]).map(|offset| offset.remedy(remedy));
+            faults.push(offset.unwrap_or(fault));
+        }
     }
     let truth = if pairs_only { Ok(Vec::new()) } else { truth(home, &left.body_from_sensor) };
     let truth = truth.map_err(|fault| faults.push(fault)).unwrap_or_default();

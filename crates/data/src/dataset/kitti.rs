@@ -52,6 +52,7 @@ pub(super) fn is_one(folder: &Path) -> bool {
 pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<Dataset, Vec<Fault>> {
     let cameras = cameras.of(folder);
     let stamps = times(folder).map_err(|fault| vec![fault])?;
+    begins_with_zero(folder, cameras[0]).map_err(|fault| vec![fault])?;
     let unstamped = without_stamps(folder, cameras, stamps.len()).map_err(|fault| vec![fault])?;
     let (mut faults, mut frames) = (Vec::new(), Vec::with_capacity(stamps.len()));
     let table = folder.join("times.txt");
@@ -94,6 +95,20 @@ pub(super) fn read(folder: &Path, cameras: Cameras, pairs_only: bool) -> Result<
         warnings: unstamped.into_iter().collect(),
     }
     .into())
+}
+
+/// The fault of images whose numbers begin above zero: line 1 of the stamps and of the truth belongs to image 0.
+fn begins_with_zero(folder: &Path, camera: usize) -> Result<(), Fault> {
+    let images = folder.join(format!("image_{camera}"));
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.ok()?.file_name().into_string().ok();
+    let number = |name: &String| name.strip_suffix(".png")?.parse::<u32>().ok();
+    let all = std::fs::read_dir(&images).into_iter().flatten().filter_map(name);
+    match all.filter_map(|name| Some((number(&name)?, name))).min() {
+        Some((first, name)) if first > 0 => Err(Fault::new("images that do not begin with 000000.png", &images)
+            .value(format!("the first is {name}"))
+            .remedy("line 1 of times.txt and poses.txt belongs to 000000.png: rename the images")),
+        _ => Ok(()),
+    }
 }
 
 /// The images beyond the last stamp: a warning, or a fault if they are more than half.

@@ -5,6 +5,7 @@
 mod camera_info;
 mod colmap;
 mod colmap_rig;
+mod common_view;
 mod euroc;
 mod found;
 mod kalibr;
@@ -37,6 +38,8 @@ pub struct Calibration {
     pub format: &'static str,
     /// What the file left open and how it was taken.
     pub notes: Vec<String>,
+    /// A warning of cameras that are rotated against each other.
+    pub warning: Option<Fault>,
 }
 
 /// Reads the calibration in `files`: one file, or one a camera (left, right), or intrinsics and extrinsics.
@@ -44,7 +47,8 @@ pub struct Calibration {
 /// A partner that stands beside the first file under its usual name need not be named.
 ///
 /// # Errors
-/// A file that cannot be read, has an unknown format, or an invalid number; a missing partner.
+/// A file that cannot be read, has an unknown format, or an invalid number; a missing partner; cameras without a common
+/// view.
 pub fn read(files: &[PathBuf], given: Given) -> Result<Calibration, Fault> {
     let mut sources = files.iter().map(|file| Source::read(file)).collect::<Result<Vec<_>, Fault>>()?;
     let first = sources[0].file.clone();
@@ -114,7 +118,8 @@ fn checked(found: Found, file: &Path) -> Result<Calibration, Fault> {
             "the right camera is to the left of the left one: exchange the files unless this is intended".to_owned(),
         );
     }
-    Ok(Calibration { numbers, rig, format, notes })
+    let warning = common_view::check(&rig, file)?;
+    Ok(Calibration { numbers, rig, format, notes, warning })
 }
 
 /// Whether the text of `file` is that of a data set description or of another file of this program.
@@ -126,6 +131,10 @@ pub fn is_foreign(file: &Path) -> bool {
 pub fn is_calibration(file: &Path) -> bool {
     is_foreign(file)
         && read_text(file).is_ok_and(|text| {
+            // COLMAP's images name their cameras too.
+            if text.contains("IMAGE_ID") {
+                return false;
+            }
             colmap::is_cameras(&text)
                 || colmap_rig::is_one(&text)
                 || opencv::is_json(file, &text)

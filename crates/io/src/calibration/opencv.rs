@@ -18,7 +18,7 @@ use crate::{
     yaml,
 };
 
-/// The numbers below each key, and its words.
+/// The numbers below each key, which may not be finite, and its words.
 #[derive(Debug, Default)]
 pub(super) struct Storage {
     pub(super) numbers: BTreeMap<String, Vec<f64>>,
@@ -72,15 +72,21 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
     let r = named(&["r", "rotation", "rotationmatrix", "rmat", "om", "rvec"]).ok_or_else(|| missing("rotation R"))?;
     let t =
         named(&["t", "translation", "translationvector", "tvec", "trans"]).ok_or_else(|| missing("translation T"))?;
-    let numbers = |key: &str, count: usize| {
+    let finite = |key: &str| {
         let numbers = &storage.numbers[key];
+        let all = numbers.iter().all(|number| number.is_finite());
+        let file = || sources.iter().find(|source| source.text.contains(key)).unwrap_or(source);
+        if all { Ok(numbers) } else { Err(file().not_finite(key)) }
+    };
+    let numbers = |key: &str, count: usize| {
+        let numbers = finite(key)?;
         if numbers.len() == count {
             Ok(numbers)
         } else {
             Err(source.fault(key, format!("`{key}` has {} numbers", numbers.len())).remedy(format!("give {count}")))
         }
     };
-    let turn = match storage.numbers[&r].as_slice() {
+    let turn = match finite(&r)?.as_slice() {
         &[x, y, z] => rodrigues([x, y, z]),
         _ => rotation(source, &r, &matrix(&numbers(&r, 9)?.as_slice().try_into().expect("nine")))?,
     };
@@ -89,7 +95,7 @@ pub(super) fn read(sources: &[Source], given: Given) -> Result<Option<Found>, Fa
     let side = |side: usize, key: &str| -> Result<CameraNumbers, Fault> {
         let k: [f64; 9] = numbers(key, 9)?.as_slice().try_into().expect("nine");
         let name = find(&COEFFICIENTS, side);
-        let distortion = name.as_ref().map(|name| storage.numbers[name].clone()).unwrap_or_default();
+        let distortion = name.as_ref().map(|name| finite(name).cloned()).transpose()?.unwrap_or_default();
         let model = model(source, &storage, name.as_deref().unwrap_or_default(), &distortion)?;
         camera(source, size(source, stated, given)?, &k, model, distortion)
     };
@@ -163,7 +169,7 @@ fn add(storage: &mut Storage, content: &Yaml) {
     for (key, value) in content.as_hash().into_iter().flatten() {
         let Some(key) = key.as_str() else { continue };
         let data = if value["data"].is_badvalue() { value } else { &value["data"] };
-        if let Some(numbers) = yaml::numbers(data).or_else(|| yaml::number(value).map(|number| vec![number])) {
+        if let Some(numbers) = yaml::any_numbers(data).or_else(|| yaml::number(value).map(|number| vec![number])) {
             storage.numbers.insert(key.to_owned(), numbers);
         } else if let Some(word) = value.as_str() {
             storage.words.insert(key.to_owned(), word.to_owned());

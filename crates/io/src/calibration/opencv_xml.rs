@@ -21,10 +21,17 @@ pub(super) fn document(source: &Source) -> Result<Document<'_>, Fault> {
     })
 }
 
-/// The numbers in the text of a node.
+/// The finite numbers in the text of a node.
 pub(super) fn numbers(node: Node<'_, '_>) -> Option<Vec<f64>> {
-    let text = node.text()?;
-    text.split_whitespace().map(|word| word.parse().ok().filter(|number: &f64| number.is_finite())).collect()
+    any_numbers(node).filter(|numbers| numbers.iter().all(|number| number.is_finite()))
+}
+
+/// The numbers in the text of a node; OpenCV writes `.Nan` and `.Inf` for those that are not finite.
+fn any_numbers(node: Node<'_, '_>) -> Option<Vec<f64>> {
+    node.text()?
+        .split_whitespace()
+        .map(|word| word.parse().or_else(|_| word.replacen('.', "", 1).parse()).ok())
+        .collect()
 }
 
 /// Adds the matrices, lists and numbers of the file.
@@ -33,7 +40,7 @@ pub(super) fn add(storage: &mut Storage, source: &Source) -> Result<(), Fault> {
     for node in document.root_element().children().filter(Node::is_element) {
         let key = node.tag_name().name().to_owned();
         let data = node.children().find(|child| child.has_tag_name("data")).unwrap_or(node);
-        match numbers(data).filter(|numbers| !numbers.is_empty()) {
+        match any_numbers(data).filter(|numbers| !numbers.is_empty()) {
             Some(numbers) => drop(storage.numbers.insert(key, numbers)),
             None => {
                 drop(storage.words.insert(key, node.text().unwrap_or_default().trim().trim_matches('"').to_owned()))

@@ -198,6 +198,33 @@ fn opencv_s_file_storage() {
     assert_eq!(fisheye.rig.left().distortion().model(), seafix_geometry::LensModel::Equidistant);
 }
 
+/// A calibration that failed. Fails if its matrix is not seen, or if any list of the file may hold such a number.
+#[test]
+fn numbers_that_are_not_finite_are_named() {
+    let text = opencv(["K1", "D1", "K2", "D2", "R", "T"]) + "image_size: [ 1024, 768 ]\n";
+    let said = |from: &str, to: &str| found(&[("s.yml", text.replacen(from, to, 1))], Given::default()).unwrap_err();
+    let matrix = said("500.3", ".Nan");
+    assert!(
+        matrix.starts_with("`K1` has a number that is not finite in ") && matrix.contains("s.yml:7: .Nan; calibrate"),
+        "{matrix}"
+    );
+    assert!(said("0.0015", "-.Inf").contains(":12: -.Inf"), "{}", said("0.0015", "-.Inf"));
+    assert!(said("-0.25", "NaN").starts_with("`T` has"));
+    let other = [("s.yml", text + "per_view_errors: [ .Nan, 0.2 ]\n")];
+    same(&other, Given::default(), "OpenCV FileStorage", 1e-12);
+}
+
+/// Fails if its deviation from orthonormal columns, which is none, is all that is said.
+#[test]
+fn a_reflection_states_its_determinant() {
+    let mut reflected = turn();
+    reflected.set_column(2, &-reflected.column(2));
+    let text = opencv(["K1", "D1", "K2", "D2", "R", "T"]) + "image_size: [ 1024, 768 ]\n";
+    let text = text.replace(&list(&by_rows(&turn())), &list(&by_rows(&reflected)));
+    let said = found(&[("s.yml", text)], Given::default()).unwrap_err();
+    assert!(said.starts_with("`R` is a reflection in ") && said.contains("its determinant is -1"), "{said}");
+}
+
 #[test]
 fn opencv_s_xml() {
     let matrix = |name: &str, numbers: &[f64]| {
@@ -217,6 +244,8 @@ fn opencv_s_xml() {
         matrix("T", step().as_slice())
     );
     same(&[("stereo.xml", text.clone())], Given::default(), "OpenCV FileStorage", 1e-12);
+    let said = found(&[("stereo.xml", text.replace("500.1", ".Nan"))], Given::default()).unwrap_err();
+    assert!(said.contains("stereo.xml:3: .Nan"), "{said}");
     assert!(
         found(&[("stereo.xml", text.replace("</K1>", "</K>"))], Given::default())
             .unwrap_err()
@@ -260,6 +289,10 @@ fn colmap_s_cameras_and_rigs() {
         1e-12,
     );
     assert!(found(&[("cameras.txt", cameras.to_owned())], Given::default()).unwrap_err().contains("give rigs.txt too"));
+    // The quaternion with w last.
+    let w_last = format!("1 2 CAMERA 7 CAMERA 9 1 {} {} {} {} -0.25 0 0\n", q.i, q.j, q.k, q.w);
+    let rolled = found(&[("cameras.txt", cameras.to_owned()), ("rigs.txt", w_last)], Given::default()).unwrap();
+    assert!(rolled.warning.is_some_and(|fault| fault.to_string().contains("w first or last")));
     // The comment may be missing, and the cameras exchanged.
     let bare: String = cameras.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect();
     let rigs = "1 2 CAMERA 7 CAMERA 9 1 1 0 0 0 0.25 0 0\n".to_owned();

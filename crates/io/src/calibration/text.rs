@@ -30,6 +30,22 @@ impl Source {
         Fault::new(what, &self.file).on_line(line)
     }
 
+    /// The fault of a number below a key that is not finite, on its line.
+    pub(super) fn not_finite(&self, key: &str) -> Fault {
+        let is_one = |word: &&str| {
+            let plain = word.trim_matches(|sign: char| !sign.is_ascii_alphabetic()).to_lowercase();
+            ["nan", "inf", "infinity"].contains(&plain.as_str())
+        };
+        let words = |line: &'_ str| -> Option<String> {
+            let apart = |sign: char| sign.is_whitespace() || ",[]<>:".contains(sign);
+            line.split(apart).find(is_one).map(str::to_owned)
+        };
+        let below = self.text.lines().enumerate().skip_while(|(_, line)| !line.contains(key));
+        let (line, word) = below.filter_map(|(index, line)| Some((index + 1, words(line)?))).next().unzip();
+        let fault = Fault::new(format!("`{key}` has a number that is not finite"), &self.file).on_line(line);
+        fault.value(word.unwrap_or_default()).remedy("calibrate again: the calibration that wrote the file has failed")
+    }
+
     /// The content as YAML, of which JSON is a part; `None` if it is not meant to be.
     pub(super) fn yaml(&self) -> Option<Result<Yaml, Fault>> {
         let is_one = self.file.extension().is_some_and(|end| ["yaml", "yml", "json"].iter().any(|known| end == *known));
@@ -96,7 +112,11 @@ pub(super) fn rotation(source: &Source, key: &str, m: &Matrix3<f64>) -> Result<M
     /// Six decimals in a calibration file.
     const ROUNDED: f64 = 1e-4;
     let off = (m.transpose() * m - Matrix3::identity()).amax();
-    if !(off <= ROUNDED && m.determinant() > 0.0) {
+    if off <= ROUNDED && m.determinant() < 0.0 {
+        let fault = source.fault(key, format!("`{key}` is a reflection")).value("its determinant is -1");
+        return Err(fault.remedy("give a rotation, of determinant 1: one axis, a row or a column, has the wrong sign"));
+    }
+    if !(off <= ROUNDED) {
         let fault = source.fault(key, format!("`{key}` is not a rotation")).value(format!("off by {off:.1e}"));
         return Err(fault.remedy("give the rotation of the right camera, 3×3"));
     }
