@@ -19,6 +19,15 @@ def test_a_fix_has_the_true_pose_and_its_covariance(scene):
     # Three axes beyond five standard deviations of the position are one case in a million.
     assert np.linalg.norm(error) < 5 * answer.position_sigma < 0.1
     assert np.all(np.linalg.eigvalsh(answer.covariance) > 0)
+    # Along and about one axis: the standard deviations that an isotropic prior of this covariance was given.
+    sigmas = np.sqrt([np.trace(answer.covariance[3:, 3:]) / 3, np.trace(answer.covariance[:3, :3]) / 3])
+    np.testing.assert_allclose([answer.position_sigma, answer.attitude_sigma], sigmas)
+    integrity = answer.integrity
+    assert integrity.redundancy == "excludable" and integrity.dof == 3 * len(answer.pairs) - 6
+    assert 0 < integrity.chi2 < integrity.chi2_limit
+    assert np.linalg.norm(error) < integrity.position_level and integrity.attitude_level > 0
+    assert abs(integrity.scale_error) < 5 * integrity.scale_error_sigma
+    assert abs(integrity.depth_error) < 5 * integrity.depth_error_sigma
     assert answer.p_wrong < 1e-3 and answer.best is None
     np.testing.assert_allclose(answer.camera_from_object @ answer.object_from_camera, np.eye(4), atol=1e-12)
     T, dst = answer.object_from_camera, scene.model[answer.pairs[:, 0]]

@@ -3,6 +3,7 @@
 //! This file alone turns what a search found into probabilities; the single setting
 //! [`Acceptance::max_p_wrong`](super::Acceptance::max_p_wrong) compares them with one number.
 
+use super::max_p_wrong::MaxPWrong;
 use crate::{
     a_contrario::{AContrario, absence::by_nfa, expected_sets},
     ablation::AcceptanceTest,
@@ -178,9 +179,10 @@ impl<'a> Evidence<'a> {
     /// Whether a pose beside the answer counts as a second copy of the object.
     ///
     /// Its evidence `ln_evidence` (nats) would be accepted by itself at `max`, or is nine nats: two possible objects
-    /// forbid a choice even if the second is not certain.
+    /// forbid a choice even if the second is not certain. Limits above that of `balanced` count as it: clutter shows a
+    /// pose of less evidence too often, and the posterior weighs such a pose as clutter.
     pub(super) fn is_copy(&self, ln_evidence: f64, max: f64) -> bool {
-        ln_evidence >= COPY || 1.0 / (1.0 + libm::exp(ln_evidence)) <= max
+        ln_evidence >= COPY || 1.0 / (1.0 + libm::exp(ln_evidence)) <= max.min(MaxPWrong::Balanced.value())
     }
 
     /// The number of false alarms: that of the points or, with edges, the smaller of it and that of all features;
