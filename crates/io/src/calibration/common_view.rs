@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_that_look_apart_are_rejected() {
+    fn cameras_without_a_common_view_are_rejected() {
         let apart = said([0.0, 66.0, 0.0]).unwrap_err();
         assert!(
             apart.starts_with("cameras without a common view in c.yml: their optical axes are 66.0° apart"),

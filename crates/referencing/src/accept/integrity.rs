@@ -140,7 +140,7 @@ pub(super) struct IntegrityTests {
     ///
     /// The error is in metres (RMS, one sigma), infinite if the point is indispensable. `None` with fewer than four
     /// points.
-    pub(super) most_influential: Option<(usize, f64)>,
+    pub(super) influential: Option<(usize, f64)>,
     /// The consistency of the object's parts, as [`Integrity::consistency`].
     pub(super) consistency: Option<Consistency>,
     /// The increase of the fix's covariance by displaced parts, if their evidence is significant.
@@ -185,12 +185,12 @@ pub(super) fn protection(
     let Some(deletions) = Deletions::near(data, pose) else {
         return IntegrityTests {
             scale_error: even(),
-            most_influential: Some((0, f64::INFINITY)),
+            influential: Some((0, f64::INFINITY)),
             ..IntegrityTests::default()
         };
     };
     let (scale_error, depth_error) = (deletions.scale_error.or_else(even), deletions.depth_error);
-    let mut exclusions = Exclusions { pose, transfer, deletions, level: own, spared: true, most_influential: None };
+    let mut exclusions = Exclusions { pose, transfer, deletions, level: own, spared: true, influential: None };
     let twice = acceptance.two_wrong_rate > 0.0;
     let fraction = if twice { 0.5 } else { 1.0 } * part;
     let ones = (0..n).map(|out| [out]);
@@ -200,7 +200,7 @@ pub(super) fn protection(
         exclusions.farthest(twos, (fraction / acceptance.two_wrong_rate).min(1.0))
     });
     let available = identified && exclusions.spared && (!twice || n >= 6);
-    let Exclusions { deletions, mut level, most_influential, .. } = exclusions;
+    let Exclusions { deletions, mut level, influential, .. } = exclusions;
     let places = deletions.places.clone();
     let hypotheses =
         (rate > 0.0).then(|| Hypotheses::of(&deletions, &places, alert, transfer.rms(covariance))).flatten();
@@ -216,7 +216,7 @@ pub(super) fn protection(
         protection: available.then_some(level),
         scale_error,
         depth_error,
-        most_influential,
+        influential,
         consistency,
         spread,
     }
@@ -231,7 +231,7 @@ struct Exclusions<'a> {
     /// Whether no excluded set was indispensable.
     spared: bool,
     /// The point whose exclusion moves the model points most.
-    most_influential: Option<(usize, f64)>,
+    influential: Option<(usize, f64)>,
 }
 
 impl Exclusions<'_> {
@@ -268,9 +268,9 @@ impl Exclusions<'_> {
     /// Keeps the most critical point.
     fn note_influence(&mut self, out: &[usize], off: f64) {
         if let &[point] = out
-            && self.most_influential.is_none_or(|(_, max)| !max.is_nan() && !(off <= max))
+            && self.influential.is_none_or(|(_, max)| !max.is_nan() && !(off <= max))
         {
-            self.most_influential = Some((point, off));
+            self.influential = Some((point, off));
         }
     }
 }

@@ -423,7 +423,7 @@ impl<'a> Judge<'a> {
             consistency: left_out.consistency,
         };
         let features = hypothesis.pairs.len() + hypothesis.edges.len();
-        let stands = self.without_any_one(&hypothesis, left_out.most_influential, transfer.rms(&covariance));
+        let stands = self.without_any_one(&hypothesis, left_out.influential, transfer.rms(&covariance));
         let stands = stands.and_then(|()| self.as_large_as_modelled(&hypothesis, &integrity));
         if let Err(rejection) = stands.and_then(|()| self.consistent(&integrity, features, transfer.rms(&covariance))) {
             return Outcome::Rejected(rejection);

@@ -38,7 +38,7 @@ use crate::{
     solve::likelihood::mixed::MIN_FEATURE_VALUE,
 };
 use beside::Beside;
-use context::Context;
+use context::{Context, MAX_COMPARED, STRONG};
 
 /// Maximum-a-posteriori pose search with Bayesian model comparison (MacKay 2003, ch. 27 and 28).
 ///
@@ -164,11 +164,6 @@ impl Component for RigidConsensus {
 
 /// Evidence (nats) below that of absence at which a pose is not searched for.
 const FLOOR: f64 = 3.0;
-/// Minimum evidence (nats) of a pose that may be accepted, a probability of absence of 2.2 %; only then are
-/// alternatives searched for.
-const STRONG: f64 = 3.8;
-/// Maximum number of poses whose evidence is weighed with the local density of clutter.
-const MAX_COMPARED: usize = 64;
 /// Maximum number of pairs of a large putative set that are examined for wrong matches, for the time it takes: O(k²).
 const MAX_INFLUENTIAL: usize = 40;
 /// Rounding error (nats) of sums in different order.

@@ -304,13 +304,13 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
     assert!(near(level.position, OFF / 6.0 + k * (3.0_f64 / 14.0).sqrt()), "{level:?}");
     assert!(near(level.attitude, OFF / 14.0 + k / 2.8_f64.sqrt()), "{level:?}");
     // The model points move by δ/6, with an error of σ √(267/210) without +x.
-    let (point, off) = found.most_influential.unwrap();
+    let (point, off) = found.influential.unwrap();
     assert!(point == 0 && near(off, (OFF / 6.0).hypot(SIGMA * (267.0_f64 / 210.0).sqrt())), "{point} {off}");
     // The result is the same for a vertex at the last index.
     data.points.rotate_left(1);
     let last = solution_separation(&data, &Acceptance::default());
-    assert_eq!(last.most_influential.unwrap().0, 5);
-    assert!(near(last.most_influential.unwrap().1, off) && near(last.protection.unwrap().position, level.position));
+    assert_eq!(last.influential.unwrap().0, 5);
+    assert!(near(last.influential.unwrap().1, off) && near(last.protection.unwrap().position, level.position));
     // Five times as far: the separation of the attitude alone exceeds the contribution of its covariance to the other
     // levels.
     let mut data = octahedron(SIGMA);
@@ -322,13 +322,13 @@ fn a_level_is_the_separation_and_the_radius_beyond_it() {
 
 /// The first of equally critical points is the most influential, and NaN is the worst error.
 #[test]
-fn the_first_of_the_worst_is_the_most_influential() {
+fn the_first_of_the_worst_is_named() {
     let data = octahedron(SIGMA);
     let (pose, transfer) = (Transform::identity(), Transfer::of(&[], &Transform::identity()));
     let deletions = Deletions::of(&data).unwrap();
     let level = Protection { position: 0.0, attitude: 0.0 };
     let mut exclusions =
-        Exclusions { pose: &pose, transfer: &transfer, deletions, level, spared: true, most_influential: None };
+        Exclusions { pose: &pose, transfer: &transfer, deletions, level, spared: true, influential: None };
     for (out, off, expected) in [
         (&[4][..], 1.0, (4, 1.0)),
         (&[2], 1.0, (4, 1.0)),
@@ -339,12 +339,12 @@ fn the_first_of_the_worst_is_the_most_influential() {
         (&[5], f64::INFINITY, (0, f64::INFINITY)),
     ] {
         exclusions.note_influence(out, off);
-        assert_eq!(exclusions.most_influential, Some(expected));
+        assert_eq!(exclusions.influential, Some(expected));
     }
     exclusions.note_influence(&[3], f64::NAN);
-    assert!(exclusions.most_influential.is_some_and(|(point, off)| point == 3 && off.is_nan()));
+    assert!(exclusions.influential.is_some_and(|(point, off)| point == 3 && off.is_nan()));
     exclusions.note_influence(&[4], 9.0);
-    assert_eq!(exclusions.most_influential.unwrap().0, 3);
+    assert_eq!(exclusions.influential.unwrap().0, 3);
 }
 
 /// Three collinear points of four determine no pose without the fourth: no level, no separation, and the fourth is the
@@ -358,7 +358,7 @@ fn a_point_that_cannot_be_spared_leaves_no_level() {
         (point.model, point.measured.at) = (at.into(), at.into());
     }
     let found = solution_separation(&data, &Acceptance::default());
-    assert_eq!((found.one, found.protection, found.most_influential), (None, None, Some((2, f64::INFINITY))));
+    assert_eq!((found.one, found.protection, found.influential), (None, None, Some((2, f64::INFINITY))));
     assert!(found.scale_error.is_some());
 }
 
@@ -376,7 +376,7 @@ fn points_near_a_line_have_a_scale_and_no_level() {
     let covariance = Covariance6::isotropic(1e-3, 1e-3);
     let found = protection(&data, &pose, &covariance, &Acceptance::default(), &Transfer::of(&[], &pose), ALERT, 0.0);
     assert_eq!((found.one, found.two, found.protection), (None, None, None));
-    assert_eq!(found.most_influential, Some((0, f64::INFINITY)));
+    assert_eq!(found.influential, Some((0, f64::INFINITY)));
     let scale_error = found.scale_error.unwrap();
     assert!(scale_error.value.abs() < 1e-9 && close(scale_error.sigma, SIGMA / 5.0_f64.sqrt()), "{scale_error:?}");
 }

@@ -88,10 +88,10 @@ impl Judge<'_> {
     pub(super) fn without_any_one(
         &self,
         hypothesis: &Hypothesis,
-        most_influential: Option<(usize, f64)>,
+        influential: Option<(usize, f64)>,
         all: f64,
     ) -> Result<(), RejectionReason> {
-        let Some((place, rms)) = most_influential.filter(|_| {
+        let Some((place, rms)) = influential.filter(|_| {
             self.searched && !self.weighs_influential_pairs && self.acceptance.with(AcceptanceTest::InfluentialPairs)
         }) else {
             return Ok(());

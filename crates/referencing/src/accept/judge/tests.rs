@@ -385,9 +385,9 @@ fn poses_up_to_the_alert_limit_apart_are_one() {
 #[test]
 fn a_set_hangs_on_a_point_without_which_it_may_be_off_by_the_alert_limit() {
     let mut scene = Scene::of(octahedron([0.0; 3]), &Transform::identity());
-    let of = |scene: &Scene, most_influential: Option<(usize, f64)>, all: f64| {
+    let of = |scene: &Scene, influential: Option<(usize, f64)>, all: f64| {
         let hypothesis = scene.hypothesis(Transform::identity(), 0.0);
-        scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, most_influential, all))
+        scene.judge(&Kabsch::default(), |judge| judge.without_any_one(&hypothesis, influential, all))
     };
     assert_eq!((of(&scene, None, 0.04), of(&scene, Some((2, 0.05)), 0.04)), (Ok(()), Ok(())));
     let rejection = |rms| RejectionReason::InfluentialPairs { points: vec!["V2".into()], rms, limit: 0.10 };

@@ -17,8 +17,7 @@ use super::{
         limits::NEEDED,
         posterior::COPY,
     },
-    STRONG,
-    context::Context,
+    context::{Context, STRONG},
 };
 use crate::{ablation::SearchMechanism, solve::likelihood::mixed::MIN_FEATURE_VALUE};
 

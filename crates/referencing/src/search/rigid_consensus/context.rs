@@ -2,24 +2,30 @@
 
 use std::collections::BTreeSet;
 
-use super::{
-    super::{
-        consensus::{
-            clutter_density::ClutterDensity,
-            edge_seeds::edge_modes,
-            edge_terms::EdgeTerms,
-            graph::ConsistencyGraph,
-            joined::Joined,
-            likelihood::{Mode, PairTerms},
-            local_maxima::Climb,
-            prior_terms::PriorTerms,
-            seeds::{Seeds, Swept},
-        },
-        posterior::Explanation,
+use super::super::{
+    consensus::{
+        clutter_density::ClutterDensity,
+        edge_seeds::edge_modes,
+        edge_terms::EdgeTerms,
+        graph::ConsistencyGraph,
+        joined::Joined,
+        likelihood::{Mode, PairTerms},
+        local_maxima::Climb,
+        prior_terms::PriorTerms,
+        seeds::{Seeds, Swept},
     },
-    MAX_COMPARED,
+    posterior::Explanation,
 };
-use crate::{Correspondence, ablation::SearchMechanism, problem::Problem};
+use crate::{
+    ablation::SearchMechanism,
+    problem::{Correspondence, Problem},
+};
+
+/// Minimum evidence (nats) of a pose that may be accepted, a probability of absence of 2.2 %; only then are
+/// alternatives searched for.
+pub(super) const STRONG: f64 = 3.8;
+/// Maximum number of poses whose evidence is weighed with the local density of clutter.
+pub(super) const MAX_COMPARED: usize = 64;
 
 /// One problem with the terms of its evidence.
 pub(super) struct Context<'a> {

@@ -76,8 +76,8 @@ impl<'a> Deletions<'a> {
         let solved = likely(data, |pose, terms| {
             let one = |k: usize| linearize(&data.points[k..=k], pose, &|_, place: &_| terms(k, place));
             let each = (0..data.points.len()).map(one).collect::<Result<Vec<_>, _>>();
-            let stretch = |lever: Lever| scale_error(&data.points, pose, terms, lever);
-            each.map(|each| (*pose, each, stretch(Lever::Isotropic), stretch(Lever::Depth)))
+            let error_of = |lever: Lever| scale_error(&data.points, pose, terms, lever);
+            each.map(|each| (*pose, each, error_of(Lever::Isotropic), error_of(Lever::Depth)))
         });
         let (pose, each, scale_error, depth_error) = solved.ok()?;
         let mut all = *each.first()?;

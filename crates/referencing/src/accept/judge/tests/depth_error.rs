@@ -85,7 +85,7 @@ fn depth_error(scene: &Scene, rig: &StereoRig) -> (ScaleError, bool) {
 /// Fails with another lever, and without the limits.
 #[test]
 fn a_focal_length_of_the_other_medium_is_rejected_by_its_depth_error() {
-    for (by, least, most) in [(1.05, 0, 0), (0.95, 0, 0), (1.0 / 1.33, 19, 20), (1.33, 19, 20)] {
+    for (by, min, max) in [(1.05, 0, 0), (0.95, 0, 0), (1.0 / 1.33, 19, 20), (1.33, 19, 20)] {
         let (mut rejected, mut off) = (0, 0.0);
         for seed in 0..20 {
             let (scene, rig) = seen(80, [0.3, 0.3, 0.8], 0.3, 3.0, by * FOCAL, &mut ChaCha8Rng::seed_from_u64(seed));
@@ -93,7 +93,7 @@ fn a_focal_length_of_the_other_medium_is_rejected_by_its_depth_error() {
             rejected += usize::from(rejects);
             off += (found.value - (by - 1.0)) / 20.0;
         }
-        assert!((least..=most).contains(&rejected), "{by}: {rejected} of 20");
+        assert!((min..=max).contains(&rejected), "{by}: {rejected} of 20");
         // σ is about 0.8 %, and the estimate is one linear step.
         assert!(off.abs() < 0.1 * (by - 1.0f64).abs().max(0.05), "{by}: off by {off}");
     }
