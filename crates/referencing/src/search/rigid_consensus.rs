@@ -73,7 +73,7 @@ use context::{Context, MAX_COMPARED, STRONG};
 ///   within the pattern are poses of their own, with their own prior densities. A pattern like the object's may also be
 ///   there without the object.
 /// - Poses elsewhere explain more than uniform clutter would: clutter resembles the object, which may be present
-///   or absent ([`StructuredClutter`]).
+///   or absent ([`StructuredClutter`](super::StructuredClutter)).
 /// - Another structure of the object's kind is there: its edges have the directions of the object's and meet as they do,
 ///   with other dimensions ([`Posterior::resembling`]).
 /// - Putative pairs confuse points of similar appearance: the model also fits the same places in another order, and
