@@ -22,8 +22,13 @@ pub(crate) struct ScaleErrors {
 impl ScaleErrors {
     /// Adds an attempt, if it has such errors with standard deviations.
     pub(crate) fn add(&mut self, target: &TargetRecord) {
-        self.scale.add(target, &quantities::SCALE_ERROR, &quantities::SCALE_ERROR_SIGMA);
-        self.depth.add(target, &quantities::DEPTH_ERROR, &quantities::DEPTH_ERROR_SIGMA);
+        let add = |mean: &mut WeightedMean, value: &Quantity, sigma: &Quantity| {
+            if let Some((value, sigma)) = value.of(target).zip(sigma.of(target)).filter(|(_, sigma)| *sigma > 0.0) {
+                mean.add(value, sigma);
+            }
+        };
+        add(&mut self.scale, &quantities::SCALE_ERROR, &quantities::SCALE_ERROR_SIGMA);
+        add(&mut self.depth, &quantities::DEPTH_ERROR, &quantities::DEPTH_ERROR_SIGMA);
     }
 
     /// The sentence of an error above 1 % and five standard deviations; of two, of the more significant one.
@@ -50,13 +55,10 @@ struct WeightedMean {
 }
 
 impl WeightedMean {
-    fn add(&mut self, target: &TargetRecord, value: &Quantity, sigma: &Quantity) {
-        let estimate = value.of(target).zip(sigma.of(target));
-        if let Some((value, sigma)) = estimate.filter(|(_, sigma)| *sigma > 0.0) {
-            self.fixes += 1;
-            let terms = [1.0, value, value * value].map(|term| term * sigma.powi(-2));
-            self.sums = std::array::from_fn(|k| self.sums[k] + terms[k]);
-        }
+    fn add(&mut self, value: f64, sigma: f64) {
+        self.fixes += 1;
+        let terms = [1.0, value, value * value].map(|term| term * sigma.powi(-2));
+        self.sums = std::array::from_fn(|k| self.sums[k] + terms[k]);
     }
 
     fn mean(&self) -> f64 {
@@ -84,10 +86,7 @@ mod tests {
 
     fn of(estimates: &[(f64, f64)]) -> WeightedMean {
         let mut mean = WeightedMean::default();
-        for (value, sigma) in estimates {
-            let terms = [1.0, *value, value * value].map(|term| term / (sigma * sigma));
-            mean = WeightedMean { fixes: mean.fixes + 1, sums: std::array::from_fn(|k| mean.sums[k] + terms[k]) };
-        }
+        estimates.iter().for_each(|(value, sigma)| mean.add(*value, *sigma));
         mean
     }
 

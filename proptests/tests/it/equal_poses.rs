@@ -133,7 +133,7 @@ fn half_a_turn_of_points_side_by_side_is_found() {
 /// Five points of the object, the nearest to each other or any, and twelve of a second copy. Of the draws in which each
 /// part by itself is a fix, at most one in ten is a fix with both: the other part's evidence is then near the limit.
 ///
-/// Seen to fail, with one in six, when copies are searched from nine nats on, since a set of points close together
+/// Seen to fail, with one in five, when copies are searched from nine nats on, since a set of points close together
 /// exceeds its bound.
 #[test]
 fn two_parts_that_are_each_a_fix_are_not_one() {

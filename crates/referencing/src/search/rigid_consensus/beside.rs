@@ -83,7 +83,7 @@ impl Beside {
         };
         context.weigh(density, &mut others, &[]);
         let (missed, structured_clutter) = match best.members.len() >= NEEDED {
-            true => compared(context, swept, &mut others, pattern),
+            true => compared(context, (swept, best), &mut others, pattern),
             false => (Vec::new(), None),
         };
         // The best pose explains its points as the object's: about a copy of it they are no clutter.
@@ -147,7 +147,7 @@ fn copies(context: &Context<'_>, best: &Mode, pattern: Option<&Pattern>, effort:
     } else if pattern.is_some() {
         context.seeds(&taken, (min, STRONG), left).sweep()
     } else {
-        // A set of points close together has up to nine nats more than its bound, which is that of an average set.
+        // The bound is that of an average set: five points close together exceed it by six nats and more.
         let seeds = context.seeds(&taken, (NEEDED, 0.0), left);
         seeds.with_parts(min, left.min(2 * effort.first), left.min(effort.first / 2)).guided(effort.budget).sweep()
     };
@@ -171,11 +171,10 @@ fn copies(context: &Context<'_>, best: &Mode, pattern: Option<&Pattern>, effort:
 /// Of `others` those remain that are elsewhere.
 fn compared(
     context: &Context<'_>,
-    swept: &Swept,
+    (swept, best): (&Swept, &Mode),
     others: &mut Swept,
     pattern: Option<&Pattern>,
 ) -> (Vec<Mode>, Option<StructuredClutter>) {
-    let Some(best) = swept.modes.first() else { return (Vec::new(), None) };
     let (terms, _, graph) = context.parts;
     let places = ModelPlaces::of(context.problem, best, pattern.and_then(Pattern::distinctive));
     let mistaken = context
