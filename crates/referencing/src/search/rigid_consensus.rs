@@ -13,6 +13,7 @@ use super::{
     consensus::{
         clutter_density::ClutterDensity,
         edge_nfa::ln_nfa,
+        edge_pattern::EdgePattern,
         edge_terms::EdgeTerms,
         graph::ConsistencyGraph,
         influential_pairs::{InfluentialPairs, influential_pairs},
@@ -137,7 +138,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 16;
+    const VERSION: u32 = 17;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";
@@ -208,10 +209,14 @@ impl Search for RigidConsensus {
         let proof_tests = proved.as_ref().map_or(0, |proved| proved.pair_tests);
         let mut clutter_density = ClutterDensity::without(&self.without);
         let pattern = if large { None } else { pattern_of(&context, &swept) };
-        add_shifted_and_turned(&context, pattern.as_ref(), &mut swept);
+        let edge_pattern = if pattern.is_some() { None } else { edge_pattern_of(&context, &swept) };
+        add_shifted_and_turned(&context, (pattern.as_ref(), edge_pattern.as_ref()), &mut swept);
         swept.modes.truncate(MAX_COMPARED);
         if !large {
             context.weigh(&mut clutter_density, &mut swept, &[]);
+        }
+        if let (Some(pattern), Some(edges)) = (&edge_pattern, &context.edges) {
+            pattern.weigh(edges, &mut swept.modes);
         }
         let continued = pattern
             .as_ref()
@@ -316,8 +321,19 @@ fn pattern_of(context: &Context<'_>, swept: &Swept) -> Option<Pattern> {
     wanted.then(|| Pattern::of(context.problem.model, context.problem.edges.model)).flatten()
 }
 
+/// The pattern that the model's edges repeat, if the best pose has edges and may be accepted.
+fn edge_pattern_of(context: &Context<'_>, swept: &Swept) -> Option<EdgePattern> {
+    let of_edges = swept.modes.first().is_some_and(|best| !best.edges.is_empty());
+    let wanted = context.with(SearchMechanism::Pattern) && strong(swept) && of_edges;
+    context.edges.as_ref().filter(|_| wanted).and_then(EdgePattern::of)
+}
+
 /// Adds the poses that the best one becomes when the object is shifted within its pattern, or turned about its edges.
-fn add_shifted_and_turned(context: &Context<'_>, pattern: Option<&Pattern>, swept: &mut Swept) {
+fn add_shifted_and_turned(
+    context: &Context<'_>,
+    (pattern, edge_pattern): (Option<&Pattern>, Option<&EdgePattern>),
+    swept: &mut Swept,
+) {
     let climb = context.climb();
     if context.with(SearchMechanism::PatternShifts)
         && let (Some(pattern), Some(best)) = (pattern, swept.modes.first())
@@ -326,7 +342,11 @@ fn add_shifted_and_turned(context: &Context<'_>, pattern: Option<&Pattern>, swep
         swept.insert(shifts);
     }
     if let (Some(edges), Some(best)) = (&context.edges, swept.modes.first().filter(|best| !best.edges.is_empty())) {
-        let turned = turned(&Joined { climb: &climb, edges, taken: &context.none }, best);
+        let joined = Joined { climb: &climb, edges, taken: &context.none };
+        let shifted = edge_pattern.filter(|_| context.with(SearchMechanism::PatternShifts));
+        let shifted = shifted.map_or_else(Vec::new, |pattern| pattern.shifts(&joined, best));
+        let turned = turned(&joined, best);
+        swept.insert(shifted);
         swept.insert(turned);
     }
 }

@@ -1,11 +1,12 @@
 //! Patterns that repeat by a translation: their continuation beyond the object looks like a part of it.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 
 use super::{
     edge_terms::EdgeTerms,
     fractions::ln_fraction,
     graph::ConsistencyGraph,
+    lattice::{Lattice, forward, independent},
     likelihood::{Mode, PairTerms, ln_measured},
     motion::Motion,
     pattern_edges::{EdgeEvidence, repeated_edges},
@@ -37,8 +38,6 @@ const MAX_REGION: usize = 64;
 const ENDS: f64 = MARGIN;
 /// Tolerance of a shift, as a fraction of the shortest step.
 const SHIFT_FRACTION: f64 = 0.25;
-/// Sine of the angle between two steps below which they are one direction.
-const SAME: f64 = 0.3;
 
 /// The points of a model that repeat by a translation, with their continuation beyond the model.
 ///
@@ -270,15 +269,9 @@ impl Pattern {
         shift.is_some_and(|shift| self.at.iter().any(|place| own(&(place + shift))))
     }
 
-    /// The shift from one pose to another (object frame): the same attitude, and a step onto the pattern itself, both up
-    /// to `off` (m); `None` if it is none.
+    /// The shift from one pose to another (object frame), if it is one up to `off` (m).
     fn shift_between(&self, from: &Motion, to: &Motion, off: f64) -> Option<Vector3<f64>> {
-        let lattice = Lattice::of(&self.basis, 1.0);
-        let reach = self.at.iter().map(|p| p.norm()).fold(0.0, f64::max);
-        let turned = (to.rotation - from.rotation).norm() * reach;
-        let centroid = self.at.iter().sum::<Vector3<f64>>() / self.at.len() as f64;
-        let step = from.rotation.transpose() * (to.apply(&centroid) - from.apply(&centroid));
-        (turned <= off && lattice.off(&step) <= off).then(|| lattice.nearest(&step))
+        Lattice::of(&self.basis, 1.0).shift_between(&self.at, [from, to], off)
     }
 
     /// The places beyond the object at which the pattern may continue, if the object may also be at these shifts.
@@ -363,54 +356,6 @@ fn repeated(at: &[Vector3<f64>], off: f64) -> Vec<Vector3<f64>> {
     };
     let common = steps.iter().filter(|step| alike(step) >= MIN_ROWS).copied().collect();
     independent(common)
-}
-
-/// The shortest of some steps, up to three, each in another direction than the shorter ones.
-fn independent(mut steps: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
-    let by = |a: &Vector3<f64>, b: &Vector3<f64>| a.iter().zip(b).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
-    steps.sort_by(|a, b| {
-        a.norm_squared().total_cmp(&b.norm_squared()).then(by(a, b).unwrap_or(std::cmp::Ordering::Equal))
-    });
-    let mut basis: Vec<Vector3<f64>> = Vec::new();
-    for step in steps {
-        let rest = basis.iter().fold(step, |rest, known| rest - known * (rest.dot(known) / known.norm_squared()));
-        if basis.len() < 3 && rest.norm() > SAME * step.norm() {
-            basis.push(step);
-        }
-    }
-    basis
-}
-
-/// All integer combinations of one to three steps, or of a fraction of them.
-struct Lattice {
-    basis: Vec<Vector3<f64>>,
-    /// The least-squares multiples of a step.
-    multiples: DMatrix<f64>,
-}
-
-impl Lattice {
-    fn of(steps: &[Vector3<f64>], fraction: f64) -> Self {
-        let basis: Vec<Vector3<f64>> = steps.iter().map(|step| step * fraction).collect();
-        let columns = DMatrix::from_fn(3, basis.len(), |row, column| basis[column][row]);
-        let inverse = (!basis.is_empty()).then(|| columns.pseudo_inverse(0.0).ok()).flatten();
-        Self { multiples: inverse.unwrap_or_else(|| DMatrix::zeros(basis.len(), 3)), basis }
-    }
-
-    /// The nearest lattice vector of a step.
-    fn nearest(&self, step: &Vector3<f64>) -> Vector3<f64> {
-        let multiples = &self.multiples * step;
-        self.basis.iter().zip(multiples.iter()).map(|(basis, m)| basis * m.round()).sum()
-    }
-
-    /// The distance of a step from the nearest lattice vector.
-    fn off(&self, step: &Vector3<f64>) -> f64 {
-        (step - self.nearest(step)).norm()
-    }
-}
-
-/// Whether a step, rather than its reverse, is the canonical one of the two.
-fn forward(step: &Vector3<f64>) -> bool {
-    step.iter().copied().find(|x| x.abs() > 1e-9).is_none_or(|x| x > 0.0)
 }
 
 #[cfg(test)]

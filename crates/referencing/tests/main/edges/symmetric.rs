@@ -1,6 +1,7 @@
 //! A symmetric object has several poses, and no search chooses one of them.
 
-use rand::SeedableRng;
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use seafix_geometry::{Point, Transform};
 use seafix_referencing::{
@@ -10,7 +11,7 @@ use seafix_referencing::{
 
 use super::{
     planted::{edge, searches},
-    scene::{SIDES, corner, line, normal3, point, pose, rig},
+    scene::{SIDES, corner, line, normal3, point, pose, rig, within},
 };
 
 /// A box turned by half a turn about an axis is the same box: without a prior its pose is ambiguous.
@@ -73,4 +74,61 @@ fn a_plain_box_of_edges_under_a_wide_prior_gets_no_fix() {
         let attempt = compute_fix(&problem, &search, &solver, &Acceptance::default(), Some(&rig), &mut rng);
         assert!(!matches!(attempt.outcome, Outcome::Fix(_)), "seed {seed}: {}", attempt.outcome);
     }
+}
+
+/// The default's answer to the edges of three equal boxes in a row, of which half are seen: whether it is a fix, and a
+/// wrong one.
+///
+/// With `longer` a fourth box follows on one side, of which four fifths of the edges are seen.
+fn row_answered(longer: bool, seed: u64) -> (bool, bool) {
+    const STEP: f64 = 0.45;
+    const SIZE: [f64; 3] = [0.3, 0.4, 0.3];
+    let (rig, mut rng) = (rig(), ChaCha8Rng::seed_from_u64(seed));
+    let place = |corner: usize, k: i32| {
+        let bit = |axis: usize| f64::from(u8::from(corner >> axis & 1 == 1));
+        Vector3::new(bit(0) * SIZE[0] + f64::from(k) * STEP, bit(1) * SIZE[1], bit(2) * SIZE[2])
+    };
+    let sides = |k: i32| SIDES.map(|ends| ends.map(|corner| place(corner, k)));
+    let model: Vec<[Vector3<f64>; 2]> = (0..3).flat_map(sides).collect();
+    let edges: Vec<ModelEdge> = model.iter().map(|ends| edge(ends.map(|end| End::At(end.into())))).collect();
+    let truth = pose(4.0, rng.random_range(0.0..6.0));
+    let mut world: Vec<[Vector3<f64>; 2]> = model.into_iter().filter(|_| rng.random_bool(0.5)).collect();
+    let further = if rng.random_bool(0.5) { -1 } else { 3 };
+    world.extend(sides(further).into_iter().filter(|_| longer && rng.random_bool(0.8)));
+    let seen = |ends: [Vector3<f64>; 2]| ends.map(|end| truth.inverse() * Point::from(end));
+    let lines: Vec<_> = world.into_iter().map(|ends| line(&rig, seen(ends), 0.1, &mut rng)).collect();
+    let moved = Transform::new(truth.rotation(), truth.translation() + within([0.3; 3], &mut rng));
+    let prior = Prior { object_from_camera: moved, bound: PriorBound::Box(0.6) };
+    let lists = candidates(&[], &[], Some(&prior), &Gate::default(), None);
+    let of_edges = edge_candidates(&edges, &[], &lines, Some(&prior), &Gate::default(), None);
+    let problem = Problem {
+        model: &[],
+        cloud: &[],
+        candidates: &lists,
+        tolerance: Tolerance::Sigmas(3.0),
+        prior: Some(&prior),
+        edges: Edges { model: &edges, lines: &lines, candidates: &of_edges },
+    };
+    let (search, solver) = (RigidConsensus::default(), StereoReprojection::default());
+    match compute_fix(&problem, &search, &solver, &Acceptance::default(), Some(&rig), &mut rng).outcome {
+        Outcome::Fix(fix) => {
+            let off = (fix.object_from_camera.translation() - truth.translation()).norm();
+            (true, off > STEP / 4.0)
+        }
+        _ => (false, false),
+    }
+}
+
+/// Where a row of boxes goes on beyond the object, its poses differ by a box: what one explains as the object, the other
+/// explains as the rest of the row. Where it ends, the pose is unique.
+#[test]
+fn the_poses_in_a_longer_row_of_boxes_are_equally_probable() {
+    let count = |longer: bool| {
+        let answers: Vec<(bool, bool)> = (0..8).map(|seed| row_answered(longer, seed)).collect();
+        [answers.iter().filter(|(fix, _)| *fix).count(), answers.iter().filter(|(_, wrong)| *wrong).count()]
+    };
+    let [_, wrong] = count(true);
+    assert!(wrong == 0, "{wrong} of 8 answers are a box off");
+    let [found, wrong] = count(false);
+    assert!(found >= 6 && wrong == 0, "{found} and {wrong} of 8 where the row ends");
 }
