@@ -92,7 +92,8 @@ use context::{Context, MAX_COMPARED, STRONG};
 /// A problem of more than 256 model points with candidates begins with guided seeds: the pairs that share most
 /// compatible pairs with a seed begin a set (second-order compatibility, Chen et al. 2022). Sets of interest then have
 /// many members. The seeding suffices, and the enumeration need not be complete, once the probability that it has
-/// missed such a set is 10⁻⁴. The seeds take at most the budget once more, in words of the graph.
+/// missed such a set is 10⁻⁴. The seeds take at most the budget once more, in words of the graph. Such seeds also follow
+/// where the enumeration of a smaller problem reaches its budget.
 ///
 /// # Large putative sets
 ///

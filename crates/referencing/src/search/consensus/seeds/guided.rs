@@ -40,7 +40,7 @@ const ENUMERATED: u64 = 8;
 const RESIDUAL: f64 = 1.5;
 
 impl Seeds<'_> {
-    /// Adds guided seeds to the search of a large problem.
+    /// Adds guided seeds to the search of a large problem, and to one whose enumeration reaches its budget.
     ///
     /// A set of interest has at least m members, each of which is a seed with the same probability. If s of N vertices
     /// that can belong to such a set were seeds, and a fraction f of the members leads to the set, the search misses it
@@ -67,6 +67,12 @@ impl Seeds<'_> {
         let left = if found { self.budget.min(self.spent / ENUMERATED) } else { self.budget };
         self.budget = self.spent.saturating_add(left);
         found
+    }
+
+    /// Follows guided seeds after an enumeration that reached its budget. Returns whether a set of interest would have
+    /// been found.
+    pub(super) fn guide_the_rest(&mut self) -> bool {
+        self.guided > 0 && self.climb.graph.starts.len() <= LARGE && self.follow_seeds()
     }
 
     fn follow_seeds(&mut self) -> bool {

@@ -192,7 +192,7 @@ impl<'a> Seeds<'a> {
         self.parts.until = until;
         let looked_for = self.threshold();
         let (pairs, followed) = self.follow_all(full_sets, self.budget);
-        let complete = found || followed && complete;
+        let complete = found || followed && complete || self.guide_the_rest();
         let followed = self.follow_all(parts, until).1 && self.spent <= until;
         let parts = followed && self.parts.every == 1 && !self.parts.dropped;
         Swept { modes: self.modes, complete, pairs, looked_for, parts, pair_tests: self.spent }

@@ -112,3 +112,54 @@ fn a_large_set_is_found_by_guided_seeds() {
     let copies = seeds(&all, SMALL).with_parts(50, SMALL, SMALL).guided(100 * SMALL).sweep();
     assert!(copies.complete && copies.modes.iter().all(|mode| mode.members.len() < 20));
 }
+
+/// A plate with nine square tags among thirty other tags of the same size: a small problem of many coherent triples.
+///
+/// The enumeration reaches its budget. Fails if no guided seeds follow then.
+#[test]
+fn guided_seeds_find_what_an_enumeration_does_not_reach() {
+    const TAGS: usize = 9;
+    const OTHERS: usize = 30;
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let corner = |k: usize| Vector3::new([0.03, 0.03, -0.03, -0.03][k], [0.03, -0.03, -0.03, 0.03][k], 0.0);
+    let mut off = |half: f64| Vector3::from_fn(|_, _| rng.random_range(-half..half));
+    let tag = |k: usize| Vector3::new(0.18 * (k % 3) as f64, 0.18 * (k / 3) as f64, 0.0);
+    let at: Vec<Vector3<f64>> = (0..TAGS)
+        .flat_map(|k| {
+            let centre = tag(k) + off(0.04);
+            (0..4).map(move |side| centre + corner(side))
+        })
+        .collect();
+    let model: Vec<ModelPoint> = at.iter().map(|at| ModelPoint::exact("", (*at).into())).collect();
+    let others = (0..OTHERS).flat_map(|_| {
+        let (centre, turn) = (off(0.7), Rotation3::from_scaled_axis(off(1.0)));
+        (0..4).map(move |side| centre + turn * corner(side))
+    });
+    let places: Vec<Vector3<f64>> =
+        at.iter().copied().chain(others.collect::<Vec<_>>()).map(|at| at + off(0.003)).collect();
+    let measured =
+        |at: &Vector3<f64>| MeasuredPoint { position: UncertainPoint::isotropic((*at).into(), 0.002), pixels: None };
+    let cloud: Vec<MeasuredPoint> = places.iter().map(measured).collect();
+    let candidates = Candidates::all(model.len(), cloud.len());
+    let problem = Problem {
+        model: &model,
+        cloud: &cloud,
+        candidates: &candidates,
+        tolerance: Tolerance::Fixed(0.012),
+        prior: None,
+        edges: Default::default(),
+    };
+    let prior_terms = PriorTerms::of(&problem).expect("a box");
+    let graph = ConsistencyGraph::of(&problem, &prior_terms);
+    let terms = PairTerms::of(&problem, &prior_terms, &graph);
+    const SMALL: u64 = 300_000;
+    let none = BTreeSet::new();
+    let seeds = || Seeds::new(&model, (&terms, &prior_terms, &graph), &none, (NEEDED, 3.0), SMALL);
+    let right = |swept: &Swept| {
+        let members = swept.modes.first().map(|mode| mode.pairs(&graph)).unwrap_or_default();
+        members.iter().filter(|pair| pair.model == pair.cloud).count()
+    };
+    let (alone, guided) = (seeds().sweep(), seeds().guided(3000 * SMALL).sweep());
+    assert!(!alone.complete && right(&alone) < 18, "{} right", right(&alone));
+    assert!(guided.complete && right(&guided) >= 34, "{} right", right(&guided));
+}
