@@ -1,7 +1,5 @@
 //! Local density of clutter: in dense clutter some points fit any pose.
 
-use std::collections::BTreeSet;
-
 use super::{
     clumped_clutter::ClumpedClutter,
     graph::ConsistencyGraph,
@@ -121,6 +119,8 @@ impl ClutterDensity {
             let clumped_clutter = self.clumped_clutter.get_or_insert_with(|| ClumpedClutter::of(problem, known));
             (known, clumped_clutter.beside(&no_clutter))
         });
+        let mut is_clutter = vec![true; problem.cloud.len()];
+        no_clutter.iter().for_each(|&j| is_clutter[j] = false);
         let every = members.len().div_ceil(MAX_MEMBERS).max(1);
         let excess: Vec<f64> = (0..members.len())
             .step_by(every)
@@ -129,7 +129,7 @@ impl ClutterDensity {
                 let Correspondence { model, cloud } = graph.vertices[v];
                 let place = &problem.cloud[cloud].position.at.coords;
                 let excess = match self.with(SearchMechanism::LocalDensity) {
-                    true => self.excess(problem, (terms, graph), v, &no_clutter),
+                    true => self.excess(problem, (terms, graph), v, &is_clutter),
                     false => 0.0,
                 };
                 let clumped = clumped.as_ref().map(|(known, clumped)| clumped.about(known, model, place));
@@ -145,17 +145,17 @@ impl ClutterDensity {
         (0..members.len()).map(|at| if at.is_multiple_of(every) { excess[at / every] } else { mean }).collect()
     }
 
-    /// ln ρ/ρ_even at the cloud point of a vertex if the points in `members` are no clutter.
+    /// ln ρ/ρ_even at the cloud point of a vertex, with the cloud points that are clutter.
     fn excess(
         &mut self,
         problem: &Problem<'_>,
         (terms, graph): (&PairTerms, &ConsistencyGraph),
         v: usize,
-        members: &[usize],
+        is_clutter: &[bool],
     ) -> f64 {
-        let lines = self.lines.get_or_insert_with(|| Lines::of(problem, (terms, graph), members));
+        let lines = self.lines.get_or_insert_with(|| Lines::of(problem, (terms, graph), is_clutter));
         let cloud = graph.vertices[v].cloud;
-        let Densities { along, near, wide } = lines.density.at(cloud, |j| members.contains(&j));
+        let Densities { along, near, wide } = lines.density.at(cloud, |j| !is_clutter[j]);
         let max = if self.without.contains(&SearchMechanism::ClumpPeak) { 1.0 } else { PEAK };
         let peak = (near / (CLUMP * wide).max(f64::MIN_POSITIVE)).clamp(1.0, max);
         let density = [along, peak * RECIPROCAL * near];
@@ -198,13 +198,12 @@ impl ClutterDensity {
 }
 
 impl Lines {
-    fn of(problem: &Problem<'_>, (terms, graph): (&PairTerms, &ConsistencyGraph), members: &[usize]) -> Self {
+    fn of(problem: &Problem<'_>, (terms, graph): (&PairTerms, &ConsistencyGraph), is_clutter: &[bool]) -> Self {
         let mut density = LineDensity::of(problem);
-        let taken: BTreeSet<usize> = members.iter().copied().collect();
         // The vertices of each cloud point; that of the first model point represents them.
         let mut of_cloud: Vec<Option<usize>> = vec![None; problem.cloud.len()];
         for (v, pair) in graph.vertices.iter().enumerate() {
-            if !taken.contains(&pair.cloud)
+            if is_clutter[pair.cloud]
                 && of_cloud[pair.cloud].is_none_or(|known| graph.vertices[known].model > pair.model)
             {
                 of_cloud[pair.cloud] = Some(v);
@@ -217,7 +216,7 @@ impl Lines {
             .filter_map(|&j| Some((j, of_cloud[j]?)))
             .map(|(j, v)| {
                 let even = even(problem, (terms, graph), &density, v);
-                let Densities { along, near, .. } = density.at(j, |other| taken.contains(&other));
+                let Densities { along, near, .. } = density.at(j, |other| !is_clutter[other]);
                 [along / even, near / even]
             })
             .filter(|ratios| ratios.iter().all(|ratio| ratio.is_finite()))

@@ -1,7 +1,5 @@
 //! A kernel density of clutter that follows lines and surfaces.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 
 use super::gaussian::HALF_LN_2PI;
@@ -15,6 +13,8 @@ pub(super) const NEAR: usize = 3;
 const AROUND: usize = 16;
 /// Standard deviation of a kernel across its line, in standard deviations of the point.
 const ACROSS: f64 = 3.0;
+/// χ² above which a kernel is less than 10⁻²¹ of its maximum.
+const NEGLIGIBLE: f64 = 100.0;
 /// Minimum standard deviation of a kernel, as a fraction of its length.
 const MIN_FRACTION: f64 = 1e-3;
 
@@ -32,8 +32,8 @@ pub(super) struct LineDensity {
     /// Their standard deviations (m).
     sigmas: Vec<f64>,
     squares: Vec<f64>,
-    /// The nearest points of the points looked up, nearest first, by their index in `points`.
-    nearest: BTreeMap<usize, Vec<usize>>,
+    /// The nearest points of each point, nearest first, by their index in `points`; empty until looked up.
+    nearest: Vec<Vec<usize>>,
 }
 
 /// The densities of the cloud about a point (1/m³).
@@ -60,7 +60,7 @@ impl LineDensity {
         let column = |axis: usize| points.iter().map(|j| position(j).at.coords[axis]).collect();
         let places = std::array::from_fn(column);
         let sigmas = points.iter().map(|j| (position(j).covariance.trace() / 3.0).max(0.0).sqrt()).collect();
-        Self { places, sigmas, squares: vec![0.0; points.len()], nearest: BTreeMap::new(), points }
+        Self { places, sigmas, squares: vec![0.0; points.len()], nearest: vec![Vec::new(); points.len()], points }
     }
 
     /// The number of points.
@@ -76,7 +76,7 @@ impl LineDensity {
         self.look_up(own);
         let left = |of: &Self, index: usize| index != own && !excluded(of.points[index]);
         let around: Vec<usize> =
-            self.nearest[&own].iter().copied().filter(|&index| left(self, index)).take(AROUND).collect();
+            self.nearest[own].iter().copied().filter(|&index| left(self, index)).take(AROUND).collect();
         // The density within the k-th neighbour, (k − 1)/V_k. Points nearer than the noise are one place.
         let within = |k: usize| {
             let Some(&j) = k.checked_sub(1).and_then(|last| around.get(last)) else { return 0.0 };
@@ -88,7 +88,7 @@ impl LineDensity {
         for j in around {
             let from = self.place(j);
             self.look_up(j);
-            let towards = self.nearest[&j].iter().filter(|&&index| left(self, index)).take(NEIGHBOURS);
+            let towards = self.nearest[j].iter().filter(|&&index| left(self, index)).take(NEIGHBOURS);
             let (mut count, mut kernels) = (0, 0.0);
             for &l in towards {
                 count += 1;
@@ -107,26 +107,30 @@ impl LineDensity {
 
     /// Finds the nearest points of a point, twice as many as count, since some may be excluded.
     fn look_up(&mut self, of: usize) {
-        if self.nearest.contains_key(&of) {
+        if !self.nearest[of].is_empty() {
             return;
         }
         let at = self.place(of);
         squares(&self.places, &at, &mut self.squares);
-        let mut nearest: Vec<(f64, usize)> = Vec::with_capacity(2 * AROUND + 1);
+        const KEPT: usize = 2 * AROUND;
+        let mut nearest: Vec<(u64, usize)> = Vec::with_capacity(2 * KEPT);
         let mut farthest = f64::INFINITY;
         for (j, &square) in self.squares.iter().enumerate() {
-            // Negated comparison: NaN is skipped, and every finite distance passes while few are known.
+            // Negated comparison: NaN is skipped.
             if !(square < farthest) || j == of {
                 continue;
             }
-            let place = nearest.partition_point(|(known, _)| *known <= square);
-            nearest.insert(place, (square, j));
-            nearest.truncate(2 * AROUND);
-            if nearest.len() == 2 * AROUND {
-                farthest = nearest[2 * AROUND - 1].0;
+            // The bits of positive numbers are in the order of the numbers.
+            nearest.push((square.to_bits(), j));
+            if nearest.len() == 2 * KEPT {
+                nearest.select_nth_unstable(KEPT - 1);
+                nearest.truncate(KEPT);
+                farthest = f64::from_bits(nearest[KEPT - 1].0);
             }
         }
-        self.nearest.insert(of, nearest.into_iter().map(|(_, j)| j).collect());
+        nearest.sort_unstable();
+        nearest.truncate(KEPT);
+        self.nearest[of] = nearest.into_iter().map(|(_, j)| j).collect();
     }
 }
 
@@ -137,6 +141,9 @@ fn kernel(step: &Vector3<f64>, line: &Vector3<f64>, s: f64) -> f64 {
     let along = square + across;
     let on = if square > 0.0 { step.dot(line).powi(2) / square } else { 0.0 };
     let chi2 = on / along + (step.norm_squared() - on).max(0.0) / across;
+    if chi2 > NEGLIGIBLE {
+        return 0.0;
+    }
     libm::exp(-0.5 * chi2 - 3.0 * HALF_LN_2PI) / (along.sqrt() * across)
 }
 
