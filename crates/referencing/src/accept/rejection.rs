@@ -185,7 +185,10 @@ impl RejectionReason {
             Self::Absent { p_wrong, .. } if p_wrong.is_nan() => "check the point covariances",
             Self::Absent { p_wrong, .. } => return improbable(*p_wrong),
             Self::Residuals { .. } => "check calibration, object model and point covariances",
-            Self::Imprecise { .. } => "identify more points (`detector.features`) or move closer",
+            Self::Imprecise { .. } => {
+                "identify more points (`detector.features`), move closer, or set `acceptance.alert-limit` to the error that \
+                 the use tolerates"
+            }
             Self::InfluentialPairs { .. } => "identify more points (`detector.features`)",
             Self::Attitude { .. } => "identify points farther from a common line",
             Self::Behind { .. } => "check the normals of the object model",
@@ -205,11 +208,11 @@ impl RejectionReason {
 fn improbable(p_wrong: f64) -> Cow<'static, str> {
     match larger_limit(p_wrong) {
         Some(limit) => Cow::Owned(format!(
-            "try more features (`detector.features`), edges in the site, a prior (or a narrower one), or `acceptance.max-p-wrong={limit}`"
+            "try more features (`detector.features`), edges in the site, a prior (a narrower one, or a wider one if it may be wrong), or `acceptance.max-p-wrong={limit}`"
         )),
-        None => {
-            Cow::Borrowed("try more features (`detector.features`), edges in the site, or a prior (or a narrower one)")
-        }
+        None => Cow::Borrowed(
+            "try more features (`detector.features`), edges in the site, or a prior (a narrower one, or a wider one if it may be wrong)",
+        ),
     }
 }
 
@@ -273,7 +276,7 @@ mod tests {
             rejection.to_string(),
             "P(wrong) is 1.8e-3, at most 1.0e-3 is allowed (preset balanced); 4 of 8 points identified"
         );
-        let remedy = "try more features (`detector.features`), edges in the site, a prior (or a narrower one), or `acceptance.max-p-wrong=5e-3`";
+        let remedy = "try more features (`detector.features`), edges in the site, a prior (a narrower one, or a wider one if it may be wrong), or `acceptance.max-p-wrong=5e-3`";
         assert_eq!(rejection.remedy(), remedy);
         assert!(!absent(0.4).remedy().contains("max-p-wrong"), "no use tolerates such a limit");
     }
