@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use nalgebra::Vector3;
 
 use super::{
-    edge_terms::EdgeTerms,
+    edge_terms::{EdgeTerms, EdgeVertex},
     fractions::ln_fraction,
     joined::Joined,
     lattice::{Lattice, forward, independent},
@@ -15,9 +15,11 @@ use super::{
 
 /// Maximum number of model edges for the detection of a pattern.
 const MAX_EDGES: usize = 128;
-/// Minimum number of edges halfway between two others like them, and the minimum fraction of the edges.
-const MIN_ROWS: usize = 3;
-const MIN_FRACTION: f64 = 0.25;
+/// Minimum number of edges that a step moves onto others, and the fraction of the edges that they must exceed.
+///
+/// A step by the width of a plain box moves a third of its edges onto others.
+const MIN_MOVED: usize = 3;
+const MIN_FRACTION: f64 = 1.0 / 3.0;
 /// Tolerance of an edge's ends, as a fraction of the model's extent.
 const OFF_FRACTION: f64 = 0.015;
 /// Minimum step in units of that tolerance.
@@ -44,11 +46,13 @@ impl Segment {
     }
 }
 
-/// The translations by which the edges of a model repeat, as those of a row of boxes, a rack or a railing do.
+/// The translations by which the edges of a model repeat, as those of a row of boxes, a rack or a ladder do.
 pub(in crate::search) struct EdgePattern {
     /// The model edges.
     segments: Vec<Segment>,
     middles: Vec<Vector3<f64>>,
+    /// Whether a step moves an edge onto another.
+    repeats: Vec<bool>,
     /// Tolerance of a place (m).
     off: f64,
     /// The steps of the pattern, one to three (object frame).
@@ -57,8 +61,6 @@ pub(in crate::search) struct EdgePattern {
 
 impl EdgePattern {
     /// The pattern of the model's edges; `None` without one.
-    ///
-    /// A step leads from one edge to an equal one and on to a third.
     pub(in crate::search) fn of(edges: &EdgeTerms<'_>) -> Option<Self> {
         Self::of_segments((0..edges.edges.len()).map(|edge| edges.ends(edge)))
     }
@@ -67,7 +69,7 @@ impl EdgePattern {
         let segment = |[from, to]: [Vector3<f64>; 2]| Segment { middle: (from + to) / 2.0, half: (to - from) / 2.0 };
         let segments: Vec<Segment> = ends.map(segment).collect();
         let n = segments.len();
-        if !(MIN_ROWS..=MAX_EDGES).contains(&n) {
+        if n > MAX_EDGES {
             return None;
         }
         let middles: Vec<Vector3<f64>> = segments.iter().map(|segment| segment.middle).collect();
@@ -76,17 +78,20 @@ impl EdgePattern {
         let mut steps: Vec<Vector3<f64>> = Vec::new();
         for a in 0..n {
             for c in 0..a {
-                let step = (middles[a] - middles[c]) / 2.0;
-                let between = || segments.iter().any(|other| segments[c].is_at(other, &step, off));
-                if step.norm() >= MIN_STEP * off && segments[a].is_like(&segments[c], off) && between() {
+                let step = middles[a] - middles[c];
+                if step.norm() >= MIN_STEP * off && segments[a].is_like(&segments[c], off) {
                     steps.push(if forward(&step) { step } else { -step });
                 }
             }
         }
-        let min = ((MIN_FRACTION * n as f64).ceil() as usize).max(MIN_ROWS);
-        let alike = |step: &Vector3<f64>| steps.iter().filter(|other| (*other - step).norm() <= off).count();
-        let basis = independent(steps.iter().filter(|step| alike(step) >= min).copied().collect());
-        (!basis.is_empty()).then_some(Self { segments, middles, off, basis })
+        let moved = |step: &Vector3<f64>| steps.iter().filter(|other| (*other - step).norm() <= off).count();
+        let enough = |count: usize| count >= MIN_MOVED && count as f64 > MIN_FRACTION * n as f64;
+        let basis = independent(steps.iter().filter(|step| enough(moved(step))).copied().collect());
+        let onto_other = |segment: &Segment, step: &Vector3<f64>| {
+            segments.iter().any(|other| segment.is_at(other, step, off) || segment.is_at(other, &-step, off))
+        };
+        let repeats = segments.iter().map(|segment| basis.iter().any(|step| onto_other(segment, step))).collect();
+        (!basis.is_empty()).then_some(Self { segments, middles, repeats, off, basis })
     }
 
     /// The poses of the object shifted within its pattern, reached from a mode step by step.
@@ -131,11 +136,12 @@ impl EdgePattern {
         let Some((first, half)) = modes.first().map(|mode| (mode.motion, mode.edges.len() / 2)) else { return };
         let shift_of = |mode: &Mode| self.shift_between(&first, &mode.motion).filter(|_| mode.edges.len() > half);
         let shifts: Vec<Option<Vector3<f64>>> = modes.iter().map(shift_of).collect();
-        // The evidence of each line that any of the shifts explains.
+        // The evidence of each line that any of the shifts explains by an edge of the pattern.
         let mut gains: BTreeMap<usize, f64> = BTreeMap::new();
         let of_shifts = |(mode, shift): (&'_ Mode, &Option<Vector3<f64>>)| shift.is_some().then(|| mode.clone());
         for mode in modes.iter().zip(&shifts).filter_map(of_shifts) {
-            for vertex in mode.edges.iter().map(|&v| &edges.vertices[v]) {
+            let repeats = |vertex: &&EdgeVertex| self.repeats[vertex.pair.model];
+            for vertex in mode.edges.iter().map(|&v| &edges.vertices[v]).filter(repeats) {
                 let Some(placed) = vertex.placed(&mode.motion) else { continue };
                 let gain = gains.entry(vertex.pair.cloud).or_insert(f64::NEG_INFINITY);
                 *gain = gain.max(vertex.residual_gain(&placed.residual));
@@ -162,7 +168,7 @@ impl EdgePattern {
     fn beyond(&self, shifts: impl Iterator<Item = Vector3<f64>>) -> usize {
         let mut beyond: Vec<Segment> = Vec::new();
         for shift in shifts.filter(|shift| *shift != Vector3::zeros()) {
-            for segment in &self.segments {
+            for (segment, _) in self.segments.iter().zip(&self.repeats).filter(|(_, repeats)| **repeats) {
                 let moved = Segment { middle: segment.middle + shift, ..*segment };
                 let known = |other: &Segment| moved.is_at(other, &Vector3::zeros(), 2.0 * self.off);
                 if !self.segments.iter().any(known) && !beyond.iter().any(known) {
@@ -194,15 +200,14 @@ mod tests {
     }
 
     #[test]
-    fn three_boxes_in_a_row_are_a_pattern_and_one_or_two_are_none() {
+    fn boxes_in_a_row_are_a_pattern_and_one_is_none() {
         let pattern = EdgePattern::of_segments(boxes(3).into_iter()).expect("a row");
         assert_eq!(pattern.basis.len(), 1);
         assert!((pattern.basis[0] - Vector3::new(0.45, 0.0, 0.0)).norm() < 1e-12);
         // One box more at either side, or two at one.
         let beyond = |steps: [f64; 2]| pattern.beyond(steps.into_iter().map(|step| pattern.basis[0] * step));
         assert_eq!([beyond([1.0, -1.0]), beyond([0.0, 2.0]), beyond([1.0, 2.0])], [24, 24, 24]);
-        for count in [1, 2] {
-            assert!(EdgePattern::of_segments(boxes(count).into_iter()).is_none());
-        }
+        assert!(EdgePattern::of_segments(boxes(2).into_iter()).is_some());
+        assert!(EdgePattern::of_segments(boxes(1).into_iter()).is_none());
     }
 }
