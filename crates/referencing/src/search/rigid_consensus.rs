@@ -211,8 +211,9 @@ impl Search for RigidConsensus {
         let mut clutter_density = ClutterDensity::without(&self.without);
         let pattern = if large { None } else { pattern_of(&context, &swept) };
         let edge_pattern = if pattern.is_some() { None } else { edge_pattern_of(&context, &swept) };
-        add_shifted_and_turned(&context, (pattern.as_ref(), edge_pattern.as_ref()), &mut swept);
+        add_shifted_and_turned(&context, pattern.as_ref(), &mut swept);
         swept.modes.truncate(MAX_COMPARED);
+        add_shifted_along(&context, edge_pattern.as_ref(), &mut swept);
         if !large {
             context.weigh(&mut clutter_density, &mut swept, &[]);
         }
@@ -330,11 +331,7 @@ fn edge_pattern_of(context: &Context<'_>, swept: &Swept) -> Option<EdgePattern> 
 }
 
 /// Adds the poses that the best one becomes when the object is shifted within its pattern, or turned about its edges.
-fn add_shifted_and_turned(
-    context: &Context<'_>,
-    (pattern, edge_pattern): (Option<&Pattern>, Option<&EdgePattern>),
-    swept: &mut Swept,
-) {
+fn add_shifted_and_turned(context: &Context<'_>, pattern: Option<&Pattern>, swept: &mut Swept) {
     let climb = context.climb();
     if context.with(SearchMechanism::PatternShifts)
         && let (Some(pattern), Some(best)) = (pattern, swept.modes.first())
@@ -343,12 +340,18 @@ fn add_shifted_and_turned(
         swept.insert(shifts);
     }
     if let (Some(edges), Some(best)) = (&context.edges, swept.modes.first().filter(|best| !best.edges.is_empty())) {
-        let joined = Joined { climb: &climb, edges, taken: &context.none };
-        let shifted = edge_pattern.filter(|_| context.with(SearchMechanism::PatternShifts));
-        let shifted = shifted.map_or_else(Vec::new, |pattern| pattern.shifts(&joined, best));
-        let turned = turned(&joined, best);
-        swept.insert(shifted);
+        let turned = turned(&Joined { climb: &climb, edges, taken: &context.none }, best);
         swept.insert(turned);
+    }
+}
+
+/// Adds the poses along the pattern of the object's edges, which may have much less evidence of their own than the best.
+fn add_shifted_along(context: &Context<'_>, pattern: Option<&EdgePattern>, swept: &mut Swept) {
+    let pattern = pattern.filter(|_| context.with(SearchMechanism::PatternShifts));
+    if let (Some(pattern), Some(edges), Some(best)) = (pattern, &context.edges, swept.modes.first()) {
+        let climb = context.climb();
+        let shifts = pattern.shifts(&Joined { climb: &climb, edges, taken: &context.none }, best);
+        swept.insert(shifts);
     }
 }
 

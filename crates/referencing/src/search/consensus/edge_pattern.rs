@@ -29,7 +29,7 @@ const LN_GOES_ON: f64 = -4.6;
 /// Maximum number of shifts examined: any two decide that the pose is ambiguous.
 const MAX_SHIFTS: usize = 16;
 
-/// A model edge: its middle and half of it, in a canonical sense (object frame).
+/// A model edge: its middle, and the step from there to one of its ends (object frame).
 #[derive(Clone, Copy)]
 struct Segment {
     middle: Vector3<f64>,
@@ -37,10 +37,12 @@ struct Segment {
 }
 
 impl Segment {
+    /// Whether it lies on another edge after a step, within `off` (m).
     fn is_at(&self, other: &Self, step: &Vector3<f64>, off: f64) -> bool {
         (self.middle + step - other.middle).norm() <= off && self.is_like(other, off)
     }
 
+    /// Whether it is parallel to another edge and as long.
     fn is_like(&self, other: &Self, off: f64) -> bool {
         (self.half - other.half).norm().min((self.half + other.half).norm()) <= off
     }
@@ -138,8 +140,7 @@ impl EdgePattern {
         let shifts: Vec<Option<Vector3<f64>>> = modes.iter().map(shift_of).collect();
         // The evidence of each line that any of the shifts explains by an edge of the pattern.
         let mut gains: BTreeMap<usize, f64> = BTreeMap::new();
-        let of_shifts = |(mode, shift): (&'_ Mode, &Option<Vector3<f64>>)| shift.is_some().then(|| mode.clone());
-        for mode in modes.iter().zip(&shifts).filter_map(of_shifts) {
+        for (mode, _) in modes.iter().zip(&shifts).filter(|(_, shift)| shift.is_some()) {
             let repeats = |vertex: &&EdgeVertex| self.repeats[vertex.pair.model];
             for vertex in mode.edges.iter().map(|&v| &edges.vertices[v]).filter(repeats) {
                 let Some(placed) = vertex.placed(&mode.motion) else { continue };

@@ -85,22 +85,8 @@ impl Joined<'_> {
     ) -> Option<Mode> {
         // The last step may move an edge off its line.
         edges.retain(|&v| self.edges.vertices[v].placed(&motion).is_some());
-        let Climb { terms, prior_terms, .. } = self.climb;
-        if !prior_terms.holds(&motion, factor) {
-            return None;
-        }
-        let gains: f64 = members.iter().map(|&v| terms.residual_gain(v, &motion)).sum();
-        let score = gains + terms.ln_fraction[members.len()] + prior_terms.ln_density(&motion);
         let of_edges = self.edges.ln_ratio(&edges, &motion);
-        let ln_evidence = score + of_edges + ln_volume(factor).min(-prior_terms.ln_peak);
-        ln_evidence.is_finite().then_some(Mode {
-            members,
-            edges,
-            motion,
-            ln_evidence,
-            ln_uniform: ln_evidence,
-            ln_clutter_density: 0.0,
-        })
+        self.climb.mode_with(members, edges, motion, factor, of_edges)
     }
 
     /// The MAP motion of some features near a start, and the factor of its information.

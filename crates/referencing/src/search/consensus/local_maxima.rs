@@ -98,16 +98,28 @@ impl<'a> Climb<'a> {
 
     /// The mode of these pairs (ascending) under their MAP motion; `None` if the prior's box excludes the motion.
     pub(in crate::search) fn mode(&self, members: Vec<usize>, motion: Motion, factor: &Factor) -> Option<Mode> {
+        self.mode_with(members, Vec::new(), motion, factor, 0.0)
+    }
+
+    /// The mode of these pairs and edges; `of_edges` is the log-likelihood ratio of the edges.
+    pub(super) fn mode_with(
+        &self,
+        members: Vec<usize>,
+        edges: Vec<usize>,
+        motion: Motion,
+        factor: &Factor,
+        of_edges: f64,
+    ) -> Option<Mode> {
         if !self.prior_terms.holds(&motion, factor) {
             return None;
         }
         let gains: f64 = members.iter().map(|&v| self.terms.residual_gain(v, &motion)).sum();
         let score = gains + self.terms.ln_fraction[members.len()] + self.prior_terms.ln_density(&motion);
         // No posterior exceeds the prior in volume; for nearly collinear points without a prior, the first order would.
-        let ln_evidence = score + ln_volume(factor).min(-self.prior_terms.ln_peak);
+        let ln_evidence = score + of_edges + ln_volume(factor).min(-self.prior_terms.ln_peak);
         ln_evidence.is_finite().then_some(Mode {
             members,
-            edges: Vec::new(),
+            edges,
             motion,
             ln_evidence,
             ln_uniform: ln_evidence,
