@@ -136,6 +136,18 @@ struct Reader<'a> {
     warnings: Vec<Fault>,
 }
 
+/// The contents of the files that a description names.
+struct Tables {
+    lines: Vec<tables::FrameLine>,
+    site: Option<Site>,
+    truth: Vec<tum::Stamped<World, Camera>>,
+    prior: Vec<tum::Stamped<World, Camera>>,
+    covariances: Option<Vec<(u64, Covariance6<World, Camera>)>>,
+    visibility: Option<Vec<tables::VisibleLine>>,
+    objects: Vec<(String, Transform<World, Object>)>,
+    sensor_buffer: SensorBuffer,
+}
+
 impl Reader<'_> {
     fn read(mut self) -> Result<Dataset, Vec<Fault>> {
         let d = self.described;
@@ -153,15 +165,55 @@ impl Reader<'_> {
             self.faults.push(fault);
             Transform::identity()
         });
-        let sort_stamps = self.sort_stamps;
-        let frame_lines =
-            self.table(&d.frames, |text, file| tables::frames(text, file, sort_stamps)).unwrap_or_default();
-        let site = d.site.as_deref().and_then(|name| self.site(name));
-        let truth = d.truth.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
-        let prior = d.prior.as_deref().and_then(|name| self.poses(name)).unwrap_or_default();
-        let covariances = d.prior_covariance.as_deref().and_then(|name| self.table(name, tables::covariances));
-        let visibility = d.visibility.as_deref().and_then(|name| self.table(name, tables::visibility));
-        let objects = d.objects.as_deref().and_then(|name| self.table(name, tables::objects)).unwrap_or_default();
+        let tables = self.tables();
+        let sigma = self.prior_sigma();
+        if d.prior.is_some() && sigma.is_none() && tables.covariances.is_none() {
+            self.fault(&["prior"], "a prior without its uncertainty", "", "add prior_sigma or prior_covariance");
+        }
+        self.names(tables.site.as_ref(), tables.visibility.as_deref().unwrap_or_default(), &tables.objects);
+        let frames = self.frames(&tables, sigma);
+        self.warnings.extend(tables.site.iter().flat_map(|site| site.warnings.clone()));
+        self.warnings.extend(rig.as_ref().ok().and_then(|(rig, _)| d.not_rectified(rig, self.file, self.source)));
+        self.missing_poses(&tables, &frames);
+        match (rig, bits) {
+            (Ok((rig, ports)), Ok(bits)) if self.faults.is_empty() => Ok(Dataset {
+                name: d.name.clone(),
+                folder: self.folder.to_owned(),
+                rig,
+                ports,
+                site: tables.site,
+                body_from_camera,
+                table: d.frames.clone(),
+                frames,
+                objects: tables.objects,
+                has_visibility: tables.visibility.is_some(),
+                sensor_buffer: tables.sensor_buffer,
+                bits,
+                limits: ImageLimits::default(),
+                hashes: d.hashes.clone().into_iter().collect(),
+                warnings: self.warnings,
+            }),
+            _ => Err(self.faults),
+        }
+    }
+
+    fn tables(&mut self) -> Tables {
+        let (d, sort_stamps) = (self.described, self.sort_stamps);
+        Tables {
+            lines: self.table(&d.frames, |text, file| tables::frames(text, file, sort_stamps)).unwrap_or_default(),
+            site: d.site.as_deref().and_then(|name| self.site(name)),
+            truth: d.truth.as_deref().and_then(|name| self.poses(name)).unwrap_or_default(),
+            prior: d.prior.as_deref().and_then(|name| self.poses(name)).unwrap_or_default(),
+            covariances: d.prior_covariance.as_deref().and_then(|name| self.table(name, tables::covariances)),
+            visibility: d.visibility.as_deref().and_then(|name| self.table(name, tables::visibility)),
+            objects: d.objects.as_deref().and_then(|name| self.table(name, tables::objects)).unwrap_or_default(),
+            sensor_buffer: self.sensor_buffer(),
+        }
+    }
+
+    /// The readings of both devices of dead reckoning.
+    fn sensor_buffer(&mut self) -> SensorBuffer {
+        let d = self.described;
         let mut readings = |name: &Option<String>, device| {
             let table = |name: &str| self.table(name, |text, file| tables::readings(text, file, device));
             name.as_deref().and_then(table).unwrap_or_default()
@@ -172,79 +224,50 @@ impl Reader<'_> {
                 self.fault(&[key], "one device without the other", key, "dead reckoning needs `doppler` and `gyro`");
             }
         }
-        let sigma = self.prior_sigma();
-        if d.prior.is_some() && sigma.is_none() && covariances.is_none() {
-            self.fault(&["prior"], "a prior without its uncertainty", "", "add prior_sigma or prior_covariance");
-        }
-        self.names(site.as_ref(), visibility.as_deref().unwrap_or_default(), &objects);
+        SensorBuffer::new(doppler.into_iter().chain(gyro).collect())
+    }
 
-        let mut frames = Vec::with_capacity(frame_lines.len());
-        for line in &frame_lines {
+    /// The stereo pairs with their poses and visible points.
+    fn frames(&mut self, tables: &Tables, sigma: Option<Covariance6<World, Camera>>) -> Vec<DatasetFrame> {
+        let mut frames = Vec::with_capacity(tables.lines.len());
+        for line in &tables.lines {
             let (Some(left), Some(right)) = (self.image(line, &line.left), self.image(line, &line.right)) else {
                 continue;
             };
-            let covariance = covariances
-                .as_ref()
-                .and_then(|all| all.iter().find(|(stamp, _)| *stamp == line.stamp_ns).map(|(_, c)| *c))
-                .or(sigma);
+            let own = tables.covariances.iter().flatten().find(|(stamp, _)| *stamp == line.stamp_ns);
+            let visible = tables.visibility.iter().flatten().filter(|v| v.stamp_ns == line.stamp_ns);
             frames.push(DatasetFrame {
                 stamp_ns: line.stamp_ns,
                 left,
                 right,
-                truth: tum::at(&truth, line.stamp_ns),
-                prior: tum::at(&prior, line.stamp_ns).zip(covariance),
-                visible: visibility
-                    .iter()
-                    .flatten()
-                    .filter(|v| v.stamp_ns == line.stamp_ns)
-                    .map(|v| (v.object.clone(), v.point.clone()))
-                    .collect(),
+                truth: tum::at(&tables.truth, line.stamp_ns),
+                prior: tum::at(&tables.prior, line.stamp_ns).zip(own.map(|(_, covariance)| *covariance).or(sigma)),
+                visible: visible.map(|v| (v.object.clone(), v.point.clone())).collect(),
             });
         }
-        let mut warnings = std::mem::take(&mut self.warnings);
-        warnings.extend(site.iter().flat_map(|site| site.warnings.clone()));
-        warnings.extend(rig.as_ref().ok().and_then(|(rig, _)| d.not_rectified(rig, self.file, self.source)));
+        frames
+    }
+
+    /// Warns of pairs without a pose; of different clocks if no pair has one.
+    fn missing_poses(&mut self, tables: &Tables, frames: &[DatasetFrame]) {
+        let d = self.described;
         for (name, given, found, poses) in [
-            ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count(), &truth),
-            ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count(), &prior),
+            ("truth", d.truth.is_some(), frames.iter().filter(|f| f.truth.is_some()).count(), &tables.truth),
+            ("prior", d.prior.is_some(), frames.iter().filter(|f| f.prior.is_some()).count(), &tables.prior),
         ] {
+            let warning = |what: String| Fault::new(what, self.file).on_line(line_of(self.source, &[name]));
             if given
                 && found == 0
                 && let Some(offset) =
                     clock_offset(frames.iter().map(|frame| frame.stamp_ns), poses.iter().map(|pose| pose.0))
             {
-                let what = format!("clocks of pairs and {name} that differ");
-                let fault = Fault::new(what, self.file).on_line(line_of(self.source, &[name]));
-                warnings
-                    .push(fault.value(offset).remedy("no pair has a pose: give both in one clock, UTC or GPS time"));
+                let fault = warning(format!("clocks of pairs and {name} that differ")).value(offset);
+                self.warnings.push(fault.remedy("no pair has a pose: give both in one clock, UTC or GPS time"));
             } else if given && found < frames.len() {
-                warnings.push(
-                    Fault::new(format!("stereo pairs without a {name}"), self.file)
-                        .on_line(line_of(self.source, &[name]))
-                        .value(format!("{} of {}", frames.len() - found, frames.len()))
-                        .remedy("a pose belongs to a pair when its stamp is within 1 ms"),
-                );
+                let fault = warning(format!("stereo pairs without a {name}"));
+                let fault = fault.value(format!("{} of {}", frames.len() - found, frames.len()));
+                self.warnings.push(fault.remedy("a pose belongs to a pair when its stamp is within 1 ms"));
             }
-        }
-        match (rig, bits) {
-            (Ok((rig, ports)), Ok(bits)) if self.faults.is_empty() => Ok(Dataset {
-                name: d.name.clone(),
-                folder: self.folder.to_owned(),
-                rig,
-                ports,
-                site,
-                body_from_camera,
-                table: d.frames.clone(),
-                frames,
-                objects,
-                has_visibility: visibility.is_some(),
-                sensor_buffer: SensorBuffer::new(doppler.into_iter().chain(gyro).collect()),
-                bits,
-                limits: ImageLimits::default(),
-                hashes: d.hashes.clone().into_iter().collect(),
-                warnings,
-            }),
-            _ => Err(self.faults),
         }
     }
 

@@ -78,6 +78,29 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// The judge of the sets that a search found.
+    pub(super) fn of_search(
+        problem: &'a Problem<'a>,
+        found: &'a Identification,
+        solver: &'a dyn Solver,
+        acceptance: &'a Acceptance,
+        rig: Option<&'a StereoRig>,
+    ) -> Self {
+        let posterior = found.posterior.as_ref();
+        let sizes = std::iter::once(&found.pairs).chain(&found.alternatives).map(Vec::len);
+        let with_edges = if posterior.is_none() { found.pairs.len() + found.edges.len() } else { 0 };
+        let support = posterior.and_then(|posterior| posterior.support.as_ref());
+        let influential = posterior.is_some_and(|posterior| !posterior.influential_pairs.is_empty());
+        Self {
+            largest: sizes.max().unwrap_or(0).max(with_edges),
+            searched: true,
+            support,
+            weighs_influential_pairs: support.is_some() || influential,
+            near: posterior.and_then(|posterior| posterior.explanations.first()).map(|best| best.object_from_camera),
+            ..Self::of_labelled(problem, solver, acceptance, rig)
+        }
+    }
+
     /// Whether points and edges are enough: the required number of features, and at least those that fix a pose.
     pub(super) fn size(&self, pairs: &[Correspondence], edges: &[Correspondence]) -> Result<(), RejectionReason> {
         let needed = self.acceptance.min_points.max(self.solver.minimum());

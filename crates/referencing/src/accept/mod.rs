@@ -83,60 +83,21 @@ pub fn judge(
         true => found,
         false => Identification { edges: Vec::new(), alternative_edges: Vec::new(), ..found },
     };
-    let largest = std::iter::once(&found.pairs).chain(&found.alternatives).map(Vec::len).max().unwrap_or(0);
-    let largest = if found.posterior.is_none() { largest.max(found.pairs.len() + found.edges.len()) } else { largest };
-    let best = found.posterior.as_ref().and_then(|posterior| posterior.explanations.first());
-    let near = best.map(|best| best.object_from_camera);
-    let support = found.posterior.as_ref().and_then(|posterior| posterior.support.as_ref());
-    let weighs_influential_pairs =
-        support.is_some() || found.posterior.as_ref().is_some_and(|posterior| !posterior.influential_pairs.is_empty());
-    let labelled = Judge::of_labelled(problem, solver, acceptance, rig);
-    let judge = Judge { largest, searched: true, support, weighs_influential_pairs, near, ..labelled };
+    let judge = Judge::of_search(problem, &found, solver, acceptance, rig);
     let a_contrario = AContrario::of(problem, &found.pairs);
     let evidence = Evidence::of(problem, &found, judge.alert_limit, &a_contrario, &acceptance.without);
-    let mut probability = evidence.probability();
-    let sized = judge.size(&found.pairs, &found.edges);
-    let (outcome, runner_up) = match (sized, &found.posterior) {
-        (Ok(()), Some(posterior)) => {
-            let (outcome, runner_up, of_outcome) = judge.accept_posterior(&found, posterior, &evidence, probability);
-            probability = of_outcome;
-            (outcome, runner_up)
-        }
-        (Ok(()), None) => match judge.check_p_wrong(probability.wrong, [&found.pairs, &found.edges]) {
-            Ok(()) => judge.poses(&found, None),
-            Err(rejection) => (Outcome::Rejected(rejection), None),
-        },
-        (Err(rejection), _) => (Outcome::Rejected(rejection), None),
+    let (outcome, runner_up, mut probability) = tested(&judge, &found, &evidence);
+    let outcome = decided(outcome, problem, &found);
+    // A fix of fewer pairs has a number of false alarms of its own, unless edges or independent pairs determine it.
+    let subset = match &outcome {
+        Outcome::Fix(fix) if found.edges.is_empty() && !evidence.is_independent() => Some(&fix.pairs),
+        _ => None,
     };
-    // The search compares the poses of edges with those of a self-symmetry itself.
-    let outcome = match found.edges.is_empty() && acceptance.with(AcceptanceTest::SelfSymmetry) {
-        true => judge.check_self_symmetry(outcome, found.posterior.is_some(), &mut probability),
-        false => outcome,
-    };
-    let (outcome, runner_up) = match (outcome, runner_up) {
-        (Outcome::Fix(fix), None) if found.posterior.is_none() => judge.against_elsewhere(fix),
-        known => known,
-    };
-    if let (Outcome::Ambiguous(all), None) = (&outcome, &found.posterior) {
-        probability = probability.among(all.len());
+    let subset = subset.filter(|pairs| **pairs != found.pairs);
+    let nfa = subset.map_or_else(|| evidence.nfa(), |pairs| AContrario::of(problem, pairs).sets_as_good());
+    if let (Some(pairs), None) = (subset, &found.posterior) {
+        probability = Probability::counted(problem, pairs);
     }
-    let outcome = match &found.undecided {
-        Some(why @ Rejected::Mirrored { .. }) => Outcome::Rejected(why.clone().into()),
-        Some(why) if !settled(&outcome, found.optimal) => Outcome::Rejected(why.clone().into()),
-        _ => outcome,
-    };
-    let line = if found.edges.is_empty() { on_a_line(problem) } else { None };
-    let outcome = line.map_or(outcome, Outcome::Degenerate);
-    let nfa = match &outcome {
-        _ if !found.edges.is_empty() || evidence.is_independent() => evidence.nfa(),
-        Outcome::Fix(fix) if fix.pairs != found.pairs => {
-            if found.posterior.is_none() {
-                probability = Probability::counted(problem, &fix.pairs);
-            }
-            AContrario::of(problem, &fix.pairs).sets_as_good()
-        }
-        _ => a_contrario.sets_as_good(),
-    };
     let best = match &outcome {
         Outcome::Fix(_) | Outcome::Degenerate(_) => None,
         Outcome::Ambiguous(all) => all.first().and_then(|first| judge.best_pose(&first.pairs, &first.edges)),
@@ -159,6 +120,54 @@ pub fn judge(
         identified: found.pairs,
         identified_edges: found.edges,
     }
+}
+
+/// The outcome of the acceptance tests, the runner-up, and the probabilities of the outcome.
+fn tested(
+    judge: &Judge<'_>,
+    found: &Identification,
+    evidence: &Evidence<'_>,
+) -> (Outcome, Option<Alternative>, Probability) {
+    let probability = evidence.probability();
+    let rejected = |rejection| (Outcome::Rejected(rejection), None, probability);
+    let (outcome, runner_up, mut probability) = match (judge.size(&found.pairs, &found.edges), &found.posterior) {
+        (Err(rejection), _) => rejected(rejection),
+        (Ok(()), Some(posterior)) => judge.accept_posterior(found, posterior, evidence, probability),
+        (Ok(()), None) => match judge.check_p_wrong(probability.wrong, [&found.pairs, &found.edges]) {
+            Err(rejection) => rejected(rejection),
+            Ok(()) => {
+                let (outcome, runner_up) = judge.poses(found, None);
+                (outcome, runner_up, probability)
+            }
+        },
+    };
+    // The search compares the poses of edges with those of a self-symmetry itself.
+    let outcome = match found.edges.is_empty() && judge.acceptance.with(AcceptanceTest::SelfSymmetry) {
+        true => judge.check_self_symmetry(outcome, found.posterior.is_some(), &mut probability),
+        false => outcome,
+    };
+    if found.posterior.is_some() {
+        return (outcome, runner_up, probability);
+    }
+    let (outcome, runner_up) = match (outcome, runner_up) {
+        (Outcome::Fix(fix), None) => judge.against_elsewhere(fix),
+        known => known,
+    };
+    if let Outcome::Ambiguous(all) = &outcome {
+        probability = probability.among(all.len());
+    }
+    (outcome, runner_up, probability)
+}
+
+/// The outcome unless the search left it undecided, or the points of the object determine no pose.
+fn decided(outcome: Outcome, problem: &Problem<'_>, found: &Identification) -> Outcome {
+    let outcome = match &found.undecided {
+        Some(why @ Rejected::Mirrored { .. }) => Outcome::Rejected(why.clone().into()),
+        Some(why) if !settled(&outcome, found.optimal) => Outcome::Rejected(why.clone().into()),
+        _ => outcome,
+    };
+    let line = if found.edges.is_empty() { on_a_line(problem) } else { None };
+    line.map_or(outcome, Outcome::Degenerate)
 }
 
 /// The acceptance of labelled pairs, which no search selected.

@@ -57,147 +57,198 @@ fn answer(what: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
     };
     let (first, rest) = what.split_once(' ').unwrap_or((what, ""));
     let log = logs.first()?;
+    let scaled = |value: Option<f64>| value.map(|value| value * scale);
     if matches!(first, "least" | "greatest" | "middle")
         && !rest.ends_with(" of navigated")
         && !rest.contains(" at the point ")
     {
-        let each: Option<Vec<Option<f64>>> = logs.iter().map(|log| answer(rest, span, &[log])).collect();
-        let mut each: Vec<f64> = each?.into_iter().flatten().map(|value| value * scale).collect();
-        return Some(match first {
-            "least" => each.iter().copied().reduce(f64::min),
-            "greatest" => each.iter().copied().reduce(f64::max),
-            _ => (!each.is_empty()).then(|| quantile(&mut each, 0.5)),
-        });
+        return of_logs(first, rest, scale, span, logs);
     }
     if let Some(group) = rest.strip_suffix(" of common") {
-        return Some(in_common(first, group, span, logs)?.map(|value| value * scale));
+        return in_common(first, group, span, logs).map(scaled);
     }
     if let Some((quantity, point)) = rest.split_once(" at the point ") {
-        return Some(poi(first, quantity, point, span, log)?.map(|value| value * scale));
+        return poi(first, quantity, point, span, log).map(scaled);
     }
     if let Some((of, object)) = rest.split_once(" on the object ") {
-        return Some(on_object(first, of, object, span, log)?.map(|value| value * scale));
+        return on_object(first, of, object, span, log).map(scaled);
     }
     if let Some(what) = rest.strip_suffix(" over pairs") {
-        return Some(in_pairs(first, what, logs, span).map(|value| scale * value));
+        return Some(scaled(in_pairs(first, what, logs, span)));
     }
     if let Some((_, over)) = rest.split_once(" over ") {
         return compared(first, over, logs, span);
     }
     if let Some(of) = rest.strip_suffix(" half octaves of candidates") {
-        let (field, bin) = of.split_once(" at ")?;
-        let (field, bin): (Field, f64) = (Field::named(field)?, bin.parse().ok()?);
-        let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.candidates > 0);
-        let own = own.filter(|row| (2.0 * (row.candidates as f64).log2()).round() / 2.0 == bin);
-        return statistic(first, own.filter_map(|row| field.of(&row.record)).filter(|cost| *cost > 0.0).collect());
+        return by_candidates(first, of, span, logs);
     }
-    Some(match (first, rest) {
-        ("borne" | "surely-borne", of) => {
-            let key = of.strip_prefix("found along ")?;
-            let end = if first == "borne" { "percent" } else { "low" };
-            let mut largest = None;
-            for log in logs {
-                let fraction = fraction_of(end, "found of attempted", scale, span, &[log])?;
-                if fraction.is_none_or(|fraction| fraction < BORNE) {
-                    break;
-                }
-                largest = Some(log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok()?);
-            }
-            largest
-        }
-        ("axis", key) => log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok(),
-        ("every", _) => Some(log.totals.as_ref()?.every as f64),
-        ("frame", _) => Some(at(log, span)?.number as f64),
-        ("stamp", _) => Some(at(log, span)?.stamp_ns as f64),
-        ("marks", name) => {
-            let place = ["corners", "cloud", "candidates", "identified", "used"].iter().position(|n| *n == name)?;
-            Some(at(log, span)?.marks[place] as f64)
-        }
-        ("disparity", _) => (log.disparity.1 > 0).then(|| (log.disparity.0 / log.disparity.1 as f64).sqrt()),
-        (_, range) if range.starts_with("p_wrong from ") => class(first, range, span, logs)?,
-        ("count" | "density", range) if range.contains(" from ") => histogram(first, range, span, logs),
-        ("count", group) if Counted::ALL.iter().any(|counted| counted.name() == group) => {
-            let counted = Counted::ALL.into_iter().find(|counted| counted.name() == group)?;
-            Some(log.sample(span).filter_map(|f| f.navigation.as_deref()).filter(|n| counted.holds(n)).count() as f64)
-        }
+    elementary(first, rest, scale, span, logs)
+}
+
+/// The value of a quantity without a relation of logs, objects or points.
+fn elementary(first: &str, rest: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let log = logs.first()?;
+    let scaled = |value: Option<f64>| value.map(|value| value * scale);
+    match (first, rest) {
+        ("borne" | "surely-borne", of) => borne(first, of, scale, span, logs),
+        ("axis" | "every" | "frame" | "stamp" | "marks" | "disparity", of) => recorded(first, of, span, log),
+        (_, range) if range.starts_with("p_wrong from ") => class(first, range, span, logs),
+        ("count" | "density", range) if range.contains(" from ") => Some(histogram(first, range, span, logs)),
         (_, group) if group.ends_with(" with one target") || group.ends_with(" with several targets") => {
-            let several = group.ends_with(" several targets");
-            let own =
-                log.sample(span).filter(|frame| if several { frame.rows.len() > 1 } else { frame.rows.len() == 1 });
-            let events: Vec<bool> = own.map(|frame| frame.rows.iter().any(|row| found(&row.record))).collect();
-            end_of(first, log, &events)
+            Some(with_targets(first, group, span, log))
         }
-        ("count", group) if group.ends_with(" targets") => {
-            let (which, size) = group.strip_suffix(" targets")?.split_once(" with ")?;
-            let size: usize = size.parse().ok()?;
-            let own = logs.iter().flat_map(|log| log.sample(span)).filter(|frame| frame.rows.len() == size);
-            Some(own.filter(|frame| which == "frames" || frame.rows.iter().any(|row| found(&row.record))).count() as f64)
-        }
-        ("count", "logged") => Some(rows(log, span).count() as f64),
-        ("count", group) => Some(pooled(logs, group, span)? as f64),
-        ("percent" | "low" | "high", group) => fraction_of(first, group, scale, span, logs)?,
-        ("f1", _) => f1(log, span),
-        ("sum", fields) => {
-            // Correct pairs are known for fixes only.
-            let (above, below) = fields.split_once(" by ")?;
-            let (below, fixes) = below.strip_suffix(" of fixes").map_or((below, false), |below| (below, true));
-            let (above, below) = (Field::named(above)?, Field::named(below)?);
-            let own = || rows(log, span).filter(|row| !fixes || row.record.outcome == Outcome::Fix);
-            let sum = |field: Field| own().filter_map(|row| field.of(&row.record)).sum::<f64>();
-            Some(sum(above) / sum(below))
-        }
+        ("count", group) => count(group, span, logs).map(Some),
+        ("percent" | "low" | "high", group) => fraction_of(first, group, scale, span, logs),
+        ("f1", _) => Some(f1(log, span)),
+        ("sum", fields) => quotient(fields, span, log).map(Some),
         ("rms" | "rms-low" | "rms-high", of) if of.ends_with(" of navigated") => {
-            let quantity = NavigationQuantity::named(of.strip_suffix(" of navigated")?)?;
-            let values: Vec<f64> = log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?)).collect();
-            let n = values.len();
-            let value = match first {
-                "rms-low" => rms::over_frames(&values).map(|ends| ends.0),
-                "rms-high" => rms::over_frames(&values).map(|ends| ends.1),
-                _ => (n > 0).then(|| (values.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt()),
-            };
-            value.map(|value| value * scale)
+            navigated_rms(first, of, span, log).map(scaled)
         }
         ("rms" | "bound" | "ratio" | "ratio-low" | "ratio-high" | "within", of) => {
-            totals(first, of, span, log)?.map(|value| value * scale)
+            totals(first, of, span, log).map(scaled)
         }
-        ("mean", "nees of judged") => totals(first, rest, span, log)?,
-        ("value", of) => single(of, span, log)?.map(|value| value * scale),
-        (place, of) if place.starts_with("place-") => located(place, of, span, log)?,
+        ("mean", "nees of judged") => totals(first, rest, span, log),
+        ("value", of) => single(of, span, log).map(scaled),
+        (place, of) if place.starts_with("place-") => located(place, of, span, log),
         ("area", of) => {
             let (field, bound) = of.strip_suffix(" of attempted")?.split_once("<=")?;
             let (field, bound) = (Field::named(field)?, bound.parse::<f64>().ok()? / scale);
-            area(rows(log, span).map(|row| &row.record), field, bound)
+            Some(area(rows(log, span).map(|row| &row.record), field, bound))
         }
-        ("intervals", of) => toothed(of.strip_suffix(" of navigated")?, span, log)?.map(|value| value * scale),
-        ("all", of) => {
-            let field = Field::named(of.strip_suffix(" of attempted")?)?;
-            let known = rows(log, span).any(|row| found(&row.record) && field.of(&row.record).is_some());
-            let mut values: Vec<f64> = rows(log, span).map(|row| error(&row.record, field)).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len().saturating_sub(1) / 2).filter(|_| known).map(|value| value * scale)
-        }
-        (name, of) => {
-            let (field, group) = of.split_once(" of ")?;
-            let values: Vec<f64> = match Field::named(field) {
-                Some(field) => {
-                    let own = rows(log, span).filter(|row| group == "attempted" || found(&row.record));
-                    own.filter_map(|row| value(row, field)).collect()
-                }
-                None if NavigationQuantity::named(field).is_some() => {
-                    let quantity = NavigationQuantity::named(field)?;
-                    log.sample(span).filter_map(|f| quantity.of(f.navigation.as_deref()?)).collect()
-                }
-                None if field.starts_with("arm_") => {
-                    let length: f64 = field.strip_prefix("arm_")?.parse().ok()?;
-                    let place = ARMS.iter().position(|arm| *arm == length)?;
-                    let own = rows(log, span).filter(|row| found(&row.record)).map(|row| row.arms[place]);
-                    own.filter(|error| !error.is_nan()).collect()
-                }
-                None => log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect(),
-            };
-            of_median(name, log, values)?.map(|value| value * scale)
-        }
+        ("intervals", of) => toothed(of.strip_suffix(" of navigated")?, span, log).map(scaled),
+        ("all", of) => median_of_attempts(of, span, log).map(scaled),
+        (name, of) => distribution(name, of, span, log).map(scaled),
+    }
+}
+
+/// The smallest, largest or middle value of a quantity over single logs, those without a value skipped.
+fn of_logs(name: &str, of: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let each: Option<Vec<Option<f64>>> = logs.iter().map(|log| answer(of, span, &[log])).collect();
+    let mut each: Vec<f64> = each?.into_iter().flatten().map(|value| value * scale).collect();
+    Some(match name {
+        "least" => each.iter().copied().reduce(f64::min),
+        "greatest" => each.iter().copied().reduce(f64::max),
+        _ => (!each.is_empty()).then(|| quantile(&mut each, 0.5)),
     })
+}
+
+/// The value of `NAME FIELD at BIN half octaves of candidates`.
+fn by_candidates(name: &str, of: &str, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let (field, bin) = of.split_once(" at ")?;
+    let (field, bin): (Field, f64) = (Field::named(field)?, bin.parse().ok()?);
+    let own = logs.iter().flat_map(|log| rows(log, span)).filter(|row| row.candidates > 0);
+    let own = own.filter(|row| (2.0 * (row.candidates as f64).log2()).round() / 2.0 == bin);
+    statistic(name, own.filter_map(|row| field.of(&row.record)).filter(|cost| *cost > 0.0).collect())
+}
+
+/// The last value of an axis before the fraction of fixes, or the lower end of its interval, is too small.
+fn borne(name: &str, of: &str, scale: f64, span: [u64; 2], logs: &[&Log]) -> Option<Option<f64>> {
+    let key = of.strip_prefix("found along ")?;
+    let end = if name == "borne" { "percent" } else { "low" };
+    let mut largest = None;
+    for log in logs {
+        let fraction = fraction_of(end, "found of attempted", scale, span, &[log])?;
+        if fraction.is_none_or(|fraction| fraction < BORNE) {
+            break;
+        }
+        largest = Some(log.header.axes.iter().find(|axis| axis.key == key)?.value.parse().ok()?);
+    }
+    Some(largest)
+}
+
+/// A value of the log or of its first frame within the stamps, as it is recorded.
+fn recorded(name: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    Some(match name {
+        "axis" => log.header.axes.iter().find(|axis| axis.key == of)?.value.parse().ok(),
+        "every" => Some(log.totals.as_ref()?.every as f64),
+        "frame" => Some(at(log, span)?.number as f64),
+        "stamp" => Some(at(log, span)?.stamp_ns as f64),
+        "marks" => {
+            let place = ["corners", "cloud", "candidates", "identified", "used"].iter().position(|n| *n == of)?;
+            Some(at(log, span)?.marks[place] as f64)
+        }
+        _ => (log.disparity.1 > 0).then(|| (log.disparity.0 / log.disparity.1 as f64).sqrt()),
+    })
+}
+
+/// A statistic of the frames with one or with several targets: whether a target has a fix.
+fn with_targets(which: &str, group: &str, span: [u64; 2], log: &Log) -> Option<f64> {
+    let several = group.ends_with(" several targets");
+    let own = log.sample(span).filter(|frame| if several { frame.rows.len() > 1 } else { frame.rows.len() == 1 });
+    let events: Vec<bool> = own.map(|frame| frame.rows.iter().any(|row| found(&row.record))).collect();
+    end_of(which, log, &events)
+}
+
+/// The number of frames or attempts of a group.
+fn count(group: &str, span: [u64; 2], logs: &[&Log]) -> Option<f64> {
+    let log = logs.first()?;
+    if let Some(counted) = Counted::ALL.into_iter().find(|counted| counted.name() == group) {
+        let records = log.sample(span).filter_map(|frame| frame.navigation.as_deref());
+        return Some(records.filter(|record| counted.holds(record)).count() as f64);
+    }
+    if let Some(of) = group.strip_suffix(" targets") {
+        let (which, size) = of.split_once(" with ")?;
+        let size: usize = size.parse().ok()?;
+        let own = logs.iter().flat_map(|log| log.sample(span)).filter(|frame| frame.rows.len() == size);
+        let own = own.filter(|frame| which == "frames" || frame.rows.iter().any(|row| found(&row.record)));
+        return Some(own.count() as f64);
+    }
+    Some(if group == "logged" { rows(log, span).count() } else { pooled(logs, group, span)? } as f64)
+}
+
+/// The sum of one field divided by that of another.
+fn quotient(fields: &str, span: [u64; 2], log: &Log) -> Option<f64> {
+    // Correct pairs are known for fixes only.
+    let (above, below) = fields.split_once(" by ")?;
+    let (below, fixes) = below.strip_suffix(" of fixes").map_or((below, false), |below| (below, true));
+    let (above, below) = (Field::named(above)?, Field::named(below)?);
+    let own = || rows(log, span).filter(|row| !fixes || row.record.outcome == Outcome::Fix);
+    let sum = |field: Field| own().filter_map(|row| field.of(&row.record)).sum::<f64>();
+    Some(sum(above) / sum(below))
+}
+
+/// The RMS of a navigation quantity over the frames that have it, or an end of its interval.
+fn navigated_rms(which: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let quantity = NavigationQuantity::named(of.strip_suffix(" of navigated")?)?;
+    let values = navigation_values(quantity, span, log);
+    let n = values.len();
+    Some(match which {
+        "rms-low" => rms::over_frames(&values).map(|ends| ends.0),
+        "rms-high" => rms::over_frames(&values).map(|ends| ends.1),
+        _ => (n > 0).then(|| (values.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt()),
+    })
+}
+
+fn navigation_values(quantity: NavigationQuantity, span: [u64; 2], log: &Log) -> Vec<f64> {
+    log.sample(span).filter_map(|frame| quantity.of(frame.navigation.as_deref()?)).collect()
+}
+
+/// The lower median of an error over all attempts, with infinity for those without a fix.
+fn median_of_attempts(of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let field = Field::named(of.strip_suffix(" of attempted")?)?;
+    let known = rows(log, span).any(|row| found(&row.record) && field.of(&row.record).is_some());
+    let mut values: Vec<f64> = rows(log, span).map(|row| error(&row.record, field)).collect();
+    values.sort_by(f64::total_cmp);
+    Some(values.get(values.len().saturating_sub(1) / 2).copied().filter(|_| known))
+}
+
+/// A statistic of a field, a navigation quantity, an error at a lever arm or the time of a stage.
+fn distribution(name: &str, of: &str, span: [u64; 2], log: &Log) -> Option<Option<f64>> {
+    let (field, group) = of.split_once(" of ")?;
+    let values: Vec<f64> = if let Some(field) = Field::named(field) {
+        let own = rows(log, span).filter(|row| group == "attempted" || found(&row.record));
+        own.filter_map(|row| value(row, field)).collect()
+    } else if let Some(quantity) = NavigationQuantity::named(field) {
+        navigation_values(quantity, span, log)
+    } else if let Some(length) = field.strip_prefix("arm_") {
+        let length: f64 = length.parse().ok()?;
+        let place = ARMS.iter().position(|arm| *arm == length)?;
+        let own = rows(log, span).filter(|row| found(&row.record)).map(|row| row.arms[place]);
+        own.filter(|error| !error.is_nan()).collect()
+    } else {
+        log.sample(span).filter_map(|frame| stage(&frame.times, field)).collect()
+    };
+    of_median(name, log, values)
 }
 
 /// The value of `NAME QUANTITY at the point OBJECT/POINT`, over the frames with the point in view.
