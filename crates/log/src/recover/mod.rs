@@ -100,7 +100,8 @@ impl<'a> Scan<'a> {
         let passed = self.next_place().filter(|next| place.is_none() && end.is_none_or(|end| end > *next));
         if let Some(next) = passed {
             self.gap(format!("a record with a damaged head, {} bytes,", next - self.at));
-            skip(&mut self.input, next.saturating_sub(self.at + 9)).map_err(unread(self.from))?;
+            // The head may reach into that record.
+            self.input.seek(SeekFrom::Start(next)).map_err(unread(self.from))?;
             self.at = next;
             return Ok(true);
         }
@@ -191,11 +192,6 @@ impl<'a> Scan<'a> {
 
 fn unread(from: &Path) -> impl Fn(io::Error) -> LogError {
     move |source| LogError::Io { doing: "read", path: from.to_owned(), source, remedy: "is the name right?" }
-}
-
-/// Skips `length` bytes.
-fn skip(input: &mut impl Read, length: u64) -> io::Result<()> {
-    io::copy(&mut input.take(length), &mut io::sink()).map(drop)
 }
 
 /// Reads until the buffer is full or the file ends; returns the number of bytes.

@@ -212,6 +212,20 @@ fn one_flipped_bit_costs_one_chunk() {
     }
 }
 
+/// The first record claims a few bytes less than it has: the head read behind it reaches into the first chunk.
+#[test]
+fn a_length_a_few_bytes_short_costs_no_frame() {
+    let log = Log::new(FRAMES);
+    for less in [1, 5, 8, 9] {
+        let mut bytes = log.bytes.clone();
+        let length = u64::from_le_bytes(bytes[9..17].try_into().unwrap());
+        bytes[9..17].copy_from_slice(&(length - less).to_le_bytes());
+        let (found, again) = log.recover(&bytes).unwrap();
+        assert_eq!(found.frames, FRAMES, "{less} bytes: {:?}", found.lost);
+        assert!(are_of(&again, &log.full));
+    }
+}
+
 /// A trial without its header has no reader: nothing is written.
 ///
 /// Fails without the check of the new file.
