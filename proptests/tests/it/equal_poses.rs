@@ -196,3 +196,28 @@ fn proposals_that_hold_all_points_alike_are_answered_where_the_row_ends() {
     }
     assert!(fixes >= 35, "{fixes} of 40");
 }
+
+/// Five places with two points each, and all points measured twice: the second measurements are no other object.
+///
+/// Seen to fail when only the points that the best pose identifies are left out of the search for copies.
+#[test]
+fn points_measured_twice_are_no_second_object() {
+    let mut rng = ChaCha8Rng::seed_from_u64(10);
+    let mut fixes = 0;
+    for draw in 0..60 {
+        let first: Vec<Vector3<f64>> = (0..5).map(|_| cube(&mut rng, 0.7)).collect();
+        let second: Vec<Vector3<f64>> =
+            first.iter().map(|at| at + cube(&mut rng, 1.0).normalize() * 4.0 * NOISE).collect();
+        let points = [first, second].concat();
+        let (model, camera_from_object) = (exact(&points), pose(&mut rng));
+        let mut seen: Vec<Vector3<f64>> =
+            points[..8].iter().map(|at| (camera_from_object * Point::from(*at)).coords).collect();
+        seen.extend((0..15).map(|_| cube(&mut rng, 1.0) + Vector3::new(0.0, 0.0, 4.0)));
+        let places: Vec<Vector3<f64>> = seen.iter().flat_map(|at| [*at, *at]).map(|at| at + error(&mut rng)).collect();
+        let prior = prior(&mut rng, &camera_from_object, 0.4, 0.6);
+        let Some(found) = fix(&model, &places, Some(&prior), None) else { continue };
+        fixes += 1;
+        assert!(rms_apart(&model, &found, &camera_from_object.inverse()) <= 0.1, "draw {draw}");
+    }
+    assert!(fixes >= 57, "{fixes} of 60");
+}

@@ -139,7 +139,7 @@ impl Default for RigidConsensus {
 
 impl Component for RigidConsensus {
     const NAME: &'static str = "rigid-consensus";
-    const VERSION: u32 = 17;
+    const VERSION: u32 = 18;
     const SUMMARY: &'static str = "the MAP pose, weighed against its alternatives and against absence";
     const SOURCE: &'static str = "own; ideas: Grimson and Lozano-Pérez, 1987; Moisan and Stival, 2004; MacKay, \
                                   Information Theory, Inference, and Learning Algorithms, 2003, ch. 27";

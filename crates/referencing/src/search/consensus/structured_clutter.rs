@@ -51,7 +51,7 @@ impl<'a> ModelPlaces<'a> {
     }
 
     /// Whether a pair's cloud point lies at a place of the object under the best pose.
-    pub(super) fn holds_place(
+    pub(in crate::search) fn holds_place(
         &self,
         problem: &Problem<'_>,
         terms: &PairTerms,

@@ -134,12 +134,20 @@ fn cloud_points(context: &Context<'_>, mode: &Mode) -> impl Iterator<Item = usiz
     mode.members.iter().map(|&v| graph.vertices[v].cloud)
 }
 
+/// The cloud points of a mode, and those at other places of the object under it, such as a point measured twice.
+fn of_object(context: &Context<'_>, best: &Mode) -> BTreeSet<usize> {
+    let (terms, _, graph) = context.parts;
+    let places = ModelPlaces::of(context.problem, best, None);
+    let at_place = (0..graph.vertices.len()).filter(|&v| places.holds_place(context.problem, terms, graph, v));
+    cloud_points(context, best).chain(at_place.map(|v| graph.vertices[v].cloud)).collect()
+}
+
 /// Second copies of the object, and with no pattern parts of them, in the rest of the cloud.
 fn copies(context: &Context<'_>, best: &Mode, pattern: Option<&Pattern>, effort: &Effort) -> Swept {
     if !context.with(SearchMechanism::SecondCopies) {
         return Swept::nothing();
     }
-    let taken: BTreeSet<usize> = cloud_points(context, best).collect();
+    let taken = of_object(context, best);
     let min = (best.members.len() + 1).saturating_sub(LEAD).max(NEEDED);
     let left = effort.left;
     let mut copies = if !context.by_points {
