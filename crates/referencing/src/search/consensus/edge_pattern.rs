@@ -24,7 +24,9 @@ const MIN_FRACTION: f64 = 1.0 / 3.0;
 const OFF_FRACTION: f64 = 0.015;
 /// Minimum step in units of that tolerance.
 const MIN_STEP: f64 = 3.0;
-/// ln of the prior probability that the pattern goes on beyond the object: it seldom does.
+/// ln of the prior probability that the pattern goes on beyond the object, an assumption.
+///
+/// It is one in a hundred. With one half, more ladders of which a tenth is hidden are ambiguous.
 const LN_GOES_ON: f64 = -4.6;
 /// Maximum number of shifts examined: any two decide that the pose is ambiguous.
 const MAX_SHIFTS: usize = 16;
